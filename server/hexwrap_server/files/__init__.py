@@ -1,0 +1,1 @@
+"""Writers: a finished Solution as a file."""

@@ -1,0 +1,104 @@
+"""Boundary conditions and the map they lead to (paper, section 3)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from hexwrap_solver.arrays import Complexes, Floats, Ints
+from hexwrap_solver.surface.types import Surface
+
+
+@dataclass(frozen=True)
+class BoundaryCondition:
+    """Paper, section 3.1.
+
+    mode ``straight``: every boundary angle is π. ``angles``: the listed ones, π elsewhere.
+    ``isometric``: boundary lengths kept up to scale, the cone angle rounded to a multiple of quantum.
+    vertices: (k,) *sent* vertex indices, −1 where points gives a place instead. points: (k, 3).
+    angles: (k,) radians. quantum: π/3, π/2, or None to leave the cone angle as it comes.
+    spread: how ``isometric`` distributes the rounding: ``even`` (the paper) or ``optimal`` (u constant on each loop).
+    """
+
+    mode: Literal["straight", "angles", "isometric"] = "straight"
+    vertices: Ints | None = None
+    points: Floats | None = None
+    angles: Floats | None = None
+    quantum: float | None = None
+    spread: Literal["even", "optimal"] = "even"
+
+
+@dataclass(frozen=True)
+class Deck:
+    """The deck transformation g(z) = e^{i·angle} z + translation: one turn around the surface.
+
+    angle is K = Σκ over loop 0, *not* reduced modulo 2π. translation: complex.
+    """
+
+    angle: float
+    translation: complex
+
+    @property
+    def is_translation(self) -> bool:
+        """K a multiple of 2π (cylinders, and flat rings): g has no fixed point."""
+        return bool(abs(np.exp(1j * self.angle) - 1) < 1e-9)
+
+    @property
+    def apex(self) -> complex | None:
+        """The fixed point of g, or None where g is a translation."""
+        return None if self.is_translation else complex(self.translation / (1 - np.exp(1j * self.angle)))
+
+    def power(self, s: Ints) -> tuple[Complexes, Complexes]:
+        """(rotation, translation) of g^s for integer arrays s: g^s(z) = rotation·z + translation."""
+        rotation = np.exp(1j * self.angle * s)
+        apex = self.apex
+        if apex is None:
+            return np.ones(np.shape(s), dtype=complex), self.translation * np.asarray(s, dtype=complex)
+        return rotation, (1 - rotation) * apex
+
+    def apply(self, z: Complexes, s: Ints | int = 1) -> Complexes:
+        """g^s(z)."""
+        rotation, translation = self.power(np.asarray(s))
+        return np.asarray(rotation * z + translation)
+
+
+@dataclass(frozen=True)
+class ConformalMap:
+    """A discrete periodic parameterization (paper, definition 1), unrolled.
+
+    surface: the mesh that was solved (with inserted vertices where that was needed).
+    log_scale: (n,) u; new edge lengths are e^{(u_i+u_j)/2}·l_ij where flips = 0.
+    uv: (n,) complex; each vertex once, in one unrolled sheet.
+    sheet: (m, 3); corner c of face f stands at g^{sheet[f,c]}(uv[faces[f,c]]); every face is then a
+    positively oriented triangle.
+    boundary_angles: per loop, angle sums in the domain, aligned with surface.loops.
+    circumference: length of one turn: |translation| on a cylinder; on a cone |K| × apex distance of its
+    middle ring (the geometric mean of the loops' mean distances).
+    residual: max |angle sum − target|. flips: number of edges flipped; inserted: number of vertices inserted.
+    closing_error: largest disagreement of the layout around the annulus / circumference.
+    notes: sentences for the user.
+    """
+
+    surface: Surface
+    log_scale: Floats
+    uv: Complexes
+    sheet: Ints
+    deck: Deck
+    boundary_angles: tuple[Floats, Floats]
+    circumference: float
+    iterations: int
+    residual: float
+    flips: int = 0
+    inserted: int = 0
+    closing_error: float = 0.0
+    notes: tuple[str, ...] = ()
+
+    @property
+    def kind(self) -> Literal["cylinder", "cone"]:
+        return "cylinder" if abs(self.deck.angle) < 1e-9 else "cone"
+
+    def corners(self) -> Complexes:
+        """(m, 3) where the corners of every face stand in the unrolled domain."""
+        return self.deck.apply(self.uv[self.surface.faces], self.sheet)

@@ -1,0 +1,107 @@
+"""Everything that hexwrap refuses, and why.
+
+    HexwrapError
+    ├── SurfaceError            the surface is not one that can be mapped
+    │   (its children, one per way to fail, stand in ``surface/errors.py``)
+    ├── RequestError            the surface is fine, what is asked of it is not
+    │   ├── GaussBonnetError    boundary angles that no surface can have, equation (1)
+    │   ├── BoundaryError       a boundary vertex or angle that cannot be used
+    │   ├── NotAdaptedError     cone angle no multiple of the pattern's quantum, definition 2
+    │   ├── PatternError        no pattern of that size, kind or place fits
+    │   └── PanelsError         no panels under those conditions
+    └── ConvergenceError        a computation did not reach its tolerance (figures in the sentence)
+
+Each error is one clear sentence (what, where, figures, what to do) with the faulty elements as indices
+of the mesh that was *sent*. ``slug`` never changes once published: programs test for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import ClassVar
+
+
+class HexwrapError(Exception):
+    """A refusal that a person can act on.
+
+    detail: one sentence. vertices, faces: indices into the sent mesh; edges: pairs of sent vertices.
+    field: path of the request's field at fault, such as ``("boundary", "angles", 2, "angle")``.
+    data: further figures for a client, JSON-like.
+    """
+
+    slug: ClassVar[str] = "error"
+    title: ClassVar[str] = "The request cannot be carried out"
+    default_field: ClassVar[tuple[str | int, ...]] = ()
+
+    def __init__(
+        self,
+        detail: str,
+        *,
+        vertices: Iterable[int] = (),
+        faces: Iterable[int] = (),
+        edges: Iterable[Sequence[int]] = (),
+        field: tuple[str | int, ...] | None = None,
+        data: dict[str, object] | None = None,
+    ) -> None:
+        super().__init__(detail)
+        self.detail = detail
+        self.vertices = [int(v) for v in vertices]
+        self.faces = [int(f) for f in faces]
+        self.edges = [[int(a), int(b)] for a, b in edges]
+        self.field = self.default_field if field is None else field
+        self.data = data or {}
+
+    def __reduce__(self) -> tuple[object, ...]:  # the default loses keyword arguments between processes
+        return _rebuild, (type(self), self.detail, self.__dict__)
+
+
+def _rebuild(kind: type[HexwrapError], detail: str, state: dict[str, object]) -> HexwrapError:
+    error = kind(detail)
+    error.__dict__.update(state)
+    return error
+
+
+class SurfaceError(HexwrapError):
+    slug = "surface"
+    title = "The surface cannot be used"
+    default_field = ("surface",)
+
+
+class RequestError(HexwrapError):
+    slug = "request"
+    title = "The request cannot be met on this surface"
+
+
+class GaussBonnetError(RequestError):
+    slug = "gauss-bonnet"
+    title = "The boundary angles do not add up"
+    default_field = ("boundary", "angles")
+
+
+class BoundaryError(RequestError):
+    slug = "boundary"
+    title = "A boundary condition cannot be used"
+    default_field = ("boundary",)
+
+
+class NotAdaptedError(RequestError):
+    slug = "not-adapted"
+    title = "The cone angle does not fit the pattern"
+    default_field = ("boundary",)
+
+
+class PatternError(RequestError):
+    slug = "pattern"
+    title = "The pattern does not fit"
+    default_field = ("pattern",)
+
+
+class PanelsError(RequestError):
+    slug = "panels"
+    title = "The panels cannot be made"
+    default_field = ("panels",)
+
+
+class ConvergenceError(HexwrapError):
+    slug = "no-convergence"
+    title = "The computation did not converge"

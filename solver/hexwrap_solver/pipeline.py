@@ -1,0 +1,81 @@
+"""The whole way from a surface to panels (paper, Figure 2), stage by stage.
+
+A ``StageRunner`` decides how a stage is run: by default it is simply called; the service passes one that
+remembers finished stages under a hash of everything they depend on, and reports progress.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, Protocol, TypeVar
+
+from hexwrap_solver.arrays import Progress, no_progress
+from hexwrap_solver.conformal import conformal_map
+from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap
+from hexwrap_solver.panels import measure, rationalize
+from hexwrap_solver.panels.types import Components, Panels, PanelSettings, Quality, Support
+from hexwrap_solver.pattern import lay_pattern
+from hexwrap_solver.pattern.types import Pattern, PatternSettings
+from hexwrap_solver.surface.types import Surface
+
+T = TypeVar("T")
+
+
+class StageRunner(Protocol):
+    """Runs one stage. settings: all that the stage depends on besides the stages before it."""
+
+    def __call__(self, stage: str, settings: Any, compute: Callable[[Progress], T]) -> T: ...
+
+
+@dataclass
+class PlainRunner:
+    """Calls each stage and keeps its wall time in seconds."""
+
+    progress: Progress = no_progress
+    timings: dict[str, float] = field(default_factory=dict)
+
+    def __call__(self, stage: str, settings: Any, compute: Callable[[Progress], T]) -> T:
+        start = time.perf_counter()
+        result = compute(self.progress)
+        self.timings[stage] = time.perf_counter() - start
+        return result
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Everything that was computed; a stage that was not asked for is None."""
+
+    map: ConformalMap
+    quality: Quality
+    pattern: Pattern | None = None
+    panels: Panels | None = None
+    components: Components | None = None
+    support: Support | None = None
+
+
+def solve(
+    take_in: Callable[[], Surface],
+    boundary: BoundaryCondition,
+    pattern: PatternSettings | None,
+    panels: PanelSettings | None,
+    run: StageRunner | None = None,
+    *,
+    source: Any = None,
+) -> Solution:
+    """Surface → conformal map → pattern → panels → quality.
+
+    take_in: makes the annulus from whatever was sent (``surface_from_mesh`` or ``surface_from_nurbs``).
+    source: what the surface depends on, for runners that remember. Raises HexwrapError.
+    """
+    run = run or PlainRunner()
+    surface = run("surface", source, lambda progress: take_in())
+    cmap = run("map", boundary, lambda progress: conformal_map(surface, boundary, progress))
+    if pattern is None:
+        return Solution(cmap, run("quality", None, lambda progress: measure(cmap, None, None)))
+    laid = run("pattern", pattern, lambda progress: lay_pattern(cmap, pattern, progress))
+    if panels is None:
+        return Solution(cmap, run("quality", None, lambda progress: measure(cmap, laid, None)), laid)
+    made = run("panels", panels, lambda progress: rationalize(cmap, laid, panels, progress))
+    return Solution(cmap, run("quality", None, lambda progress: measure(cmap, laid, made)), laid, made)

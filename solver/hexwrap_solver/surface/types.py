@@ -1,0 +1,48 @@
+"""What the intake of a surface yields (paper, Figure 2: NURBS surface → triangle mesh)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from hexwrap_solver.arrays import Floats, Ints
+
+
+@dataclass(frozen=True)
+class NurbsSurface:
+    """Tensor-product rational B-spline surface with *full* knot vectors.
+
+    degree: (p, q). knots: two arrays of lengths n+p+1 and m+q+1. control_points: (n, m, 4) as
+    (x, y, z, w), coordinates not premultiplied by the weight. closed: whether the surface closes up
+    (with whatever knots; clamped-and-coincident or periodic) in u, in v.
+    """
+
+    degree: tuple[int, int]
+    knots: tuple[Floats, Floats]
+    control_points: Floats
+    closed: tuple[bool, bool]
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A triangle mesh that is an annulus: connected, oriented, manifold, two boundary loops, χ = 0.
+
+    vertices: (n, 3). faces: (m, 3), counter-clockwise seen from outside.
+    loops: the two boundary loops as vertex indices, surface on the left; loop 0 holds the lowest sent
+    vertex index of the boundary.
+    input_vertex: (n,) a sent vertex that stands at vertex i, or −1.
+    vertex_of_input: (n_sent,) the vertex at which each sent vertex stands, or −1 where it was dropped.
+    normals: (n, 3) unit vertex normals (sent ones, the NURBS surface's, or area-weighted face normals).
+    repairs: one sentence each.
+    nurbs, parameters: the NURBS surface the mesh was made from, and (n, 2) its parameters at the
+    vertices (in the closed direction, parameters are in the base period); None for sent meshes.
+    """
+
+    vertices: Floats
+    faces: Ints
+    loops: tuple[Ints, Ints]
+    input_vertex: Ints
+    vertex_of_input: Ints
+    normals: Floats
+    repairs: tuple[str, ...] = ()
+    nurbs: NurbsSurface | None = None
+    parameters: Floats | None = None
