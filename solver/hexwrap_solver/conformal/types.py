@@ -31,6 +31,23 @@ class BoundaryCondition:
 
 
 @dataclass(frozen=True)
+class Targets:
+    """What the variational problem prescribes at each vertex; both routes (plain, flips) take it.
+
+    angle: (n,) target angle sums Θ: 2π inside, as wanted on the boundary (ignored where tie ≥ 0).
+    tie: (n,) −1 where u is free; vertices with equal tie ≥ 0 share one value of u. Tie 0 is pinned at u = 0.
+    tie_angle: (t,) prescribed *sum* of the angle sums over the vertices of each tie (entry 0 is ignored).
+
+    Prescribed angles everywhere: all ties −1 (u is then determined up to a constant). Isometric boundary:
+    both loops have tie 0. Least stretch at given cone angle: loop 0 has tie 0, loop 1 tie 1.
+    """
+
+    angle: Floats
+    tie: Ints
+    tie_angle: Floats
+
+
+@dataclass(frozen=True)
 class Deck:
     """The deck transformation g(z) = e^{i·angle} z + translation: one turn around the surface.
 
