@@ -64,7 +64,7 @@ def _rebuild(kind: type[HexwrapError], detail: str, state: dict[str, object]) ->
 class SurfaceError(HexwrapError):
     slug = "surface"
     title = "The surface cannot be used"
-    default_field = ("surface",)
+    default_field: ClassVar[tuple[str | int, ...]] = ("surface",)
 
 
 class RequestError(HexwrapError):

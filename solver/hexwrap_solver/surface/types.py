@@ -4,7 +4,33 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from hexwrap_solver.arrays import Floats, Ints
+from hexwrap_solver.arrays import Floats, Ints, Ragged
+
+
+@dataclass(frozen=True)
+class SentMesh:
+    """A polygon mesh as it was sent, nothing checked yet.
+
+    vertices: (n, 3). faces: rows of 3 or 4 vertex indices. normals: (n, 3), any length, or None.
+    """
+
+    vertices: Floats
+    faces: Ragged
+    normals: Floats | None = None
+
+
+@dataclass(frozen=True)
+class MeshSettings:
+    """How finely a NURBS surface is meshed (paper, Figure 2), lengths in model units.
+
+    max_edge: no edge is longer; None: chosen from the surface's area, about 6,000 vertices.
+    tolerance: chord height, greatest distance of the middle of an edge from the surface; None: not asked for.
+    max_vertices: a finer mesh than this is refused (SurfaceError) before any large array is made.
+    """
+
+    max_edge: float | None = None
+    tolerance: float | None = None
+    max_vertices: int = 1_000_000
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,118 @@
+"""Every way in which a sent surface can fail to be an annulus that can be mapped.
+
+SurfaceError
+├── of the data
+│   ├── EmptySurfaceError        no vertices or no faces
+│   ├── ShapeError               an array of the wrong shape
+│   ├── NonFiniteError           NaN, infinity, or numbers too large to square
+│   ├── IndexRangeError          a face points at a vertex that was not sent
+│   ├── PolygonSizeError         a face with other than three or four corners
+│   ├── DegeneratePolygonError   a face without area that could not be repaired
+│   └── FlatSurfaceError         all vertices in one place or on one line
+├── of the topology
+│   ├── NonManifoldEdgeError     an edge with three or more faces
+│   ├── NonManifoldVertexError   faces that meet in a vertex only
+│   ├── SeveralComponentsError   more than one piece
+│   ├── NotOrientableError       a Möbius band
+│   └── NotAnnulusError          closed, wrong number of boundary loops, or handles
+└── of a NURBS surface
+    ├── NurbsDataError           degree, knots, weights or control points that define no surface
+    ├── NotClosedError           closed in no direction, or not where it claims to be
+    ├── PoleError                a boundary that shrinks to a point
+    └── TooFineError             a mesh of more vertices than allowed
+"""
+
+from __future__ import annotations
+
+from hexwrap_solver.errors import SurfaceError
+
+
+class EmptySurfaceError(SurfaceError):
+    slug = "empty-surface"
+    title = "The surface is empty"
+
+
+class ShapeError(SurfaceError):
+    slug = "malformed-surface"
+    title = "The surface's arrays have the wrong shape"
+
+
+class NonFiniteError(SurfaceError):
+    slug = "not-finite"
+    title = "The surface has coordinates that are no finite numbers"
+    default_field = ("surface", "vertices")
+
+
+class IndexRangeError(SurfaceError):
+    slug = "index-out-of-range"
+    title = "A face points at a vertex that was not sent"
+    default_field = ("surface", "faces")
+
+
+class PolygonSizeError(SurfaceError):
+    slug = "polygon-size"
+    title = "A face is neither triangle nor quad"
+    default_field = ("surface", "faces")
+
+
+class DegeneratePolygonError(SurfaceError):
+    slug = "degenerate-face"
+    title = "A face has no area"
+    default_field = ("surface", "faces")
+
+
+class FlatSurfaceError(SurfaceError):
+    slug = "no-extent"
+    title = "The surface has no area"
+    default_field = ("surface", "vertices")
+
+
+class NonManifoldEdgeError(SurfaceError):
+    slug = "non-manifold-edge"
+    title = "More than two faces share an edge"
+
+
+class NonManifoldVertexError(SurfaceError):
+    slug = "non-manifold-vertex"
+    title = "Parts of the surface touch in a single vertex"
+
+
+class SeveralComponentsError(SurfaceError):
+    slug = "several-components"
+    title = "The surface is in several pieces"
+
+
+class NotOrientableError(SurfaceError):
+    slug = "not-orientable"
+    title = "The surface has only one side"
+
+
+class NotAnnulusError(SurfaceError):
+    """data["reason"] is ``closed``, ``loops`` or ``handle``; the figures stand beside it."""
+
+    slug = "not-an-annulus"
+    title = "The surface is not tube-like"
+
+
+class NurbsDataError(SurfaceError):
+    slug = "nurbs-data"
+    title = "The NURBS data define no surface"
+    default_field = ("surface", "nurbs")
+
+
+class NotClosedError(SurfaceError):
+    slug = "nurbs-not-closed"
+    title = "The NURBS surface does not close up"
+    default_field = ("surface", "nurbs", "closed")
+
+
+class PoleError(SurfaceError):
+    slug = "nurbs-pole"
+    title = "The NURBS surface shrinks to a point"
+    default_field = ("surface", "nurbs", "control_points")
+
+
+class TooFineError(SurfaceError):
+    slug = "mesh-too-fine"
+    title = "The mesh would have too many vertices"
+    default_field = ("surface", "mesh")
