@@ -19,7 +19,8 @@ class BoundaryCondition:
     ``isometric``: boundary lengths kept up to scale, the cone angle rounded to a multiple of quantum.
     vertices: (k,) *sent* vertex indices, −1 where points gives a place instead. points: (k, 3).
     angles: (k,) radians. quantum: π/3, π/2, or None to leave the cone angle as it comes.
-    spread: how ``isometric`` distributes the rounding: ``even`` (the paper) or ``optimal`` (u constant on each loop).
+    spread: how ``isometric`` distributes the rounding: ``even`` (the paper) or ``optimal`` (u constant on
+    each loop).
     """
 
     mode: Literal["straight", "angles", "isometric"] = "straight"

@@ -1,0 +1,161 @@
+"""The convex energy of discretely conformal metrics (Springborn, Schröder, Pinkall 2008, section 3).
+
+New lengths are l̃_ij = e^{(u_i+u_j)/2} l_ij. Its gradient is Θ_i − Σ angles at i, its Hessian half the
+cotangent Laplacian of the *new* metric. Only gradient and Hessian are needed: see ``newton``.
+
+All arrays per corner are (3, m): row k belongs to corner k of every face, and the edge opposite to it.
+That keeps each operation contiguous in memory.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hexwrap_solver.arrays import Bools, Floats, Ints
+from hexwrap_solver.conformal.types import Targets
+from hexwrap_solver.surface.types import Surface
+
+
+def total(index: Ints, values: Floats, n: int) -> Floats:
+    """(n,) sums of the values that share an index."""
+    return np.asarray(np.bincount(index, weights=values, minlength=n), dtype=np.float64)
+
+
+def opposite_lengths(vertices: Floats, faces: Ints) -> Floats:
+    """(3, m) length of the edge opposite to each corner, from coordinate differences.
+
+    Differences come first, so a far-away origin costs no digits beyond those the data has lost already.
+    """
+    corner = vertices[faces]
+    edge = np.stack([corner[:, (k + 2) % 3] - corner[:, (k + 1) % 3] for k in range(3)])
+    largest = np.abs(edge).max(initial=0.0) or 1.0
+    edge /= largest  # squares must neither overflow nor vanish
+    return np.asarray(np.sqrt(np.einsum("kmd,kmd->km", edge, edge)) * largest)
+
+
+@dataclass(frozen=True)
+class Corners:
+    """Angles of every triangle of a metric, and what the Hessian needs.
+
+    angle: (3, m). broken: (m,) where the triangle inequality fails. cotangent: (3, m), 0 where broken.
+    """
+
+    angle: Floats
+    excess: Floats
+    radius: Floats
+    broken: Bools
+
+    def cotangent(self) -> Floats:
+        """cot α = (s² − r²) / (2 r s), from tan(α/2) = r/s; no cancellation beyond that in s itself."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            cot = (self.excess - self.radius) * (self.excess + self.radius) / (2 * self.radius * self.excess)
+        if self.broken.any():
+            cot[:, self.broken] = 0.0
+        return np.asarray(cot)
+
+
+def corner_angles(lengths: Floats) -> Corners:
+    """Angles from (3, m) lengths, continued by (π, 0, 0) where the triangle inequality fails.
+
+    Half-angle form tan(α/2) = r/s_a with s_a = b + c − a and r² = s_a s_b s_c/(a + b + c): accurate for
+    needles and caps alike. The three angles add up to π exactly, as Gauss–Bonnet wants it.
+    """
+    a, b, c = lengths
+    # b + c − a in an order in which close lengths are subtracted first
+    excess = np.stack([c + (b - a), a + (c - b), b + (a - c)])
+    broken = np.asarray((excess <= 0).any(axis=0))
+    square = excess[0] * excess[1] * excess[2] / (a + b + c)
+    radius = np.sqrt(np.maximum(square, 0.0, where=~broken, out=np.zeros_like(square)))
+    angle = np.zeros_like(lengths)
+    angle[:2] = 2 * np.arctan2(radius, excess[:2])
+    if broken.any():
+        angle[:2, broken] = np.where(excess[:2, broken] <= 0, np.pi, 0.0)
+    angle[2] = np.pi - angle[0] - angle[1]
+    return Corners(angle, excess, radius, broken)
+
+
+class Energy:
+    """Gradient and Hessian in the unknowns that are left after pinning and tying (see ``Targets``).
+
+    dof: (n,) unknown of each vertex, −1 where u = 0 is fixed. With nothing pinned, u is only defined up to
+    a constant: then the first vertex is pinned (its equation follows from Gauss–Bonnet).
+    rows, columns: (e,) the off-diagonal pattern of the Hessian, rows > columns, each pair once.
+    """
+
+    def __init__(self, surface: Surface, targets: Targets) -> None:
+        self.targets = targets
+        self.n = len(surface.vertices)
+        self.corner = np.ascontiguousarray(surface.faces.T)
+        self.lengths = opposite_lengths(surface.vertices, surface.faces)
+        self.dof, self.n_dof = _unknowns(targets)
+        self.target = self._reduce(np.where(targets.tie < 0, targets.angle, 0.0))
+        for tie in range(1, len(targets.tie_angle)):
+            self.target[self.dof[np.argmax(targets.tie == tie)]] = targets.tie_angle[tie]
+        self._find_pattern()
+
+    def _find_pattern(self) -> None:
+        first, second = self.dof[self.corner[[1, 2, 0]].ravel()], self.dof[self.corner[[2, 0, 1]].ravel()]
+        low, high = np.minimum(first, second), np.maximum(first, second)
+        apart = low != high  # an edge inside one tie does not change
+        self._to_low = np.flatnonzero(apart & (low >= 0))
+        self._to_high = np.flatnonzero(apart)
+        self._low, self._high = low[self._to_low], high[self._to_high]
+        pairs, self._pair = np.unique(self._low * self.n_dof + high[self._to_low], return_inverse=True)
+        self.rows, self.columns = pairs % self.n_dof, pairs // self.n_dof
+
+    def _reduce(self, per_vertex: Floats) -> Floats:
+        """Sums over the vertices that share an unknown; pinned ones fall away."""
+        return total(self.dof + 1, per_vertex, self.n_dof + 1)[1:]
+
+    def scale_of(self, x: Floats) -> Floats:
+        """(n,) u from the unknowns."""
+        return np.concatenate([[0.0], x])[self.dof + 1]
+
+    def unknowns_of(self, u: Floats) -> Floats:
+        """(n_dof,) the unknowns from u, which is shifted to vanish where it is pinned."""
+        pinned = np.flatnonzero(self.dof < 0)
+        x = np.zeros(self.n_dof + 1)
+        x[self.dof + 1] = u - u[pinned].mean()
+        return x[1:]
+
+    def corners(self, u: Floats) -> Corners:
+        """Angles of the new metric. Each triangle is scaled by e^{−(u_i+u_j+u_k)/2}, which leaves them as
+        they are and makes one exponential per vertex do."""
+        return corner_angles(self.lengths * np.exp((u.mean() - u) / 2)[self.corner])
+
+    def scaled_lengths(self, u: Floats) -> Floats:
+        """(3, m) e^{(u_i+u_j)/2} l_ij."""
+        half = np.exp(u / 2)[self.corner]
+        return np.asarray(self.lengths * half[[1, 2, 0]] * half[[2, 0, 1]])
+
+    def angle_sums(self, corners: Corners) -> Floats:
+        """(n,) angle sum at each vertex."""
+        return total(self.corner.ravel(), corners.angle.ravel(), self.n)
+
+    def gradient(self, corners: Corners) -> Floats:
+        """(n_dof,) Θ − Σ angles."""
+        return self.target - self._reduce(self.angle_sums(corners))
+
+    def hessian(self, corners: Corners) -> tuple[Floats, Floats]:
+        """(n_dof,) diagonal and (e,) off-diagonal values of half the cotangent Laplacian."""
+        weight = 0.5 * corners.cotangent().ravel()
+        to_low = weight[self._to_low]
+        diagonal = total(self._low, to_low, self.n_dof)
+        diagonal += total(self._high, weight[self._to_high], self.n_dof)
+        return diagonal, -total(self._pair, to_low, len(self.rows))
+
+
+def _unknowns(targets: Targets) -> tuple[Ints, int]:
+    """(n,) unknown of each vertex (−1: pinned) and their number; ties come last."""
+    free = targets.tie < 0
+    if not (targets.tie == 0).any():
+        free = free.copy()
+        free[np.argmax(free)] = False
+    n_free = int(free.sum())
+    dof = np.full(len(free), -1, dtype=np.int64)
+    dof[free] = np.arange(n_free)
+    tied = targets.tie > 0
+    dof[tied] = n_free + targets.tie[tied] - 1
+    return dof, n_free + max(len(targets.tie_angle) - 1, 0)

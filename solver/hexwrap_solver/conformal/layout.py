@@ -1,0 +1,140 @@
+"""Unrolling a flat metric on an annulus (paper, Figure 4): positions, sheets, deck transformation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.csgraph import breadth_first_order
+
+from hexwrap_solver.arrays import Complexes, Floats, Ints
+from hexwrap_solver.conformal.cut import Cut, cut_open
+from hexwrap_solver.conformal.types import Deck
+
+#: Cone angles nearer than this to a multiple of 2π count as one: g is a translation (see Deck).
+FULL_TURN = 1e-9
+#: A translation shorter than this, relative to the domain, is none (flat rings that close up by themselves).
+NO_TRANSLATION = 1e-10
+
+
+@dataclass(frozen=True)
+class Layout:
+    """uv: (n,) complex. sheet: (m, 3). closing_error: greatest disagreement around the annulus, relative
+    to the circumference. The other fields as in ConformalMap."""
+
+    uv: Complexes
+    sheet: Ints
+    deck: Deck
+    circumference: float
+    closing_error: float
+
+
+def lay_out(
+    faces: Ints, lengths: Floats, angles: Floats, cone_angle: float, loops: tuple[Ints, Ints], n: int
+) -> Layout:
+    """Develops the triangles over a breadth-first tree of the faces and closes the result with g.
+
+    lengths, angles: (3, m) of the flat metric (row k: corner k, and the edge opposite to it).
+    cone_angle: K. g is one turn around the surface in the direction of loop 0 (surface on its left).
+
+    Cylinder: g moves along +x, loop 0 lies around y = 0 with the surface above. Cone: the apex is the
+    origin, and the sheet is symmetric to the positive y axis. K = 2πm, m ≠ 0: loop 0 is centred at 0.
+    """
+    cut = cut_open(faces, loops, n)
+    corners = _develop(cut.twin, lengths, angles, faces)
+    return _close(faces, corners, cut, cone_angle, loops, n)
+
+
+def _local_frames(lengths: Floats, angles: Floats) -> Complexes:
+    """(m, 3) every triangle by itself: corner 0 at 0, corner 1 on the positive real axis."""
+    local = np.zeros((lengths.shape[1], 3), dtype=complex)
+    local[:, 1] = lengths[2]
+    local[:, 2] = lengths[1] * np.exp(1j * angles[0])
+    return local
+
+
+def _develop(twin: Ints, lengths: Floats, angles: Floats, faces: Ints) -> Complexes:
+    """(m, 3) all triangles side by side in the plane, consistent across all edges of the tree.
+
+    Motions z → r z + t from each face into its parent are composed by pointer jumping: after k rounds
+    every face knows the way 2^k steps up the tree, so rounds and rounding errors grow with log(depth).
+    """
+    m = len(faces)
+    local = _local_frames(lengths, angles)
+    inside = np.flatnonzero(twin.ravel() >= 0)
+    graph = sparse.csr_matrix(
+        (np.ones(len(inside), dtype=np.int8), (inside // 3, twin.ravel()[inside])), shape=(m, m)
+    )
+    order, parent = breadth_first_order(graph, 0)
+    child = order[1:].astype(np.int64)
+    above = parent[child].astype(np.int64)
+    edge = (twin[child] == above[:, None]).argmax(axis=1)
+    tail = faces[child, (edge + 1) % 3]
+    start = (faces[above] == tail[:, None]).argmax(axis=1)  # the same edge runs backwards in the parent
+    from_child = local[child, (edge + 1) % 3], local[child, (edge + 2) % 3]
+    in_parent = local[above, start], local[above, (start + 2) % 3]
+    turn = np.ones(m, dtype=complex)
+    shift = np.zeros(m, dtype=complex)
+    ratio = (in_parent[1] - in_parent[0]) / (from_child[1] - from_child[0])
+    turn[child] = ratio / np.abs(ratio)
+    shift[child] = (in_parent[0] + in_parent[1]) / 2 - turn[child] * (from_child[0] + from_child[1]) / 2
+    up = np.zeros(m, dtype=np.int64)
+    up[child] = above
+    while up.any():
+        shift = turn[up] * shift + shift[up]
+        turn = turn[up] * turn
+        up = up[up]
+    turn /= np.abs(turn)
+    return np.asarray(turn[:, None] * local + shift[:, None])
+
+
+def _close(
+    faces: Ints, corners: Complexes, cut: Cut, cone_angle: float, loops: tuple[Ints, Ints], n: int
+) -> Layout:
+    flat = faces.ravel()
+    rotation = np.exp(1j * cone_angle)
+    on_left = cut.sheet.ravel() > 0
+    right = _mean_position(flat[~on_left], corners.ravel()[~on_left], n)
+    left = _mean_position(flat[on_left], corners.ravel()[on_left], n)[cut.path]
+    # left = e^{iK} right + t along the cut: t in least squares, then the positions share the rest
+    offsets = left - rotation * right[cut.path]
+    translation = complex(offsets.mean())
+    disagreement = float(np.abs(offsets - translation).max())
+    uv = right
+    deck = Deck(cone_angle, translation)
+    uv, deck, circumference = _normalise(uv, deck, cut, faces, loops)
+    return Layout(uv, cut.sheet, deck, circumference, disagreement / circumference)
+
+
+def _mean_position(vertex: Ints, position: Complexes, n: int) -> Complexes:
+    count = np.maximum(np.bincount(vertex, minlength=n), 1)
+    real = np.bincount(vertex, weights=position.real, minlength=n)
+    imaginary = np.bincount(vertex, weights=position.imag, minlength=n)
+    return np.asarray((real + 1j * imaginary) / count)
+
+
+def _normalise(
+    uv: Complexes, deck: Deck, cut: Cut, faces: Ints, loops: tuple[Ints, Ints]
+) -> tuple[Complexes, Deck, float]:
+    """Moves the sheet into its standard place (see lay_out). Also gives the circumference."""
+    foot = uv[cut.path[0]]
+    if abs(deck.angle) < FULL_TURN:
+        turn = abs(deck.translation) / deck.translation
+        moved = (uv - foot) * turn
+        moved -= 1j * moved[loops[0]].imag.mean()
+        length = abs(deck.translation)
+        return moved, Deck(deck.angle, complex(length)), length
+    if deck.is_translation:
+        moved = uv - uv[loops[0]].mean()
+        radii = [float(np.abs(moved[loop] - moved[loop].mean()).mean()) for loop in loops]
+        length = abs(deck.angle) * float(np.sqrt(radii[0] * radii[1]))
+        short = abs(deck.translation) <= NO_TRANSLATION * length
+        return moved, Deck(deck.angle, 0j if short else deck.translation), length
+    apex = deck.apex
+    assert apex is not None  # no translation: g has a fixed point
+    moved = uv - apex
+    turn = np.exp(1j * (np.pi - deck.angle) / 2) * np.conj(foot - apex) / abs(foot - apex)
+    moved = moved * turn
+    radii = [float(np.abs(moved[loop]).mean()) for loop in loops]
+    return moved, Deck(deck.angle, 0j), abs(deck.angle) * float(np.sqrt(radii[0] * radii[1]))

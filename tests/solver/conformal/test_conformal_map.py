@@ -1,0 +1,103 @@
+"""Theorems about the map: flatness, closed forms, what the contract says of uv, sheets and g."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from tests.solver.conformal.annuli import bump, catenoid, flat_cone
+
+from hexwrap_solver.conformal import conformal_map
+from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap
+
+CONDITIONS = [
+    BoundaryCondition(),
+    BoundaryCondition("isometric"),
+    BoundaryCondition("isometric", quantum=np.pi / 3),
+    BoundaryCondition("isometric", quantum=np.pi / 3, spread="optimal"),
+    BoundaryCondition("isometric", quantum=np.pi / 2),
+]
+
+
+def assert_honest(cmap: ConformalMap) -> None:
+    """Every promise of the contract's paragraph on ``map``, checked from outside."""
+    surface, u, corners = cmap.surface, cmap.log_scale, cmap.corners()
+    faces = surface.faces
+    for k in range(3):
+        i, j = faces[:, (k + 1) % 3], faces[:, (k + 2) % 3]
+        length = np.linalg.norm(surface.vertices[i] - surface.vertices[j], axis=1) * np.exp((u[i] + u[j]) / 2)
+        drawn = np.abs(corners[:, (k + 2) % 3] - corners[:, (k + 1) % 3])
+        np.testing.assert_allclose(drawn, length, rtol=1e-8)
+    edge_1, edge_2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    assert ((edge_1.conj() * edge_2).imag > 0).all()
+    angle = np.stack(
+        [
+            np.angle((corners[:, (k + 2) % 3] - corners[:, k]) / (corners[:, (k + 1) % 3] - corners[:, k]))
+            for k in range(3)
+        ],
+        1,
+    )
+    sums = np.bincount(faces.ravel(), weights=angle.ravel())
+    inside = np.ones(len(sums), dtype=bool)
+    for loop, told in zip(surface.loops, cmap.boundary_angles, strict=True):
+        inside[loop] = False
+        np.testing.assert_allclose(sums[loop], told, atol=1e-9)
+    np.testing.assert_allclose(sums[inside], 2 * np.pi, atol=1e-9)
+    assert abs((np.pi - cmap.boundary_angles[0]).sum() - cmap.deck.angle) < 1e-9
+    assert abs((np.pi - cmap.boundary_angles[1]).sum() + cmap.deck.angle) < 1e-9
+    assert cmap.closing_error < 1e-9
+
+
+@pytest.mark.parametrize("condition", CONDITIONS)
+def test_every_mode_keeps_the_promises_of_the_contract(condition: BoundaryCondition) -> None:
+    cmap = conformal_map(bump(40, 20), condition)
+    assert_honest(cmap)
+    assert cmap.residual < 1e-11
+    if condition.quantum:
+        assert cmap.deck.angle / condition.quantum == pytest.approx(
+            round(cmap.deck.angle / condition.quantum), abs=1e-14
+        )
+
+
+def test_straight_loops_lie_on_two_parallels_with_loop_0_below() -> None:
+    cmap = conformal_map(bump(40, 20), BoundaryCondition())
+    low, high = (cmap.uv[loop] for loop in cmap.surface.loops)
+    assert np.abs(low.imag).max() < 1e-11
+    assert np.ptp(high.imag) < 1e-11
+    assert high.imag.mean() > 0
+    assert cmap.kind == "cylinder"
+
+
+def test_g_is_one_turn_along_loop_0() -> None:
+    """Developing loop 0 once around ends at g of where it began."""
+    cmap = conformal_map(bump(40, 20), BoundaryCondition("isometric"))
+    loop = cmap.surface.loops[0]
+    position, corners = cmap.uv[loop[0]], cmap.corners()
+    sheet = 0
+    for tail, head in zip(loop, np.roll(loop, -1), strict=True):
+        [[face, a]] = np.argwhere((cmap.surface.faces == tail) & (np.roll(cmap.surface.faces, -1, 1) == head))
+        b = (a + 1) % 3
+        step = sheet - cmap.sheet[face, a]
+        assert abs(cmap.deck.apply(corners[face, a], step) - position) < 1e-9
+        position, sheet = complex(cmap.deck.apply(corners[face, b], step)), step + cmap.sheet[face, b]
+    assert sheet == 1
+    assert abs(position - cmap.deck.apply(cmap.uv[loop[0]])) < 1e-9
+
+
+def test_modulus_of_the_catenoid_converges_with_order_two() -> None:
+    error = []
+    for n in (8, 16, 32):
+        cmap = conformal_map(catenoid(4 * n, n), BoundaryCondition())
+        height = cmap.uv[cmap.surface.loops[1]].imag.mean()
+        error.append(abs(height / cmap.circumference / (1.5 / (2 * np.pi)) - 1))
+    order = np.diff(-np.log2(error))
+    assert (order > 1.9).all()
+
+
+def test_a_flat_cone_maps_to_itself() -> None:
+    cone = flat_cone(48, 12, 1.0, 2.0, np.pi / 3)
+    cmap = conformal_map(cone, BoundaryCondition("isometric"))
+    assert np.abs(cmap.log_scale).max() < 1e-12
+    # the polygon of 48 sides has slightly less angle than the round cone
+    assert cmap.deck.angle == pytest.approx(48 * 2 * np.arcsin(np.sin(np.pi / 48) / 6), rel=1e-12)
+    assert np.abs(cmap.uv[cone.loops[0]]) == pytest.approx(2.0, rel=1e-12)
+    assert cmap.deck.apex == 0
