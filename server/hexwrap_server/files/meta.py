@@ -1,0 +1,59 @@
+"""What the writers are told besides the solution, and how they say that there is nothing to write."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+from hexwrap_solver.errors import HexwrapError
+from hexwrap_solver.panels.types import Panels
+from hexwrap_solver.pattern.types import Pattern
+from hexwrap_solver.pipeline import Solution
+
+
+@dataclass(frozen=True)
+class Meta:
+    """name: of the job, any text. timings: seconds per stage.
+
+    sheet: width and height of the sheets of ``flat.dxf`` in model units; None takes a size that holds
+    about six by four of the largest panels.
+    """
+
+    name: str = "hexwrap"
+    timings: Mapping[str, float] = field(default_factory=dict)
+    sheet: tuple[float, float] | None = None
+
+
+class NotMadeError(HexwrapError):
+    """The file shows something that was not asked for, so it cannot be written."""
+
+    slug: ClassVar[str] = "not-made"
+    title: ClassVar[str] = "The file needs a stage that was left out"
+
+
+class SheetError(HexwrapError):
+    """A panel is larger than the sheet it should be cut from."""
+
+    slug: ClassVar[str] = "sheet"
+    title: ClassVar[str] = "The panels do not fit on the sheets"
+
+
+def panels_of(solution: Solution, name: str) -> tuple[Pattern, Panels]:
+    """The pattern and its panels. Raises NotMadeError where the request stopped before them, or none fit."""
+    if solution.pattern is None:
+        raise NotMadeError(
+            f'{name} shows panels, but the request has "pattern": null; ask for a pattern and panels.',
+            field=("pattern",),
+        )
+    if solution.panels is None:
+        raise NotMadeError(
+            f'{name} shows panels, but the request has "panels": null; ask for panels.', field=("panels",)
+        )
+    if solution.panels.n_panels == 0:
+        raise NotMadeError(
+            f"{name} shows panels, but no cell of the pattern became one "
+            f'({solution.pattern.n_cells} cells); ask for smaller cells, or for "boundary": "trim".',
+            field=("pattern",),
+        )
+    return solution.pattern, solution.panels

@@ -1,0 +1,149 @@
+"""A small z-buffer rasterizer for planar polygons, in arrays: no display, no graphics library."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged
+
+#: Samples drawn at a time; bounds the memory that fragments take.
+CHUNK = 2_000_000
+#: Polygons seen at a flatter angle than this (sine) cover no sample worth drawing.
+EDGE_ON = 1e-4
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A pinhole. axes: rows right, down, forward (unit, world); focal: samples; center: principal point."""
+
+    position: Floats
+    axes: Floats
+    focal: float
+    center: tuple[float, float]
+    width: int
+    height: int
+
+    def see(self, points: Floats) -> Floats:
+        """(n, 3) camera coordinates: right, down, depth."""
+        return np.asarray((points - self.position) @ self.axes.T)
+
+    def project(self, seen: Floats) -> Floats:
+        """(n, 2) image position of camera coordinates."""
+        return np.asarray(seen[:, :2] * (self.focal / seen[:, 2:3]) + self.center)
+
+    def rays(self, x: Floats, y: Floats) -> Floats:
+        """(…, 3) directions in camera coordinates through image positions, with depth 1."""
+        return np.stack(
+            [(x - self.center[0]) / self.focal, (y - self.center[1]) / self.focal, np.ones_like(x)], axis=-1
+        )
+
+
+@dataclass(frozen=True)
+class Polygons:
+    """What is drawn: points in space, rows of points, and for each row a plane through ``anchor``."""
+
+    outline: Ragged
+    normal: Floats
+    anchor: Floats
+
+    @classmethod
+    def of(cls, outline: Ragged) -> Polygons:
+        """Planes by Newell's formula through each row's mean, which serves bent polygons too."""
+        points, rows, n = np.asarray(outline.values, dtype=float), outline.row, outline.n_rows
+        count = np.maximum(outline.lengths, 1)[:, None]
+        anchor = np.stack([np.bincount(rows, points[:, i], n) for i in range(3)], axis=1) / count
+        arms = points - anchor[rows]
+        turn = np.cross(arms, arms[outline.next()])
+        normal = np.stack([np.bincount(rows, turn[:, i], n) for i in range(3)], axis=1)
+        size = np.linalg.norm(normal, axis=1, keepdims=True)
+        return cls(outline, np.divide(normal, size, out=np.zeros_like(normal), where=size > 0), anchor)
+
+    def take(self, rows: Bools) -> Polygons:
+        """Only the rows that are True."""
+        kept = np.repeat(rows, self.outline.lengths)
+        offsets = np.append(0, np.cumsum(self.outline.lengths[rows]))
+        return Polygons(Ragged(self.outline.values[kept], offsets), self.normal[rows], self.anchor[rows])
+
+    def join(self, other: Polygons) -> Polygons:
+        """These rows, then the other's."""
+        last = self.outline.offsets[-1]
+        outline = Ragged(
+            np.concatenate([self.outline.values, other.outline.values]),
+            np.concatenate([self.outline.offsets, other.outline.offsets[1:] + last]),
+        )
+        return Polygons(
+            outline, np.vstack([self.normal, other.normal]), np.vstack([self.anchor, other.anchor])
+        )
+
+
+def planes(camera: Camera, polygons: Polygons) -> Floats:
+    """(n, 3) coefficients a, b, c of 1/depth = a·x + b·y + c over the image, zero where seen edge-on."""
+    normal = polygons.normal @ camera.axes.T
+    anchor = camera.see(polygons.anchor)
+    offset = np.sum(normal * anchor, axis=1)
+    seen = np.abs(offset) > EDGE_ON * np.linalg.norm(anchor, axis=1)
+    a, b = normal[:, 0] / camera.focal, normal[:, 1] / camera.focal
+    c = normal[:, 2] - a * camera.center[0] - b * camera.center[1]
+    return np.where(seen[:, None], np.stack([a, b, c], axis=1) / np.where(seen, offset, 1.0)[:, None], 0.0)
+
+
+def draw(camera: Camera, polygons: Polygons) -> tuple[Ints, Floats]:
+    """(height, width) row of the nearest polygon at each sample (−1: none), and 1/depth there (0: none).
+
+    A sample belongs to a polygon when its middle lies inside (even–odd rule, so any simple polygon will do).
+    All polygons must lie in front of the camera.
+    """
+    inverse = planes(camera, polygons)
+    row, y, first, last = _spans(camera, polygons, np.flatnonzero(np.any(inverse != 0, axis=1)))
+    nearest = np.zeros(camera.height * camera.width)
+    owner = np.full(camera.height * camera.width, -1, dtype=np.int64)
+    ends = np.cumsum(last - first)
+    cuts = (
+        np.searchsorted(ends, np.arange(CHUNK, ends[-1] + CHUNK, CHUNK)) if len(ends) else np.array([], int)
+    )
+    start = 0
+    for stop in np.unique(np.append(cuts, len(ends))).tolist():
+        part = slice(start, min(stop + 1, len(ends)))
+        start = part.stop
+        length = last[part] - first[part]
+        which = np.repeat(np.arange(len(length)), length)
+        x = np.arange(len(which)) - np.repeat(np.cumsum(length) - length, length) + first[part][which]
+        owns, line = row[part][which], y[part][which]
+        a, b, c = inverse[owns].T
+        depth = a * (x + 0.5) + b * (line + 0.5) + c
+        at = line * camera.width + x
+        np.maximum.at(nearest, at, depth)
+        front = depth >= nearest[at]
+        owner[at[front]] = owns[front]
+    shape = camera.height, camera.width
+    return owner.reshape(shape), nearest.reshape(shape)
+
+
+def _spans(camera: Camera, polygons: Polygons, rows: Ints) -> tuple[Ints, Ints, Ints, Ints]:
+    """Runs of samples inside the given rows: row, line, first and one past the last column."""
+    outline = polygons.outline
+    flat = camera.project(camera.see(np.asarray(outline.values, dtype=float)))
+    wanted = np.zeros(outline.n_rows, dtype=bool)
+    wanted[rows] = True
+    edge = np.flatnonzero(wanted[outline.row])
+    p, q, owner = flat[edge], flat[outline.next()[edge]], outline.row[edge]
+    top = np.clip(np.ceil(np.minimum(p[:, 1], q[:, 1]) - 0.5), 0, camera.height).astype(np.int64)
+    bottom = np.clip(np.ceil(np.maximum(p[:, 1], q[:, 1]) - 0.5), 0, camera.height).astype(np.int64)
+    count = bottom - top
+    crossing = np.repeat(np.arange(len(edge)), count)
+    line = np.arange(len(crossing)) - np.repeat(np.cumsum(count) - count, count) + top[crossing]
+    slope = np.divide(q[:, 0] - p[:, 0], q[:, 1] - p[:, 1], out=np.zeros(len(edge)), where=count > 0)
+    x = p[crossing, 0] + slope[crossing] * (line + 0.5 - p[crossing, 1])
+    # One sort brings the crossings of each row and line together, from left to right: the whole part
+    # of the key tells row and line, the fraction the column (to a thousandth at 10⁹ pairs).
+    reach = camera.width + 4.0
+    key = np.sort(
+        owner[crossing] * camera.height + line + (np.clip(x, -1.0, camera.width + 1.0) + 2.0) / reach
+    )
+    slot = np.floor(key)
+    column = np.clip(np.ceil((key - slot) * reach - 2.5), 0, camera.width).astype(np.int64)
+    slot, first, last = slot[::2].astype(np.int64), column[::2], column[1::2]
+    there = last > first
+    return (slot // camera.height)[there], (slot % camera.height)[there], first[there], last[there]

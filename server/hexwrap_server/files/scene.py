@@ -1,0 +1,201 @@
+"""Panels before their surface: a sun with soft shadows, light from the sky, fine outlines, a shadow on the ground."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import ndimage
+
+from hexwrap_server.files.colours import encoded, from_hex, linear
+from hexwrap_server.files.raster import Camera, Polygons, draw, planes
+from hexwrap_solver.arrays import Bools, Floats, Ints
+
+#: Pixels: the model is fitted into this box, with room around it for its shadow on the ground.
+HEIGHT, WIDTH, MARGIN = 1600, 1700, 80
+#: Samples per pixel and direction.
+FINE = 3
+#: Degrees: small, so that parallels stay nearly parallel.
+FIELD = 22.0
+#: The sun, relative to the view: right, up, towards the viewer. Its distance in radii of the model.
+SUN, SUN_DISTANCE = (-0.55, 0.70, 0.46), 40.0
+#: Samples of the map of distances from the sun; places looked up per pixel; blur of a shadow's edge on the
+#: model and on the ground, in those samples; how much nearer, in radii, a thing must be to cast a shadow.
+SUN_MAP, TAPS, PENUMBRA, GROUND_BLUR, BIAS = 1200, 24, 5.0, 26.0, 0.012
+SUNLIGHT, SKYLIGHT, GLOSS, GLOSS_EXPONENT = 0.80, 0.36, 0.10, 40.0
+#: Blur radii in pixels, and depths in radii of the model, over which hollows darken.
+HOLLOWS = ((6.0, 0.03), (40.0, 0.25))
+SHELL, BACK = "#4a4f58", "#8d9199"
+#: What is left of the light on an outline, and the panel width in pixels from which outlines have full strength.
+OUTLINE, OUTLINE_FULL = 0.25, 22.0
+GROUND_SHADOW = 0.34
+
+
+@dataclass(frozen=True)
+class Scene:
+    """panels: one sRGB colour each. shell: what is seen between them. view: unit vector towards the viewer.
+
+    Coordinates are relative to the model's middle; z is up.
+    """
+
+    panels: Polygons
+    colour: Floats
+    shell: Polygons
+    view: Floats
+
+
+def render(scene: Scene) -> Floats:
+    """(height, width, 3) sRGB in 0..1 on white."""
+    points = np.vstack([scene.panels.outline.values, scene.shell.outline.values])
+    radius = float(np.linalg.norm(points, axis=1).max())
+    camera = _camera(points, radius, scene.view)
+    # From inside one sees the backs of the panels; the shell shows only its outside.
+    facing = np.sum(scene.shell.normal * (camera.position - scene.shell.anchor), axis=1) > 0
+    drawn = scene.panels.join(scene.shell.take(facing))
+    n_panels = scene.panels.outline.n_rows
+    owner, nearest = draw(camera, drawn)
+    sun = _sun(scene, points, radius)
+    direct, sky = _light(scene, drawn, camera, sun)
+    middle = owner[FINE // 2 :: FINE, FINE // 2 :: FINE]
+    lit = _lit(camera, drawn, middle, sun, scene, points, radius)
+    sky_seen = _openness(nearest[FINE // 2 :: FINE, FINE // 2 :: FINE], radius)
+    outline = _outline(owner, n_panels)
+    image = np.zeros((*middle.shape, 3))
+    for i in range(FINE):
+        for j in range(FINE):
+            of = owner[i::FINE, j::FINE]
+            light = direct[of] * lit[..., None] + sky[of] * sky_seen[..., None]
+            image += light * outline[i::FINE, j::FINE, None]
+    return encoded(image / FINE**2)
+
+
+def _camera(points: Floats, radius: float, view: Floats) -> Camera:
+    """A pinhole that sees all points, with its image cut to them and the margin."""
+    position = view * radius / np.sin(np.radians(FIELD / 2))
+    return _aim(points, position, (WIDTH, HEIGHT), MARGIN, FINE)
+
+
+def _aim(points: Floats, position: Floats, box: tuple[int, int], margin: int, fine: int) -> Camera:
+    forward = -position / np.linalg.norm(position)
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    axes = np.stack([right, np.cross(forward, right), forward])
+    wide = Camera(position, axes, 1.0, (0.0, 0.0), 1, 1)
+    flat = wide.project(wide.see(points))
+    low, extent = flat.min(axis=0), np.ptp(flat, axis=0)
+    scale = min((side - 2 * margin) / size for side, size in zip(box, extent.tolist(), strict=True))
+    width, height = (int(np.ceil(size * scale)) + 2 * margin for size in extent.tolist())
+    at = (fine * (margin - low * scale)).tolist()
+    return Camera(position, axes, scale * fine, (at[0], at[1]), width * fine, height * fine)
+
+
+@dataclass(frozen=True)
+class Sun:
+    """A far pinhole and how near the model comes to it at each sample; direction: unit, towards the sun."""
+
+    camera: Camera
+    nearest: Floats
+    direction: Floats
+
+    def reaches(self, points: Floats, blur: float, bias: float) -> Floats:
+        """(n,) share of the sun, 0..1, that reaches the points, with edges blurred over so many samples."""
+        seen = self.camera.see(points)
+        at, limit = self.camera.project(seen), 1.0 / (seen[:, 2] - bias)
+        share = np.zeros(len(points))
+        for k in range(TAPS):  # Vogel's spiral: even over the disk
+            turn, reach = k * np.pi * (3 - np.sqrt(5)), blur * np.sqrt((k + 0.5) / TAPS)
+            x = np.floor(at[:, 0] + reach * np.cos(turn)).astype(np.int64)
+            y = np.floor(at[:, 1] + reach * np.sin(turn)).astype(np.int64)
+            inside = (x >= 0) & (x < self.camera.width) & (y >= 0) & (y < self.camera.height)
+            near = np.where(
+                inside,
+                self.nearest[y.clip(0, self.camera.height - 1), x.clip(0, self.camera.width - 1)],
+                0.0,
+            )
+            share += near < limit
+        return share / TAPS
+
+
+def _sun(scene: Scene, points: Floats, radius: float) -> Sun:
+    right = np.cross([0.0, 0.0, 1.0], scene.view)
+    right /= np.linalg.norm(right)
+    direction = (
+        SUN[0] * right + SUN[1] * np.array([0.0, 0.0, 1.0]) + SUN[2] * np.cross(right, [0.0, 0.0, 1.0])
+    )
+    direction /= np.linalg.norm(direction)
+    camera = _aim(points, direction * radius * SUN_DISTANCE, (SUN_MAP, SUN_MAP), 8, 1)
+    _, nearest = draw(camera, scene.panels.join(scene.shell))
+    return Sun(camera, nearest, direction)
+
+
+def _light(scene: Scene, drawn: Polygons, camera: Camera, sun: Sun) -> tuple[Floats, Floats]:
+    """Linear light off each row from the sun and from the sky, (n + 1, 3); the last row is the white ground."""
+    viewer = camera.position - drawn.anchor
+    viewer /= np.linalg.norm(viewer, axis=1, keepdims=True)
+    side = np.where(np.sum(drawn.normal * viewer, axis=1) < 0, -1.0, 1.0)
+    n_panels = scene.panels.outline.n_rows
+    base = np.repeat(linear(from_hex([SHELL])), len(side), axis=0)
+    base[:n_panels] = linear(scene.colour)
+    backs = np.flatnonzero(side[:n_panels] < 0)
+    base[backs] = 0.35 * base[backs] + 0.45 * linear(from_hex([BACK]))
+    normal = drawn.normal * side[:, None]
+    half = viewer + sun.direction
+    half /= np.linalg.norm(half, axis=1, keepdims=True)
+    gloss = GLOSS * np.clip(np.sum(normal * half, axis=1), 0, 1) ** GLOSS_EXPONENT
+    gloss[n_panels:] = 0.0
+    slope = np.clip(normal @ sun.direction, 0, 1)[:, None]
+    direct = SUNLIGHT * base * slope + gloss[:, None] * (slope > 0)
+    sky = SKYLIGHT * base * (0.8 + 0.2 * normal[:, 2:3])
+    return np.vstack([direct, [[GROUND_SHADOW] * 3]]), np.vstack([sky, [[1 - GROUND_SHADOW] * 3]])
+
+
+def _lit(
+    camera: Camera, drawn: Polygons, owner: Ints, sun: Sun, scene: Scene, points: Floats, radius: float
+) -> Floats:
+    """(h, w) share of the sun at each pixel, of the model and of the ground under it."""
+    y, x = np.meshgrid(*(np.arange(n) * FINE + FINE / 2 for n in owner.shape), indexing="ij")
+    rays = camera.rays(x, y)
+    lit = np.ones(owner.shape)
+    hit = owner >= 0
+    a, b, c = planes(camera, drawn)[owner[hit]].T
+    depth = 1.0 / np.maximum(a * x[hit] + b * y[hit] + c, 1e-12 / radius)
+    places = rays[hit] * depth[:, None] @ camera.axes + camera.position
+    lit[hit] = sun.reaches(places, PENUMBRA, BIAS * radius)
+    if scene.view[2] > 0:
+        down = rays[~hit] @ camera.axes
+        floor = points[:, 2].min()
+        meets = down[:, 2] < -1e-6
+        depth = np.where(meets, (floor - camera.position[2]) / np.where(meets, down[:, 2], 1.0), 0.0)
+        near = meets & (depth < 4 * np.linalg.norm(camera.position))
+        share = np.ones(len(down))
+        share[near] = sun.reaches(down[near] * depth[near, None] + camera.position, GROUND_BLUR, 0.0)
+        lit[~hit] = share
+    return lit
+
+
+def _openness(nearest: Floats, radius: float) -> Floats:
+    """(h, w) how much of the sky a pixel sees: less where its surroundings stand nearer to the viewer."""
+    there: Bools = nearest > 0
+    depth = np.where(there, 1.0 / np.where(there, nearest, 1.0), 0.0)
+    light = np.ones(nearest.shape)
+    for blur, reach in HOLLOWS:
+        weight = ndimage.gaussian_filter(there.astype(np.float64), blur, truncate=2.5)
+        around = ndimage.gaussian_filter(depth, blur, truncate=2.5) / np.maximum(weight, 1e-9)
+        light *= 1 - 0.5 * np.clip((depth - around) / (reach * radius), 0, 1)
+    return np.where(there, light, 1.0)
+
+
+def _outline(owner: Ints, n_panels: int) -> Floats:
+    """(h, w) what is left of the light at each sample: less along the edges of panels and of the model."""
+    thing = np.minimum(owner, n_panels)  # the shell is one thing
+    line = np.zeros(owner.shape, dtype=bool)
+    across, down = thing[:, 1:] != thing[:, :-1], thing[1:] != thing[:-1]
+    line[:, 1:] |= across
+    line[:, :-1] |= across
+    line[1:] |= down
+    line[:-1] |= down
+    line &= owner >= 0
+    shown = np.bincount(thing[(thing >= 0) & (thing < n_panels)], minlength=1)
+    width = float(np.sqrt(np.median(shown[shown > 0]))) / FINE if np.any(shown) else 0.0
+    strength = (1 - OUTLINE) * min(1.0, width / OUTLINE_FULL)
+    return np.where(line, 1 - strength, 1.0)
