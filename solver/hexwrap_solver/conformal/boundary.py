@@ -8,8 +8,9 @@ from hexwrap_solver.arrays import Floats
 from hexwrap_solver.conformal.types import Targets
 from hexwrap_solver.surface.types import Surface
 
-#: A cone angle smaller than this is rounding: the domain is a cylinder.
-NO_ANGLE = 1e-9
+#: A cone angle this near to a multiple of π/6 (that holds all quanta) is that multiple: sums of many angles
+#: carry rounding, and g must be an exact symmetry of the pattern. Near 0 the domain is a cylinder.
+SNAP = 1e-10
 
 
 def straight(surface: Surface) -> Targets:
@@ -49,6 +50,12 @@ def constant_on_loops(surface: Surface, cone_angle: float) -> Targets:
 def cone_angle(boundary_angles: Floats) -> float:
     """Σκ = Σ(π − Θ) over a loop."""
     return float((np.pi - boundary_angles).sum())
+
+
+def snapped(angle: float) -> float:
+    """The cone angle without rounding, see SNAP."""
+    nearest = nearest_multiple(angle, np.pi / 6)
+    return nearest if abs(angle - nearest) < SNAP else angle
 
 
 def nearest_multiple(angle: float, quantum: float) -> float:

@@ -6,6 +6,7 @@ import numpy as np
 
 from hexwrap_solver.arrays import Floats, Progress, no_progress
 from hexwrap_solver.conformal import boundary
+from hexwrap_solver.conformal.corners import boundary_angles
 from hexwrap_solver.conformal.energy import Energy
 from hexwrap_solver.conformal.layout import lay_out
 from hexwrap_solver.conformal.newton import Minimum, minimise
@@ -25,6 +26,9 @@ def conformal_map(
     """
     if condition.mode == "isometric":
         return _isometric(surface, condition, progress)
+    if condition.mode == "angles":
+        targets = boundary.prescribed(surface, boundary_angles(surface, condition))
+        return _map(surface, targets, None, progress)
     return _map(surface, boundary.straight(surface), None, progress)
 
 
@@ -94,7 +98,7 @@ def _cone_angle(targets: Targets, sums: Floats, surface: Surface) -> float:
         angle = float(targets.tie_angle[1]) - len(surface.loops[1]) * np.pi
     else:
         angle = boundary.cone_angle(sums[surface.loops[0]])
-    return 0.0 if abs(angle) < boundary.NO_ANGLE else angle
+    return boundary.snapped(angle)
 
 
 def _mean_on_area(surface: Surface, u: Floats) -> float:

@@ -1,0 +1,142 @@
+"""Listed boundary angles: met to rounding where equation (1) allows, refused with a way out elsewhere."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from tests.solver.conformal.annuli import bump
+from tests.solver.conformal.test_conformal_map import assert_honest
+
+from hexwrap_solver.conformal import conformal_map
+from hexwrap_solver.conformal.corners import GAUSS_BONNET_TOLERANCE, boundary_angles
+from hexwrap_solver.conformal.types import BoundaryCondition
+from hexwrap_solver.errors import BoundaryError, GaussBonnetError
+from hexwrap_solver.surface.types import Surface
+
+SURFACE = bump(36, 12)
+TOP = SURFACE.loops[1]
+
+
+def listed(*pairs: tuple[int, float], quantum: float | None = None) -> BoundaryCondition:
+    vertices, angles = zip(*pairs, strict=True)
+    return BoundaryCondition(
+        "angles", vertices=np.array(vertices), angles=np.array(angles, dtype=float), quantum=quantum
+    )
+
+
+def test_an_entrance_on_a_cylinder() -> None:
+    """Figure 7: 4π/3, π/3, 4π/3 on the lower loop bend it inwards, and the domain stays a cylinder."""
+    wanted = {10: 4 * np.pi / 3, 14: np.pi / 3, 18: 4 * np.pi / 3}
+    cmap = conformal_map(SURFACE, listed(*wanted.items()))
+    assert_honest(cmap)
+    assert cmap.kind == "cylinder"
+    straight = np.full(36, np.pi)
+    straight[list(wanted)] = list(wanted.values())
+    np.testing.assert_allclose(cmap.boundary_angles[0], straight, atol=1e-9)
+    np.testing.assert_allclose(cmap.boundary_angles[1], np.pi, atol=1e-9)
+
+
+def test_corners_on_both_loops_make_a_cone() -> None:
+    """Figure 5, middle: three corners on one loop and their counterparts on the other."""
+    bottom = [(v, np.pi - np.pi / 3) for v in (0, 12, 24)]
+    top = [(int(TOP[k]), np.pi + np.pi / 3) for k in (0, 12, 24)]
+    cmap = conformal_map(SURFACE, listed(*bottom, *top, quantum=np.pi / 3))
+    assert_honest(cmap)
+    assert cmap.deck.angle == pytest.approx(np.pi, abs=1e-14)
+
+
+def test_points_mean_their_nearest_boundary_vertex() -> None:
+    near = SURFACE.vertices[[5, int(TOP[3])]] * 1.001
+    condition = BoundaryCondition(
+        "angles", vertices=np.array([-1, -1]), points=near, angles=np.array([2.0, 2 * np.pi - 2.0])
+    )
+    bottom, top = boundary_angles(SURFACE, condition)
+    assert bottom[5] == pytest.approx(2.0)
+    assert top[3] == pytest.approx(2 * np.pi - 2.0)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.floats(-0.99e-3, 0.99e-3), st.sampled_from([None, np.pi / 3, np.pi / 2]))
+def test_a_small_rest_goes_to_the_vertices_left_at_pi(rest: float, quantum: float | None) -> None:
+    condition = listed((4, 2 * np.pi / 3), (int(TOP[4]), 4 * np.pi / 3 + rest), quantum=quantum)
+    bottom, top = boundary_angles(SURFACE, condition)
+    assert (np.pi - bottom).sum() + (np.pi - top).sum() == pytest.approx(0, abs=1e-12)
+    assert bottom[4] == 2 * np.pi / 3
+    assert top[4] == 4 * np.pi / 3 + rest
+    others = np.concatenate([np.delete(bottom, 4), np.delete(top, 4)])
+    assert np.abs(others - np.pi).max() <= abs(rest) / 30
+    if quantum == np.pi / 3:
+        assert (np.pi - bottom).sum() == pytest.approx(np.pi / 3, abs=1e-13)
+
+
+def test_gauss_bonnet_names_both_sums_what_is_missing_and_an_example_that_closes() -> None:
+    with pytest.raises(GaussBonnetError) as caught:
+        boundary_angles(SURFACE, listed((3, 4 * np.pi / 3), (int(TOP[0]), np.pi / 2)))
+    data = caught.value.data
+    assert data["loop_sums"] == pytest.approx([-np.pi / 3, np.pi / 2])
+    assert data["missing"] == pytest.approx(np.pi / 6)
+    for figure in ("-1.0472", "1.5708", "0.523599", "more"):
+        assert figure in caught.value.detail
+    assert_closes(SURFACE, data["example"])
+
+
+@pytest.mark.parametrize(
+    "pairs",
+    [[(3, 30.0)], [(v, 0.01) for v in range(30)], [(v, 0.2) for v in range(36)], [(0, 1.0), (1, 5.0)]],
+)
+def test_the_example_always_closes(pairs: list[tuple[int, float]]) -> None:
+    with pytest.raises(GaussBonnetError) as caught:
+        boundary_angles(SURFACE, listed(*pairs))
+    assert_closes(SURFACE, caught.value.data["example"])
+
+
+def test_the_example_closes_where_every_vertex_is_listed() -> None:
+    with pytest.raises(GaussBonnetError) as caught:
+        boundary_angles(SURFACE, listed(*((int(v), 0.2) for v in np.concatenate(SURFACE.loops))))
+    assert_closes(SURFACE, caught.value.data["example"])
+
+
+def assert_closes(surface: Surface, example: object) -> None:
+    assert isinstance(example, list)
+    angles = boundary_angles(surface, listed(*((e["vertex"], e["angle"]) for e in example)))
+    assert np.concatenate(angles).min() > 0
+    assert abs(sum((np.pi - a).sum() for a in angles)) < GAUSS_BONNET_TOLERANCE
+
+
+@pytest.mark.parametrize("angle", [0.0, -1.0, np.nan, np.inf])
+def test_angles_that_no_vertex_can_have(angle: float) -> None:
+    with pytest.raises(BoundaryError, match="positive") as caught:
+        boundary_angles(SURFACE, listed((0, 3.0), (1, angle)))
+    assert caught.value.field == ("boundary", "angles", 1, "angle")
+
+
+def test_angles_too_large_for_any_surface() -> None:
+    with pytest.raises(BoundaryError, match="too large") as caught:
+        boundary_angles(SURFACE, listed((7, 300.0)))
+    assert caught.value.vertices == [7]
+
+
+def test_vertices_inside_are_refused_with_the_nearest_boundary_vertex() -> None:
+    with pytest.raises(BoundaryError, match="nearest to 40 is 4,") as caught:
+        boundary_angles(SURFACE, listed((0, 3.0), (40, 3.2)))
+    assert caught.value.vertices == [40]
+    assert caught.value.field == ("boundary", "angles", 1, "vertex")
+
+
+def test_vertices_that_were_never_sent() -> None:
+    with pytest.raises(BoundaryError, match="only vertices 0 to"):
+        boundary_angles(SURFACE, listed((10_000, 3.0)))
+
+
+def test_one_vertex_listed_twice() -> None:
+    with pytest.raises(BoundaryError, match="0 and 2 mean the same vertex") as caught:
+        boundary_angles(SURFACE, listed((4, 3.0), (5, 3.0), (4, 3.3)))
+    assert caught.value.vertices == [4]
+
+
+def test_an_entry_without_a_place() -> None:
+    condition = BoundaryCondition("angles", vertices=np.array([-1]), angles=np.array([3.0]))
+    with pytest.raises(BoundaryError, match="neither a vertex nor a point"):
+        boundary_angles(SURFACE, condition)
