@@ -1,4 +1,4 @@
-"""Half-edges, boundary loops and normals of triangle meshes as plain arrays.
+"""Half-edges, boundary loops, components and normals of triangle meshes as plain arrays.
 
 Half-edge h = 3·face + corner runs from that corner to the next one counter-clockwise.
 """
@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.sparse import csr_array
-from scipy.sparse.csgraph import breadth_first_order, depth_first_order
+from scipy.sparse.csgraph import breadth_first_order, connected_components, depth_first_order
 
 from hexwrap_solver.arrays import Floats, Ints
 
@@ -22,30 +22,40 @@ def half_edges(faces: Ints) -> tuple[Ints, Ints]:
     return faces.ravel(), faces[:, [1, 2, 0]].ravel()
 
 
+def stable_order(key: Ints, n: int) -> Ints:
+    """Stable argsort of integers 0 … n − 1 in linear time: a sparse matrix is transposed by counting."""
+    k = len(key)
+    matrix = csr_array((np.ones(k, dtype=np.int8), key, np.arange(k + 1)), shape=(k, n))
+    return np.asarray(matrix.tocsc().indices, dtype=np.int64)
+
+
 def edge_groups(faces: Ints, n: int) -> tuple[Ints, Ints]:
     """Half-edges sorted so that those of one undirected edge stand together.
 
-    Returns order (3m,) and first (e + 1,): edge k has the half-edges ``order[first[k]:first[k + 1]]``.
+    Returns order (3m,) and first (e + 1,): edge k has the half-edges ``order[first[k]:first[k + 1]]``,
+    ascending.
     """
     start, end = half_edges(faces)
-    key = np.minimum(start, end) * n + np.maximum(start, end)
-    order = np.argsort(key, kind="stable")
-    sorted_key = key[order]
-    first = np.flatnonzero(np.concatenate([[True], sorted_key[1:] != sorted_key[:-1], [True]]))
-    return order, first
+    low, high = np.minimum(start, end), np.maximum(start, end)
+    order = stable_order(high, n)
+    order = order[stable_order(low[order], n)]
+    low, high = low[order], high[order]
+    new = (low[1:] != low[:-1]) | (high[1:] != high[:-1])
+    return order, np.flatnonzero(np.concatenate([[True], new, [True]]))
 
 
-def twins(faces: Ints, n: int) -> Ints:
-    """(3m,) the half-edge on the other side of the same edge, −1 at the boundary.
-
-    The mesh must have at most two faces per edge.
-    """
-    order, first = edge_groups(faces, n)
+def twins_of(order: Ints, first: Ints) -> Ints:
+    """(3m,) the half-edge on the other side, −1 where the edge has not exactly two faces."""
     inner = first[:-1][np.diff(first) == 2]
-    twin = np.full(faces.size, -1, dtype=np.int64)
+    twin = np.full(len(order), -1, dtype=np.int64)
     twin[order[inner]] = order[inner + 1]
     twin[order[inner + 1]] = order[inner]
     return twin
+
+
+def twins(faces: Ints, n: int) -> Ints:
+    """(3m,) the half-edge on the other side of the same edge, −1 at the boundary."""
+    return twins_of(*edge_groups(faces, n))
 
 
 def edges(faces: Ints, n: int) -> tuple[Ints, Ints]:
@@ -53,9 +63,9 @@ def edges(faces: Ints, n: int) -> tuple[Ints, Ints]:
     start, end = half_edges(faces)
     order, first = edge_groups(faces, n)
     one = order[first[:-1]]
-    two = np.where(np.diff(first) > 1, order[np.minimum(first[:-1] + 1, len(order) - 1)], -3)
+    two = np.where(np.diff(first) > 1, order[np.minimum(first[:-1] + 1, len(order) - 1)] // 3, -1)
     ends = np.stack([np.minimum(start[one], end[one]), np.maximum(start[one], end[one])], axis=1)
-    return ends, np.stack([one // 3, two // 3], axis=1)
+    return ends, np.stack([one // 3, two], axis=1)
 
 
 def boundary_loops(faces: Ints, twin: Ints) -> list[Ints]:
@@ -67,39 +77,59 @@ def boundary_loops(faces: Ints, twin: Ints) -> list[Ints]:
     h = np.flatnonzero(twin < 0)
     start, end = half_edges(faces)
     vertices = np.sort(start[h])
-    tail, head = np.searchsorted(vertices, start[h]), np.searchsorted(vertices, end[h])
     k = len(vertices)
     following = np.zeros(k, dtype=np.int64)
-    following[tail] = head
+    following[np.searchsorted(vertices, start[h])] = np.searchsorted(vertices, end[h])
     graph = csr_array((np.ones(k, dtype=np.int8), following, np.arange(k + 1)), shape=(k, k))
-    left = np.ones(k, dtype=bool)
-    loops = []
-    while left.any():
-        loop = depth_first_order(graph, int(np.argmax(left)), return_predecessors=False)
-        left[loop] = False
-        loops.append(vertices[loop])
-    return loops
+    _, label = connected_components(graph, directed=False)
+    _, lowest = np.unique(label, return_index=True)
+    loops = [depth_first_order(graph, seed, return_predecessors=False) for seed in np.sort(lowest)]
+    return [vertices[loop] for loop in loops]
 
 
-def face_component(twin: Ints, seed: int = 0) -> Ints:
-    """The faces that can be reached from one face across edges, breadth first."""
+def face_graph(twin: Ints) -> csr_array:
+    """(m, m) adjacency of faces across edges, stored entries in the order of half-edges."""
     m = len(twin) // 3
     inner = twin >= 0
     offsets = np.concatenate([[0], np.cumsum(inner)])[::3]
-    graph = csr_array((np.ones(int(inner.sum()), dtype=np.int8), twin[inner] // 3, offsets), shape=(m, m))
-    return np.asarray(breadth_first_order(graph, seed, return_predecessors=False), dtype=np.int64)
+    return csr_array((np.ones(int(inner.sum()), dtype=np.int8), twin[inner] // 3, offsets), shape=(m, m))
 
 
-def face_areas_normals(vertices: Floats, faces: Ints) -> Floats:
-    """(m, 3) normals of length twice the area."""
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    return np.cross(b - a, c - a)
+def spanning_tree(twin: Ints, root: int = 0) -> tuple[Ints, Ints]:
+    """Faces that can be reached from root across edges, breadth first, and (m,) the face before each
+    one (negative at the root and where there is none)."""
+    order, before = breadth_first_order(face_graph(twin), root)
+    return np.asarray(order, dtype=np.int64), np.asarray(before, dtype=np.int64)
+
+
+def face_normals(vertices: Floats, faces: Ints) -> Floats:
+    """(m, 3) normals, their length twice the area."""
+    a = vertices[faces[:, 0]]
+    ax, ay, az = (vertices[faces[:, 1]] - a).T
+    bx, by, bz = (vertices[faces[:, 2]] - a).T
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
 
 
 def vertex_normals(vertices: Floats, faces: Ints) -> Floats:
-    """(n, 3) unit normals, area-weighted means of the faces around."""
+    """(n, 3) unit normals, area-weighted means of the faces around; zero where they cancel."""
     n = len(vertices)
-    weighted = face_areas_normals(vertices, faces)
-    total = np.stack([np.bincount(faces.ravel(), np.repeat(x, 3), n) for x in weighted.T], axis=1)
-    length = np.linalg.norm(total, axis=1, keepdims=True)
-    return total / np.where(length > 0, length, 1.0)
+    weighted = np.repeat(face_normals(vertices, faces), 3, axis=0)
+    return unit(sum_rows(weighted, faces.ravel(), n))
+
+
+def sum_rows(rows: Floats, where: Ints, n: int) -> Floats:
+    """(n, d) sums of the rows (k, d) that go to each place (k,)."""
+    return np.stack([np.bincount(where, x, n).astype(float) for x in rows.T], axis=1)
+
+
+def unit(vectors: Floats) -> Floats:
+    """(n, 3) vectors at length one, zero vectors kept."""
+    length = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))[:, None]
+    return np.asarray(vectors / np.where(length > 0, length, 1.0))
+
+
+def edge_lengths(vertices: Floats, faces: Ints) -> Floats:
+    """(m, 3) lengths of the half-edges."""
+    corners = vertices[faces]
+    sides = corners[:, [1, 2, 0]] - corners
+    return np.asarray(np.sqrt(np.einsum("ijk,ijk->ij", sides, sides)))

@@ -1,0 +1,30 @@
+"""Sent vertex normals, where they can be used."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hexwrap_solver.arrays import Floats, Ints
+from hexwrap_solver.surface.topology import sum_rows, unit
+
+
+def sent_normals(own: Floats, sent: Floats, stand: Ints) -> tuple[Floats, list[str]]:
+    """(n, 3) unit normals outward, and a sentence where not all sent ones could be used.
+
+    own: (n, 3) normals from the faces. sent: (n_sent, 3) of any length. stand: (n_sent,) the vertex at
+    which each sent vertex stands, or −1. All are turned over where most of them look inward; those that
+    are zero, not finite or still inward give way to the faces'.
+    """
+    here = stand >= 0
+    finite = np.isfinite(sent).all(axis=1, keepdims=True)
+    directions = unit(np.where(finite, sent, 0.0))[here]
+    total = sum_rows(directions, stand[here], len(own))
+    outward = (total * own).sum(axis=1)
+    sentences = []
+    if (outward < 0).sum() > (outward > 0).sum():
+        total, outward = -total, -outward
+        sentences.append("The sent normals look inward, as most faces are oriented, and were turned over.")
+    bad = outward <= 0
+    if bad.any():
+        sentences.append(f"{bad.sum()} sent normals could not be used; the faces around stand in for them.")
+    return np.where(bad[:, None], own, unit(total)), sentences

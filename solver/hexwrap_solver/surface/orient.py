@@ -1,0 +1,46 @@
+"""One orientation for all faces, that of most of the sent ones."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hexwrap_solver.arrays import Bools, Floats, Ints
+from hexwrap_solver.surface.topology import half_edges, spanning_tree
+
+
+def flipped(faces: Ints, twin: Ints, weight: Floats) -> tuple[Bools, Ints]:
+    """Which faces of a connected mesh are to be turned over, so that the fewest (by weight, (m,)) are.
+
+    Also the half-edges across which no choice of orientations agrees: none, unless the surface is one-sided.
+    """
+    disagree = _disagreeing(faces, twin)
+    odd = np.zeros(len(faces), dtype=bool)
+    if not disagree.any():
+        return odd, np.flatnonzero(disagree)
+    odd = _parity(disagree, twin)
+    if weight[odd].sum() > weight[~odd].sum():
+        odd = ~odd
+    inner = np.flatnonzero(twin >= 0)
+    across = odd[inner // 3] ^ odd[twin[inner] // 3]
+    return odd, inner[across != disagree[inner]]
+
+
+def _disagreeing(faces: Ints, twin: Ints) -> Bools:
+    """(3m,) half-edges that run the same way as their twin."""
+    start, _ = half_edges(faces)
+    return np.asarray((twin >= 0) & (start[twin] == start))
+
+
+def _parity(disagree: Bools, twin: Ints) -> Bools:
+    """(m,) number of disagreements, modulo 2, on the way from face 0 along a spanning tree; by pointer
+    doubling."""
+    _, before = spanning_tree(twin)
+    root = before < 0
+    before = np.where(root, np.arange(len(before)), before)
+    towards = twin.reshape(-1, 3) // 3 == before[:, None]
+    corner = np.argmax(towards, axis=1)
+    odd: Bools = disagree.reshape(-1, 3)[np.arange(len(before)), corner] & ~root
+    while np.any(before[before] != before):
+        odd = odd ^ odd[before]
+        before = before[before]
+    return odd

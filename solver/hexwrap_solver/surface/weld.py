@@ -1,0 +1,103 @@
+"""Coincident vertices made one, where that closes a seam.
+
+Only vertices on open edges are candidates: an interior vertex has all its neighbours already, and the fine
+parts of strongly graded meshes stay as they are.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from hexwrap_solver.arrays import Floats, Ints
+from hexwrap_solver.surface.topology import edge_groups, edge_lengths, half_edges
+
+#: Relative to the bounding diagonal.
+TOLERANCE = 1e-6
+#: So many neighbours of a vertex are looked at; bounds memory where thousands stand within the tolerance.
+NEIGHBOURS = 8
+#: Edges shorter than so many units in the last place of the coordinates have no direction.
+ULPS = 4
+
+
+def weldings(vertices: Floats, faces: Ints, tolerance: float) -> list[Ints]:
+    """Ways to weld, from the most to the least, no two the same.
+
+    Each is (n,) the lowest vertex with which a vertex becomes one: within the tolerance; only where
+    coordinates are equal; only along edges without length.
+    """
+    collapsed = _collapse(vertices, faces)
+    rim = _open_vertices(collapsed[faces], len(vertices))
+    equal = _equal(vertices, rim)
+    exact = _merge(collapsed, *equal)
+    if len(equal[0]):
+        rim = _open_vertices(exact[faces], len(vertices))
+    near = _undo_collapses(_merge(exact, *_close(vertices, rim, tolerance)), exact, faces)
+    ways = [near]
+    for way in (exact, collapsed):
+        if not np.array_equal(way, ways[-1]):
+            ways.append(way)
+    return ways
+
+
+def _collapse(vertices: Floats, faces: Ints) -> Ints:
+    resolution = ULPS * np.finfo(float).eps * float(np.abs(vertices).max())
+    none = (edge_lengths(vertices, faces) <= resolution).ravel()
+    start, end = half_edges(faces)
+    return _merge(np.arange(len(vertices), dtype=np.int64), start[none], end[none])
+
+
+def _merge(label: Ints, a: Ints, b: Ints) -> Ints:
+    """Joins the classes of a[k] and b[k]; classes are named by their lowest vertex."""
+    if len(a) == 0:
+        return label
+    n = len(label)
+    pairs = coo_array((np.ones(len(a), dtype=np.int8), (label[a], label[b])), shape=(n, n))
+    _, group = connected_components(pairs, directed=False)
+    lowest = np.zeros(int(group.max()) + 1, dtype=np.int64)
+    lowest[group[::-1]] = np.arange(n - 1, -1, -1)
+    return lowest[group][label]
+
+
+def _open_vertices(faces: Ints, n: int) -> Ints:
+    """Vertices on edges that have one face only, ascending."""
+    start, end = half_edges(faces)
+    order, first = edge_groups(faces, n)
+    rim = order[first[:-1][np.diff(first) == 1]]
+    mark = np.zeros(n, dtype=bool)
+    mark[start[rim]] = mark[end[rim]] = True
+    return np.flatnonzero(mark)
+
+
+def _equal(vertices: Floats, among: Ints) -> tuple[Ints, Ints]:
+    """Pairs of vertices with the same coordinates, each with the lowest of them."""
+    points = vertices[among] + 0.0  # −0 becomes 0
+    order = np.lexsort(points.T)
+    same = np.all(points[order][1:] == points[order][:-1], axis=1)
+    return among[order[1:][same]], among[order[:-1][same]]
+
+
+def _close(vertices: Floats, among: Ints, tolerance: float) -> tuple[Ints, Ints]:
+    """Pairs of different vertices within the tolerance."""
+    if len(among) < 2:
+        return among[:0], among[:0]
+    distance, near = cKDTree(vertices[among]).query(
+        vertices[among], k=min(NEIGHBOURS, len(among)), distance_upper_bound=tolerance
+    )
+    i, k = np.nonzero(np.isfinite(distance))
+    a, b = among[i], among[np.asarray(near)[i, k]]
+    return a[a < b], b[a < b]
+
+
+def _undo_collapses(label: Ints, before: Ints, faces: Ints) -> Ints:
+    """Takes back the classes in which two corners of one triangle that were apart have met."""
+    if label is before:
+        return label
+    met = (label[faces] == label[faces[:, [1, 2, 0]]]) & (before[faces] != before[faces[:, [1, 2, 0]]])
+    if not met.any():
+        return label
+    spoilt = np.zeros(len(label), dtype=bool)
+    spoilt[label[faces[met]]] = True
+    return np.where(spoilt[label], before, label)

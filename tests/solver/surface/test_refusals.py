@@ -1,0 +1,211 @@
+"""Every way to fail is fed its failing input: slug, elements by sent indices, and advice."""
+
+from __future__ import annotations
+
+import pickle
+
+import numpy as np
+import pytest
+from tests.solver.surface.shapes import mesh, triangles, tube
+
+from hexwrap_solver.arrays import Ragged
+from hexwrap_solver.errors import SurfaceError
+from hexwrap_solver.surface import SentMesh, surface_from_mesh
+from hexwrap_solver.surface.errors import (
+    DegeneratePolygonError,
+    EmptySurfaceError,
+    FlatSurfaceError,
+    IndexRangeError,
+    NonFiniteError,
+    NonManifoldEdgeError,
+    NonManifoldVertexError,
+    NotAnnulusError,
+    NotOrientableError,
+    PolygonSizeError,
+    SeveralComponentsError,
+    ShapeError,
+)
+
+
+def refused(sent: SentMesh, kind: type[SurfaceError]) -> SurfaceError:
+    with pytest.raises(kind) as caught:
+        surface_from_mesh(sent)
+    error = caught.value
+    assert type(error) is kind
+    assert error.detail.endswith(".")
+    again = pickle.loads(pickle.dumps(error))
+    assert (again.detail, again.vertices, again.faces, again.edges) == (
+        error.detail,
+        error.vertices,
+        error.faces,
+        error.edges,
+    )
+    return error
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e200])
+def test_not_finite(bad: float) -> None:
+    vertices, quads = tube()
+    vertices[17, 1] = bad
+    error = refused(mesh(vertices, quads), NonFiniteError)
+    assert error.vertices == [17]
+    assert error.field == ("surface", "vertices")
+
+
+@pytest.mark.parametrize("bad", [-1, 35, 2**40])
+def test_index_out_of_range(bad: int) -> None:
+    vertices, quads = tube()
+    quads[6, 2] = bad
+    error = refused(mesh(vertices, quads), IndexRangeError)
+    assert error.faces == [6]
+    assert str(bad) in error.detail
+
+
+def test_empty() -> None:
+    vertices, quads = tube()
+    refused(mesh(np.zeros((0, 3)), quads[:0]), EmptySurfaceError)
+    refused(mesh(vertices, quads[:0]), EmptySurfaceError)
+
+
+def test_wrong_shapes() -> None:
+    vertices, quads = tube()
+    refused(mesh(vertices[:, :2], quads), ShapeError)
+    refused(mesh(vertices, quads, np.ones((4, 3))), ShapeError)
+    refused(SentMesh(vertices, Ragged.from_table(quads + 0.5)), ShapeError)
+
+
+@pytest.mark.parametrize("corners", [[], [0], [0, 1], [0, 1, 2, 3, 4]])
+def test_polygons_of_other_sizes(corners: list[int]) -> None:
+    vertices, quads = tube()
+    error = refused(mesh(vertices, [*quads.tolist(), corners]), PolygonSizeError)
+    assert error.faces == [28]
+    assert f"{len(corners)} corners" in error.detail
+
+
+def test_no_extent() -> None:
+    vertices, quads = tube()
+    refused(mesh(vertices * 0 + 5, quads), FlatSurfaceError)
+
+
+def test_all_on_one_line() -> None:
+    vertices, quads = tube()
+    vertices[:, :2] = 0
+    refused(mesh(vertices, quads), DegeneratePolygonError)
+
+
+def test_only_degenerate_faces() -> None:
+    refused(mesh(tube()[0], [[0, 1, 1], [2, 3, 2]]), DegeneratePolygonError)
+
+
+def test_a_face_without_area_that_cannot_be_merged() -> None:
+    """Its longest edge is on the boundary and its middle corner, too: dropping it would pinch the surface."""
+    vertices, quads = tube(2, 6)
+    faces = triangles(quads)
+    a, b, c = faces[0]
+    vertices[c] = (vertices[a] + vertices[b]) / 2
+    error = refused(mesh(vertices, faces), DegeneratePolygonError)
+    assert error.faces == [0]
+
+
+def test_an_edge_with_three_faces() -> None:
+    vertices, quads = tube()
+    fin = np.concatenate([vertices, [[5.0, 0.0, 1.0]]])
+    error = refused(mesh(fin, [*quads.tolist(), [7, 14, 35]]), NonManifoldEdgeError)
+    assert error.edges in ([[7, 14]], [[14, 7]])
+    assert 28 in error.faces
+    assert len(error.faces) == 3
+
+
+def test_parts_that_touch_in_one_vertex() -> None:
+    vertices, quads = tube(6, 7)
+    holes = np.delete(quads, [10, 18], axis=0)  # two holes with one corner in common
+    error = refused(mesh(vertices, holes), NonManifoldVertexError)
+    assert error.vertices == [18]
+
+
+def test_a_boundary_that_touches_itself() -> None:
+    vertices, quads = tube(6, 7)
+    notched = np.delete(quads, [0, 8], axis=0)
+    error = refused(mesh(vertices, notched), NonManifoldVertexError)
+    assert error.vertices == [8]
+
+
+def test_an_inner_vertex_shared_by_two_sheets() -> None:
+    """Two inner vertices of a tube, far from each other, made one."""
+    vertices, quads = tube(9, 8)
+    pinched = quads.copy()
+    pinched[pinched == 20] = 52
+    error = refused(mesh(vertices, pinched), NonManifoldVertexError)
+    assert error.vertices == [52]
+
+
+def test_several_pieces() -> None:
+    vertices, quads = tube()
+    both = np.concatenate([quads, quads[:-7] + len(vertices)])
+    error = refused(mesh(np.concatenate([vertices, vertices + 9]), both), SeveralComponentsError)
+    assert error.faces == list(range(28, 49))
+    assert error.data["sizes"] == [56, 42]
+
+
+@pytest.mark.parametrize("welded", [True, False])
+def test_a_moebius_band(welded: bool) -> None:
+    k = 24
+    angle = np.linspace(0, 2 * np.pi, k + 1)
+    across = np.array([-0.4, 0.0, 0.4])[:, None]
+    r = 2 + across * np.cos(angle / 2)
+    vertices = np.stack([r * np.cos(angle), r * np.sin(angle), across * np.sin(angle / 2)], axis=2).reshape(
+        -1, 3
+    )
+    i, j = np.divmod(np.arange(2 * k), k)
+    a = i * (k + 1) + j
+    quads = np.stack([a, a + 1, a + k + 2, a + k + 1], axis=1)
+    if welded:
+        ends = {k: 2 * (k + 1), 2 * k + 1: k + 1, 3 * k + 2: 0}
+        for old, new in ends.items():
+            quads[quads == old] = new
+    error = refused(mesh(vertices, quads), NotOrientableError)
+    assert len(error.edges) >= 1
+
+
+def test_a_closed_surface() -> None:
+    i, j = np.divmod(np.arange(48), 8)
+    u, v = 2 * np.pi * i / 6, 2 * np.pi * j / 8
+    ring = 3 + np.cos(u)
+    torus = np.stack([ring * np.cos(v), ring * np.sin(v), np.sin(u)], axis=1)
+    quads = np.stack(
+        [i * 8 + j, i * 8 + (j + 1) % 8, (i + 1) % 6 * 8 + (j + 1) % 8, (i + 1) % 6 * 8 + j], axis=1
+    )
+    error = refused(mesh(torus, quads), NotAnnulusError)
+    assert (error.slug, error.data["reason"], error.data["genus"]) == ("not-an-annulus", "closed", 1)
+    one_hole = refused(mesh(torus, quads[1:]), NotAnnulusError)
+    assert (one_hole.data["reason"], one_hole.data["loops"]) == ("loops", 1)
+    two_holes = refused(mesh(torus, np.delete(quads, [3, 21], axis=0)), NotAnnulusError)
+    assert (two_holes.data["reason"], two_holes.data["genus"]) == ("handle", 1)
+    assert two_holes.data["euler_characteristic"] == -2
+
+
+def test_a_disk_and_a_tube_with_a_hole() -> None:
+    vertices, quads = tube(6, 7)
+    disk = refused(mesh(vertices, np.delete(quads, np.arange(0, 35, 7), axis=0)), NotAnnulusError)
+    assert disk.data["loops"] == 1
+    hole = refused(mesh(vertices, np.delete(quads, 16, axis=0)), NotAnnulusError)
+    assert hole.data["loops"] == 3
+    assert sorted(hole.vertices) == [16, 17, 23, 24]
+    assert hole.data["loop_lengths"] == [7, 4, 7]
+
+
+def test_the_reported_indices_are_the_sent_ones() -> None:
+    """With strays, duplicates and flipped faces in front, whose repair renumbers everything."""
+    vertices, quads = tube()
+    points = np.concatenate([np.full((5, 3), 7.0), vertices, [[5.0, 0.0, 1.0]]])
+    faces = [[5, 6, 6], *(quads[:, ::-1] + 5).tolist(), (quads[0] + 5).tolist(), [12, 19, 40]]
+    error = refused(mesh(points, faces), NonManifoldEdgeError)
+    assert sorted(error.edges[0]) == [12, 19]
+    assert 30 in error.faces
+
+
+def test_slugs_are_unique_and_stable() -> None:
+    kinds = SurfaceError.__subclasses__()
+    assert len({kind.slug for kind in kinds}) == len(kinds)
+    assert "not-an-annulus" in {kind.slug for kind in kinds}
+    assert all(kind.__doc__ is not None or kind.title != SurfaceError.title for kind in kinds)
