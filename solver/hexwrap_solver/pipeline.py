@@ -14,7 +14,8 @@ from typing import Any, Protocol, TypeVar
 from hexwrap_solver.arrays import Progress, no_progress
 from hexwrap_solver.conformal import conformal_map
 from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap
-from hexwrap_solver.panels import measure, rationalize
+from hexwrap_solver.panels import fit_panels, measure, quantize
+from hexwrap_solver.panels.fit import FitKey
 from hexwrap_solver.panels.types import Components, Panels, PanelSettings, Quality, Support
 from hexwrap_solver.pattern import lay_pattern
 from hexwrap_solver.pattern.types import Pattern, PatternSettings
@@ -77,5 +78,7 @@ def solve(
     laid = run("pattern", pattern, lambda progress: lay_pattern(cmap, pattern, progress))
     if panels is None:
         return Solution(cmap, run("quality", None, lambda progress: measure(cmap, laid, None)), laid)
-    made = run("panels", panels, lambda progress: rationalize(cmap, laid, panels, progress))
+    # Two stages, so that a change of the size classes alone reuses the poses and limits.
+    fitted = run("fit", FitKey.of(panels), lambda progress: fit_panels(cmap, laid, panels, progress))
+    made = run("panels", panels, lambda progress: quantize(fitted, panels))
     return Solution(cmap, run("quality", None, lambda progress: measure(cmap, laid, made)), laid, made)

@@ -65,6 +65,31 @@ class TradeOff:
 
 
 @dataclass(frozen=True)
+class FittedPanels:
+    """Panels before their lengths are chosen: everything that does not depend on the size classes.
+
+    mode: as asked for. face: (q,) cell of the pattern. regular: (q,) panels that become regular polygons;
+    the others (trimmed cells, watertight panels) are finished in ``shapes``. spokes: (r, p, 3) corners
+    around the centre at edge length 1, of the r regular panels in order. shapes: polygons of the others in
+    order. center, normal: (q, 3). limit: (q,) greatest edge length (mean edge of the others). whole: (q,).
+    cell_area: (q,) of the panels' cells. energy, notes: as in ``Panels``.
+    """
+
+    mode: Literal["split", "watertight"]
+    face: Ints
+    regular: Bools
+    spokes: Floats
+    shapes: Ragged
+    center: Floats
+    normal: Floats
+    limit: Floats
+    whole: Bools
+    cell_area: Floats
+    energy: Floats | None = None
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class Panels:
     """Finished panels.
 
@@ -73,7 +98,8 @@ class Panels:
     edge_length: (q,) ℓ_P (the mean edge for polygons that are not equilateral). limit: (q,) largest
     length allowed before quantization. center, normal: (q, 3). whole: (q,).
     class_length, class_count: (s,) the size classes, ascending. trade_off: None where sizes make no sense.
-    energy: (steps,) value of the weighted energy, empty for method ``exact``.
+    energy: (steps,) value of the weighted energy, None for method ``exact``.
+    outside: panels whose limit lies below the allowed ``edge_range``.
     """
 
     mode: Literal["split", "watertight"]
@@ -90,6 +116,7 @@ class Panels:
     trade_off: TradeOff | None = None
     energy: Floats | None = None
     notes: tuple[str, ...] = ()
+    outside: Ints | None = None
 
     @property
     def n_panels(self) -> int:

@@ -1,0 +1,173 @@
+"""Where each panel lies and how large it may become: all of the rationalization but the size classes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hexwrap_solver.arrays import Bools, Floats, Ints, Progress, Ragged, no_progress
+from hexwrap_solver.conformal.types import ConformalMap
+from hexwrap_solver.errors import PanelsError
+from hexwrap_solver.panels import limits
+from hexwrap_solver.panels.halfedges import HalfEdges, half_edges
+from hexwrap_solver.panels.polygons import fan_areas, mean_edges
+from hexwrap_solver.panels.regular import Poses, nearest_regular, nearest_regular_in_plane
+from hexwrap_solver.panels.separation import Separation, separating_planes
+from hexwrap_solver.panels.trimmed import flatten_and_clear, plane_normals
+from hexwrap_solver.panels.types import FittedPanels, PanelSettings, Weights
+from hexwrap_solver.pattern.types import Pattern
+
+#: Corners of a whole cell of each kind.
+CORNERS = {"hex": 6, "quad": 4, "triangle": 3}
+
+#: A trimmed cell that would have to shrink below this fraction of itself gets no panel.
+LEAST_TRIMMED = 0.05
+
+
+@dataclass(frozen=True)
+class FitKey:
+    """The settings that ``fit_panels`` depends on."""
+
+    mode: str
+    target: str
+    orientation: str
+    joint: float
+    method: str
+    weights: Weights
+
+    @classmethod
+    def of(cls, settings: PanelSettings) -> FitKey:
+        return cls(
+            settings.mode,
+            settings.target,
+            settings.orientation,
+            settings.joint,
+            settings.method,
+            settings.weights,
+        )
+
+
+def fit_panels(
+    cmap: ConformalMap, pattern: Pattern, settings: PanelSettings, progress: Progress = no_progress
+) -> FittedPanels:
+    """Poses and size limits of split panels (paper, section 5).
+
+    Depends on the settings in ``FitKey`` only.
+    Raises PanelsError where a whole cell has no room for a panel.
+    """
+    progress(0.0, "fitting panels")
+    cells = _corner_points(pattern)
+    p = CORNERS[pattern.kind]
+    regular: Bools = pattern.whole & (pattern.faces.lengths == p)
+    points = _table(cells, regular, p)
+    poses = _poses(pattern, points, regular, settings)
+    edges = half_edges(pattern)
+    normal = plane_normals(cells)
+    normal[regular] = poses.normal
+    planes = separating_planes(pattern, edges, normal, settings.joint)
+    progress(0.4, "limiting sizes")
+    length, center = _limits(poses, points, planes, regular, pattern, settings)
+    _require_room(length, np.flatnonzero(regular), settings.joint)
+    shapes, shape_center, kept = _trimmed(cells, normal, planes, edges, ~regular)
+    face = np.flatnonzero(regular | kept)
+    notes = _dropped_note(int((~regular & ~kept).sum()))
+    return FittedPanels(
+        mode="split",
+        face=face,
+        regular=regular[face],
+        spokes=poses.spokes(p),
+        shapes=shapes,
+        center=_merge(regular, center, kept, shape_center)[face],
+        normal=normal[face],
+        limit=_merge(regular, length, kept, mean_edges(shapes))[face],
+        whole=pattern.whole[face],
+        cell_area=fan_areas(cells)[face],
+        notes=notes,
+    )
+
+
+def _corner_points(pattern: Pattern) -> Ragged:
+    return Ragged(pattern.vertices[pattern.faces.values.astype(np.int64)], pattern.faces.offsets)
+
+
+def _table(cells: Ragged, chosen: Bools, p: int) -> Floats:
+    """(r, p, 3) corner points of the chosen cells, which have p corners each."""
+    return np.asarray(cells.values[cells.offsets[:-1][chosen][:, None] + np.arange(p)], dtype=np.float64)
+
+
+def _poses(pattern: Pattern, points: Floats, regular: Bools, settings: PanelSettings) -> Poses:
+    if settings.orientation == "fit":
+        return nearest_regular(points)
+    p = points.shape[1]
+    corner = pattern.faces.values.astype(np.int64)[
+        pattern.faces.offsets[:-1][regular][:, None] + np.arange(p)
+    ]
+    normal = pattern.normals[corner].mean(axis=1)
+    return nearest_regular_in_plane(points, normal / np.linalg.norm(normal, axis=1)[:, None])
+
+
+def _limits(
+    poses: Poses,
+    points: Floats,
+    planes: Separation,
+    regular: Bools,
+    pattern: Pattern,
+    settings: PanelSettings,
+) -> tuple[Floats, Floats]:
+    """Greatest length of each regular panel, and its centre."""
+    p = points.shape[1]
+    at = pattern.faces.offsets[:-1][regular][:, None] + np.arange(p)
+    direction, offset = planes.direction[at], planes.offset[at]
+    if settings.target == "mean":
+        edge = np.linalg.norm(np.roll(points, -1, axis=1) - points, axis=2)
+        return edge.mean(axis=1), poses.center
+    if settings.target == "shortest":
+        return limits.shortest_edge(poses, points, direction, offset)
+    return limits.inscribed(poses, direction, offset)
+
+
+def _require_room(length: Floats, cell: Ints, joint: float) -> None:
+    empty = cell[length <= 0]
+    if len(empty):
+        raise PanelsError(
+            f"{len(empty)} cells (first: {', '.join(map(str, empty[:5]))}) have no room for a regular panel"
+            f" beside joints of {joint:g}; ask for larger cells or a narrower joint.",
+            data={"cells": empty[:100].tolist()},
+        )
+
+
+def _trimmed(
+    cells: Ragged, normal: Floats, planes: Separation, edges: HalfEdges, chosen: Bools
+) -> tuple[Ragged, Floats, Bools]:
+    """Flat polygons for the chosen cells, their centres, and which cells (of all) keep a panel."""
+    shapes, at = take_rows(cells, np.flatnonzero(chosen))
+    inner = edges.twin[at] >= 0
+    flat, center, factor = flatten_and_clear(
+        shapes, normal[chosen], planes.direction[at], planes.offset[at], inner
+    )
+    enough = factor >= LEAST_TRIMMED
+    kept = np.zeros(len(chosen), dtype=bool)
+    kept[np.flatnonzero(chosen)[enough]] = True
+    return take_rows(flat, np.flatnonzero(enough))[0], center[enough], kept
+
+
+def take_rows(table: Ragged, rows: Ints) -> tuple[Ragged, Ints]:
+    """The given rows, and the positions of their values in the table."""
+    count = table.lengths[rows]
+    offsets = np.concatenate([[0], np.cumsum(count)]).astype(np.int64)
+    at = np.arange(offsets[-1]) + np.repeat(table.offsets[rows] - offsets[:-1], count)
+    return Ragged(table.values[at], offsets), at
+
+
+def _merge(first: Bools, a: Floats, second: Bools, b: Floats) -> Floats:
+    merged = np.zeros((len(first), *a.shape[1:]))
+    merged[first] = a
+    merged[second] = b
+    return merged
+
+
+def _dropped_note(dropped: int) -> tuple[str, ...]:
+    if not dropped:
+        return ()
+    return (f"{dropped} trimmed cells at the boundary are too thin to carry a panel and were left open.",)

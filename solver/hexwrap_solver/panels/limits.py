@@ -1,0 +1,102 @@
+"""How large a regular panel may become in its cell.
+
+A panel with centre c and edge ℓ reaches s_k·c + ℓ h_k in the direction s_k of its k-th separating plane,
+h_k being the reach of the polygon with edge 1. It stays on its side when that is at most the plane's offset
+o_k.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+
+from hexwrap_solver.arrays import Floats, Ints
+from hexwrap_solver.panels.regular import Poses
+
+#: Multipliers of a dual vertex count as non-negative down to this (their sum is of order 1).
+DUAL_TOLERANCE = 1e-12
+
+
+def reach(poses: Poses, direction: Floats) -> Floats:
+    """(q, k) farthest extent, along each direction (q, k, 3), of the polygons of edge 1 around 0; k =
+    corners."""
+    spokes = poses.spokes(direction.shape[1])
+    return np.asarray(np.einsum("qkd,qjd->qkj", direction, spokes).max(axis=2))
+
+
+def inscribed(poses: Poses, direction: Floats, offset: Floats) -> tuple[Floats, Floats]:
+    """The largest panels of the given orientations within their planes; direction (q, k, 3), offset (q, k).
+
+    max ℓ over ℓ and c subject to s_k·c + ℓ h_k ≤ o_k, where c moves in the panel's plane: a linear programme
+    in three unknowns, whose dual has a vertex for every triple of planes. By duality the optimum is
+    the least dual value over all triples with non-negative multipliers, taken here for all cells at once.
+    Returns lengths (q,), which may be negative where the planes leave no room, and centres (q, 3).
+    """
+    axes = np.stack([poses.x_axis, poses.y_axis], axis=1)
+    flat = np.einsum("qkd,qed->qke", direction, axes)
+    room = offset - np.einsum("qkd,qd->qk", direction, poses.center)
+    h = reach(poses, direction)
+    best = np.full(len(room), np.inf)
+    chosen = np.zeros((len(room), 3), dtype=np.int64)
+    for triple in combinations(range(direction.shape[1]), 3):
+        value = _dual_value(flat[:, triple], h[:, triple], room[:, triple])
+        better = value < best
+        best = np.where(better, value, best)
+        chosen[better] = triple
+    shift = _touching_centre(flat, h, room, chosen)
+    center = poses.center + np.einsum("qe,qed->qd", shift, axes)
+    # The length is taken from the centre found, so that rounding in the centre cannot break a constraint.
+    return length_at(center, direction, offset, h), center
+
+
+def _dual_value(s: Floats, h: Floats, room: Floats) -> Floats:
+    """Value of the dual vertex of three planes, s (q, 3, 2); infinite where it is not feasible."""
+    weight = np.stack([_cross(s[:, 1], s[:, 2]), _cross(s[:, 2], s[:, 0]), _cross(s[:, 0], s[:, 1])], axis=1)
+    total = (weight * h).sum(axis=1)
+    feasible = (np.abs(total) > DUAL_TOLERANCE) & ~np.any(
+        weight * np.sign(total)[:, None] < -DUAL_TOLERANCE, 1
+    )
+    return np.where(feasible, (weight * room).sum(axis=1) / np.where(feasible, total, 1.0), np.inf)
+
+
+def _touching_centre(flat: Floats, h: Floats, room: Floats, triple: Ints) -> Floats:
+    """(q, 2) where the panel touches the three planes that bound it."""
+    rows = np.arange(len(flat))[:, None]
+    matrix = np.concatenate([flat[rows, triple], h[rows, triple][..., None]], axis=2)
+    right = room[rows, triple]
+    # Two parallel sides bound a panel that can still slide between them; least norm keeps it near the
+    # centroid.
+    singular = np.abs(np.linalg.det(matrix)) < 1e-9
+    solution = np.zeros((len(flat), 3))
+    solution[~singular] = np.linalg.solve(matrix[~singular], right[~singular][..., None])[..., 0]
+    solution[singular] = np.einsum(
+        "qij,qj->qi", np.linalg.pinv(matrix[singular], rcond=1e-9), right[singular]
+    )
+    return solution[:, :2]
+
+
+def length_at(center: Floats, direction: Floats, offset: Floats, h: Floats) -> Floats:
+    """(q,) greatest edge length of panels with fixed centres."""
+    return np.asarray(((offset - np.einsum("qkd,qd->qk", direction, center)) / h).min(axis=1))
+
+
+def shortest_edge(poses: Poses, points: Floats, direction: Floats, offset: Floats) -> tuple[Floats, Floats]:
+    """The paper's rule: a panel takes the shortest edge of its cell, around the cell's centroid.
+
+    That alone does not exclude overlap. Where it would overlap, the centre moves towards that of the largest
+    inscribed panel just as far as needed; where even that is smaller, the inscribed panel is taken.
+    """
+    edge = np.linalg.norm(np.roll(points, -1, axis=1) - points, axis=2).min(axis=1)
+    largest, goal = inscribed(poses, direction, offset)
+    length = np.minimum(edge, largest)
+    h = reach(poses, direction)
+    now = offset - np.einsum("qkd,qd->qk", direction, poses.center) - length[:, None] * h
+    gained = -np.einsum("qkd,qd->qk", direction, goal - poses.center)
+    needed = np.divide(-now, gained, out=np.zeros_like(now), where=(now < 0) & (gained > 0))
+    center = poses.center + np.clip(needed.max(axis=1), 0.0, 1.0)[:, None] * (goal - poses.center)
+    return np.minimum(length, length_at(center, direction, offset, h)), center
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])

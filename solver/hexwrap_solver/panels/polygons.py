@@ -1,0 +1,79 @@
+"""Measures of polygons in space, for rows of any number of corners."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hexwrap_solver.arrays import Floats, Ints, Ragged
+
+
+def row_sums(values: Floats, offsets: Ints) -> Floats:
+    """Sum of each row; no row may be empty."""
+    return np.asarray(np.add.reduceat(values, offsets[:-1], axis=0)) if len(offsets) > 1 else values[:0]
+
+
+def row_minima(values: Floats, offsets: Ints) -> Floats:
+    """Least value of each row; no row may be empty."""
+    return np.asarray(np.minimum.reduceat(values, offsets[:-1])) if len(offsets) > 1 else values[:0]
+
+
+def row_maxima(values: Floats, offsets: Ints) -> Floats:
+    """Greatest value of each row; no row may be empty."""
+    return np.asarray(np.maximum.reduceat(values, offsets[:-1])) if len(offsets) > 1 else values[:0]
+
+
+def means(polygons: Ragged) -> Floats:
+    """(q, 3) mean of the corners."""
+    return (
+        row_sums(np.asarray(polygons.values, dtype=np.float64), polygons.offsets) / polygons.lengths[:, None]
+    )
+
+
+def edge_vectors(polygons: Ragged) -> Floats:
+    """(·, 3) from each corner to the next."""
+    return np.asarray(polygons.values[polygons.next()] - polygons.values, dtype=np.float64)
+
+
+def edge_lengths(polygons: Ragged) -> Floats:
+    """(·,) length of the edge from each corner to the next."""
+    return np.asarray(np.linalg.norm(edge_vectors(polygons), axis=1))
+
+
+def mean_edges(polygons: Ragged) -> Floats:
+    """(q,) mean edge length."""
+    return row_sums(edge_lengths(polygons), polygons.offsets) / polygons.lengths
+
+
+def area_vectors(polygons: Ragged) -> Floats:
+    """(q, 3) ½ Σ p_k × p_{k+1} about the mean: the area for flat polygons, along the normal."""
+    spoke = polygons.values - means(polygons)[polygons.row]
+    return row_sums(np.cross(spoke, spoke[polygons.next()]) / 2, polygons.offsets)
+
+
+def fan_areas(polygons: Ragged) -> Floats:
+    """(q,) area of the fan of triangles around the mean of the corners."""
+    spoke = polygons.values - means(polygons)[polygons.row]
+    triangle = np.linalg.norm(np.cross(spoke, spoke[polygons.next()]), axis=1) / 2
+    return row_sums(triangle, polygons.offsets)
+
+
+def interior_angles(polygons: Ragged, normal: Floats) -> Floats:
+    """(·,) angle inside the polygon at each corner, 0…2π, seen along the unit normals (q, 3)."""
+    ahead = edge_vectors(polygons)
+    back = np.empty_like(ahead)
+    back[polygons.next()] = -ahead
+    n = normal[polygons.row]
+    sine = np.einsum("hd,hd->h", np.cross(ahead, back), n)
+    cosine = np.einsum("hd,hd->h", ahead, back)
+    # The full length of the cross product, not its part along n, gives the angle of bent corners.
+    length = np.linalg.norm(np.cross(ahead, back), axis=1)
+    angle = np.arctan2(length, cosine)
+    return np.asarray(np.where(sine >= 0, angle, 2 * np.pi - angle))
+
+
+def best_plane_distances(polygons: Ragged) -> Floats:
+    """(·,) signed distance of each corner from its polygon's least-squares plane."""
+    spoke = polygons.values - means(polygons)[polygons.row]
+    moment = row_sums(np.einsum("hd,he->hde", spoke, spoke), polygons.offsets)
+    _, axes = np.linalg.eigh(moment)
+    return np.asarray(np.einsum("hd,hd->h", spoke, axes[:, :, 0][polygons.row]))

@@ -1,0 +1,92 @@
+"""What was reached, measured on the finished panels and on the map."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from hexwrap_solver.arrays import Floats, Progress, Ragged, no_progress
+from hexwrap_solver.conformal.types import ConformalMap
+from hexwrap_solver.panels.distance import distance_to_surface
+from hexwrap_solver.panels.gaps import gaps
+from hexwrap_solver.panels.halfedges import HalfEdges, half_edges
+from hexwrap_solver.panels.overlap import overlapping_pairs
+from hexwrap_solver.panels.polygons import (
+    best_plane_distances,
+    edge_lengths,
+    fan_areas,
+    interior_angles,
+    mean_edges,
+    row_maxima,
+)
+from hexwrap_solver.panels.types import Panels, Quality
+from hexwrap_solver.pattern.types import Pattern
+
+
+def measure(
+    cmap: ConformalMap, pattern: Pattern | None, panels: Panels | None, progress: Progress = no_progress
+) -> Quality:
+    """Everything is measured on the finished geometry, nothing is taken over from how it was made."""
+    stretch, area = stretch_ratio(cmap)
+    quality = Quality(
+        scale_ratio=float(np.exp(np.ptp(cmap.log_scale))),
+        quasi_conformal_mean=float(np.average(stretch, weights=area)),
+        quasi_conformal_max=float(stretch.max()),
+        notes=cmap.notes + (pattern.notes if pattern else ()) + (panels.notes if panels else ()),
+    )
+    if pattern is None or panels is None:
+        return quality
+    progress(0.1, "measuring panels")
+    polygons = panels.polygons
+    edges = half_edges(pattern)
+    between = gaps(pattern, edges, panels)
+    angle = interior_angles(polygons, panels.normal)
+    row, count, mean = polygons.row, polygons.lengths, mean_edges(polygons)
+    ideal = (np.pi * (count - 2) / count)[row]
+    progress(0.5, "distances to the surface")
+    away = distance_to_surface(np.asarray(polygons.values, dtype=np.float64), cmap.surface)
+    progress(0.9, "looking for overlaps")
+    return replace(
+        quality,
+        planarity=row_maxima(np.abs(best_plane_distances(polygons)), polygons.offsets) / mean,
+        edge_deviation=row_maxima(np.abs(edge_lengths(polygons) - mean[row]), polygons.offsets) / mean,
+        angle_deviation=row_maxima(np.abs(angle - ideal), polygons.offsets),
+        surface_distance=row_maxima(away, polygons.offsets),
+        gap_tangential=between.tangential,
+        gap_normal=between.normal,
+        kink=between.kink,
+        convex=row_maxima(angle, polygons.offsets) <= np.pi + 1e-9,
+        overlaps=_count_overlaps(pattern, edges, panels),
+        coverage=_coverage(pattern, panels),
+    )
+
+
+def _count_overlaps(pattern: Pattern, edges: HalfEdges, panels: Panels) -> int:
+    panel_of = np.full(pattern.n_cells, -1, dtype=np.int64)
+    panel_of[panels.face] = np.arange(panels.n_panels)
+    once = edges.pairs()
+    pairs = np.stack([panel_of[edges.cell[once]], panel_of[edges.across[once]]], axis=1)
+    pairs = np.unique(np.sort(pairs[(pairs >= 0).all(axis=1)], axis=1), axis=0)
+    return len(overlapping_pairs(panels.polygons, panels.normal, mean_edges(panels.polygons), pairs))
+
+
+def _coverage(pattern: Pattern, panels: Panels) -> float:
+    cells = Ragged(pattern.vertices[pattern.faces.values.astype(np.int64)], pattern.faces.offsets)
+    return float(fan_areas(panels.polygons).sum() / fan_areas(cells).sum())
+
+
+def stretch_ratio(cmap: ConformalMap) -> tuple[Floats, Floats]:
+    """(m,) ratio of the singular values of the map on each face, and the faces' areas on the surface."""
+    corners = cmap.surface.vertices[cmap.surface.faces]
+    e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    x = np.linalg.norm(e1, axis=1)
+    double_area = np.linalg.norm(np.cross(e1, e2), axis=1)
+    # In the face's own plane e1 = (x, 0) and e2 = (a, h); the map's derivative is [w1 w2]·[e1 e2]⁻¹.
+    a, h = np.einsum("md,md->m", e1, e2) / x, double_area / x
+    places = cmap.corners()
+    w1, w2 = places[:, 1] - places[:, 0], places[:, 2] - places[:, 0]
+    dx = w1 / x
+    dy = (w2 - a * dx) / h
+    conformal, anti = np.abs(dx - 1j * dy) / 2, np.abs(dx + 1j * dy) / 2
+    return (conformal + anti) / np.maximum(np.abs(conformal - anti), 1e-300), double_area / 2

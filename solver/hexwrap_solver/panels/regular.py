@@ -1,0 +1,92 @@
+"""The regular polygon nearest to a cell, in closed form.
+
+With the corner angles θ_i = 2πi/p, a = (2/p) Σ cos θ_i p_i and b = (2/p) Σ sin θ_i p_i, the sum of squared
+distances between the cell's corners p_i and those of a regular polygon of given size is least when its
+centre is the centroid and its axes are the polar factor of the 3×2 matrix [a b], whatever the size; the best
+circumradius is then (σ₁ + σ₂)/2. (An orthogonal Procrustes problem with scale; Schönemann and Carroll 1970.)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hexwrap_solver.arrays import Floats
+
+
+@dataclass(frozen=True)
+class Poses:
+    """Where regular polygons lie. center, x_axis, y_axis: (q, 3); the axes are orthonormal.
+
+    Corner i of a polygon with edge ℓ stands at center + ℓ·(corners(p)[i] · [x_axis, y_axis]).
+    free_length: (q,) edge length of the nearest regular polygon of any size.
+    """
+
+    center: Floats
+    x_axis: Floats
+    y_axis: Floats
+    free_length: Floats
+
+    @property
+    def normal(self) -> Floats:
+        return np.asarray(np.cross(self.x_axis, self.y_axis))
+
+    def spokes(self, p: int) -> Floats:
+        """(q, p, 3) from the centre to the corners of polygons of edge length 1."""
+        circle = corners(p)
+        return np.asarray(circle[:, :1] * self.x_axis[:, None] + circle[:, 1:] * self.y_axis[:, None])
+
+
+def corners(p: int) -> Floats:
+    """(p, 2) corners of the regular p-gon of edge length 1 around the origin, the first on the x axis."""
+    angle = 2 * np.pi * np.arange(p) / p
+    return np.stack([np.cos(angle), np.sin(angle)], axis=1) / (2 * np.sin(np.pi / p))
+
+
+def nearest_regular(points: Floats) -> Poses:
+    """points: (q, p, 3) corners of the cells, in order. Their nearest regular polygons."""
+    a, b = _moments(points)
+    g11, g12, g22 = _dot(a, a), _dot(a, b), _dot(b, b)
+    # Square root of the 2×2 Gram matrix G by Cayley–Hamilton: √G = (G + √det G) / √(tr G + 2 √det G).
+    root_det = np.linalg.norm(np.cross(a, b), axis=1)
+    trace_root = np.sqrt(g11 + g22 + 2 * root_det)
+    scale = 1 / (root_det * trace_root)
+    s11, s12, s22 = g11 + root_det, g12, g22 + root_det
+    x_axis = (s22[:, None] * a - s12[:, None] * b) * scale[:, None]
+    y_axis = (s11[:, None] * b - s12[:, None] * a) * scale[:, None]
+    return _orthonormal(points, x_axis, y_axis, trace_root)
+
+
+def nearest_regular_in_plane(points: Floats, normal: Floats) -> Poses:
+    """The same with the planes' unit normals (q, 3) given."""
+    a, b = _moments(points)
+    a = a - _dot(a, normal)[:, None] * normal
+    b = b - _dot(b, normal)[:, None] * normal
+    # In the plane the best rotation turns every direction θ_i to Σ z_i e^{−iθ_i}, that is to a − n×b.
+    x_axis = a - np.cross(normal, b)
+    length = np.linalg.norm(x_axis, axis=1)
+    x_axis /= length[:, None]
+    return _orthonormal(points, x_axis, np.cross(normal, x_axis), length)
+
+
+def _orthonormal(points: Floats, x_axis: Floats, y_axis: Floats, trace: Floats) -> Poses:
+    """Makes the axes orthonormal to the last bit that matters; trace: σ₁ + σ₂."""
+    x_axis = x_axis / np.linalg.norm(x_axis, axis=1)[:, None]
+    y_axis = y_axis - _dot(x_axis, y_axis)[:, None] * x_axis
+    y_axis /= np.linalg.norm(y_axis, axis=1)[:, None]
+    return Poses(points.mean(axis=1), x_axis, y_axis, trace * np.sin(np.pi / points.shape[1]))
+
+
+def _moments(points: Floats) -> tuple[Floats, Floats]:
+    p = points.shape[1]
+    angle = 2 * np.pi * np.arange(p) / p
+    # Centred first: far from the origin the cosines alone would cancel digits away.
+    centred = points - points.mean(axis=1, keepdims=True)
+    a = np.einsum("i,qid->qd", np.cos(angle), centred) * (2 / p)
+    b = np.einsum("i,qid->qd", np.sin(angle), centred) * (2 / p)
+    return a, b
+
+
+def _dot(a: Floats, b: Floats) -> Floats:
+    return np.asarray(np.einsum("qd,qd->q", a, b))

@@ -1,0 +1,190 @@
+"""A few edge lengths for many panels, none longer than a panel's limit.
+
+The best classes are intervals of the sorted limits, and a class takes the least limit of its members. What is
+lost is then an exact dynamic programme over the number of classes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.optimize import isotonic_regression
+
+from hexwrap_solver.arrays import Bools, Floats, Ints
+
+#: A limit this close below a multiple of the increment (relative to the increment) counts as the multiple.
+INCREMENT_SLACK = 1e-9
+
+
+@dataclass(frozen=True)
+class Partition:
+    """Best classes for every number 1…K over limits sorted ascending.
+
+    start: per number of classes, the indices (into the sorted limits) at which its classes begin.
+    loss: (K,) what that number of classes loses: Σ(limit² − length²), or the greatest limit − length.
+    """
+
+    start: list[Ints]
+    loss: Floats
+
+
+def floor_to(length: Floats, increment: float) -> Floats:
+    """Rounded down to a multiple of the increment, 0: unchanged."""
+    if increment <= 0:
+        return length
+    return np.asarray(np.floor(length / increment + INCREMENT_SLACK) * increment)
+
+
+def partition_by_area(length: Floats, classes: int) -> Partition:
+    """Least lost area, exactly, for 1…classes classes; length: (n,) ascending.
+
+    With k classes over the first j limits, the greatest Σ length² is
+        V_k(j) = max_i V_{k−1}(i) + (j − i)·ℓ_{i+1}²,
+    for each i a straight line in j with slope ℓ_{i+1}². Lines sorted by slope have their upper envelope at
+    the corners of the least concave majorant of (slope, intercept), which isotonic regression of the
+    difference quotients finds in linear time; a layer costs O(n). Lines with i > j need no exclusion: their
+    value at j never exceeds V_{k−1}(j). Equal limits are one line.
+    """
+    square, first = np.unique(length**2, return_index=True)
+    n, m = len(length), len(square)
+    begin = np.append(first, n)
+    total = float(np.sum(length**2))
+    value = np.zeros(1)
+    choice: list[Ints] = []
+    loss: list[float] = []
+    for k in range(1, min(classes, m) + 1):
+        if k == 1:
+            chosen = np.zeros(m + 1, dtype=np.int64)
+        else:
+            chosen = _upper_envelope(square, value[:-1] - begin[:-1] * square, begin)
+        before = value[chosen] if k > 1 else np.zeros(m + 1)
+        value = before + (begin - begin[chosen]) * square[np.minimum(chosen, m - 1)]
+        value[0] = 0.0
+        choice.append(chosen)
+        loss.append(max(total - float(value[-1]), 0.0))
+    return Partition([first[_trace(choice, k, m)] for k in range(1, len(choice) + 1)], np.array(loss))
+
+
+def _upper_envelope(slope: Floats, intercept: Floats, at: Ints) -> Ints:
+    """For each ascending abscissa the index of the highest of the lines, slopes strictly ascending."""
+    run = np.diff(slope)
+    quotient = np.diff(intercept) / run
+    # Blocks of the decreasing fit are the edges of the concave majorant; their ends are its corners.
+    corner = np.asarray(isotonic_regression(quotient, weights=run, increasing=False).blocks)
+    edge_slope = np.diff(intercept[corner]) / np.diff(slope[corner])
+    # Line corner[t+1] overtakes corner[t] where the abscissa passes −edge_slope[t], ascending in t.
+    return corner[np.searchsorted(-edge_slope, at, side="right")]
+
+
+def _trace(choice: list[Ints], k: int, m: int) -> Ints:
+    """Indices of the distinct values at which the k classes begin."""
+    starts = []
+    j = m
+    for layer in range(k - 1, -1, -1):
+        j = int(choice[layer][j])
+        starts.append(j)
+    return np.unique(np.array(starts, dtype=np.int64))
+
+
+def partition_by_worst(length: Floats, floored: Floats, classes: int) -> Partition:
+    """Least greatest loss limit − length over all panels, exactly; both (n,) ascending, floored ≤ length.
+
+    A loss t suffices when the classes drawn greedily from below (each as long as t allows) are few enough;
+    the least sufficient t is found by bisection down to neighbouring floating-point numbers.
+    """
+    starts: list[Ints] = []
+    loss: list[float] = []
+    previous: Ints | None = None
+    for k in range(1, classes + 1):
+        if previous is not None and len(previous) < k - 1:
+            break
+        found = _least_worst(length, floored, k)
+        starts.append(found)
+        end = np.append(found[1:], len(length)) - 1
+        loss.append(float(np.max(length[end] - floored[found])))
+        previous = found
+    return Partition(starts, np.array(loss))
+
+
+def _least_worst(length: Floats, floored: Floats, classes: int) -> Ints:
+    """Starts of the classes with the least greatest loss."""
+    found = _greedy(length, floored, 0.0, classes)
+    if found is not None:
+        return found
+    low, high = 0.0, float(length[-1] - floored[0])
+    found = np.zeros(1, dtype=np.int64)
+    while low < (middle := (low + high) / 2) < high:
+        better = _greedy(length, floored, middle, classes)
+        if better is None:
+            low = middle
+        else:
+            high, found = middle, better
+    return found
+
+
+def _greedy(length: Floats, floored: Floats, loss: float, classes: int) -> Ints | None:
+    """Starts of the fewest classes whose loss stays within the given one, None if more than ``classes``."""
+    starts: list[int] = []
+    at = 0
+    while at < len(length):
+        if len(starts) == classes:
+            return None
+        starts.append(at)
+        after = int(np.searchsorted(length, floored[at] + loss, side="right"))
+        if after <= at:
+            return None
+        at = after
+    return np.array(starts, dtype=np.int64)
+
+
+def partition(
+    limit: Floats, classes: int, cost: Literal["area", "worst"], increment: float
+) -> tuple[Partition, Floats]:
+    """Partition of limits sorted ascending, and the floored limits that the lengths are taken from."""
+    floored = floor_to(limit, increment)
+    made = (
+        partition_by_area(floored, classes) if cost == "area" else partition_by_worst(limit, floored, classes)
+    )
+    return made, floored
+
+
+def choose_lengths(
+    limit: Floats,
+    classes: int | None,
+    cost: Literal["area", "worst"] = "area",
+    increment: float = 0.0,
+    smallest: float = 0.0,
+) -> Floats:
+    """(q,) the length of each panel: at most its limit, a multiple of the increment, one of ``classes``
+    values.
+
+    limit: (q,) positive, any order. classes: None leaves every panel its own (floored) limit.
+    smallest: panels whose limit is below cannot reach the allowed range; they share no class with panels
+    that can, and the number of classes (from 2) is divided between the two groups with the least total loss.
+    """
+    if classes is None:
+        return floor_to(limit, increment)
+    length = np.zeros_like(limit)
+    low: Bools = floor_to(limit, increment) < smallest
+    if classes == 1:
+        low[:] = False
+    groups = [group for group in (np.flatnonzero(low), np.flatnonzero(~low)) if len(group)]
+    ordered = [group[np.argsort(limit[group], kind="stable")] for group in groups]
+    parts = [partition(limit[group], classes, cost, increment) for group in ordered]
+    for group, (made, floored), k in zip(ordered, parts, _divide(parts, classes, cost), strict=True):
+        start = made.start[k - 1]
+        length[group] = np.repeat(floored[start], np.diff(np.append(start, len(group))))
+    return length
+
+
+def _divide(parts: list[tuple[Partition, Floats]], classes: int, cost: str) -> list[int]:
+    """Number of classes for each of one or two groups (at least one each)."""
+    if len(parts) == 1:
+        return [len(parts[0][0].start)]
+    first, second = parts[0][0].loss, parts[1][0].loss
+    options = [(k, min(classes - k, len(second))) for k in range(1, min(len(first), classes - 1) + 1)]
+    a, b = np.array(options).T - 1
+    losses = np.maximum(first[a], second[b]) if cost == "worst" else first[a] + second[b]
+    return list(options[int(losses.argmin())])

@@ -1,0 +1,166 @@
+"""Individual panels: flat, regular, of few sizes, and never overlapping (contract, ``panels``)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+from tests.solver.panels.cells import (
+    catenoid,
+    cylinder,
+    grid_map,
+    hex_pattern,
+    inverted,
+    quad_pattern,
+    sphere,
+    torus,
+    triangle_pattern,
+)
+
+from hexwrap_solver.errors import PanelsError
+from hexwrap_solver.panels import fit_panels, measure, quantize, rationalize
+from hexwrap_solver.panels.types import PanelSettings
+
+SURFACES = {"cylinder": cylinder, "catenoid": catenoid, "sphere": sphere, "torus": torus}
+
+
+def panelize(chart, around=24, rings=8, make=hex_pattern, **wanted):
+    pattern = make(chart, around, rings, -0.6)
+    cmap = grid_map(chart, 96, 60, -0.7, 1.8)
+    panels = rationalize(cmap, pattern, PanelSettings(**wanted))
+    return pattern, panels, measure(cmap, pattern, panels)
+
+
+@pytest.mark.parametrize("chart", SURFACES.values(), ids=SURFACES)
+@pytest.mark.parametrize("target", ["shortest", "inscribed"])
+def test_panels_are_flat_regular_of_few_sizes_and_apart(chart, target):
+    _, panels, quality = panelize(chart, target=target, sizes=5)
+    assert quality.planarity.max() < 1e-12
+    assert quality.edge_deviation.max() < 1e-12
+    assert quality.angle_deviation.max() < 1e-12
+    assert quality.overlaps == 0
+    assert quality.convex.all()
+    assert len(panels.class_length) <= 5
+    assert (panels.edge_length == panels.class_length[panels.size]).all()
+    assert (panels.class_count == np.bincount(panels.size)).all()
+    assert np.nanmin(quality.gap_tangential) > -1e-12
+    assert 0.7 < quality.coverage < 1
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    st.floats(-1.5, 1.5),
+    st.floats(-1.5, 1.5),
+    st.floats(2.5, 6.0),
+    st.sampled_from(list(SURFACES)),
+    st.sampled_from(["shortest", "inscribed"]),
+    st.sampled_from(["fit", "tangent"]),
+    st.sampled_from([hex_pattern, quad_pattern, triangle_pattern]),
+)
+def test_nothing_overlaps_on_any_surface(x, y, z, name, target, orientation, make):
+    chart = inverted(SURFACES[name], (x, y, z))
+    _, _, quality = panelize(chart, make=make, target=target, orientation=orientation, sizes=None)
+    assert quality.overlaps == 0
+    assert quality.planarity.max() < 1e-9
+
+
+def test_targets_are_ordered():
+    """The shortest-edge rule, made safe, is never longer than the largest panel that fits."""
+    chart = inverted(catenoid, (0.3, 0.2, 4.0))
+    pattern, cmap = hex_pattern(chart, 30, 9, -0.6), grid_map(chart, 60, 40, -0.7, 1.5)
+    limit = {
+        t: fit_panels(cmap, pattern, PanelSettings(target=t)).limit for t in ("shortest", "inscribed", "mean")
+    }
+    assert (limit["shortest"] <= limit["inscribed"] * (1 + 1e-12)).all()
+    assert limit["shortest"].mean() < limit["inscribed"].mean() < limit["mean"].mean()
+
+
+def test_mean_panels_overlap_and_the_measurement_sees_it():
+    _, _, quality = panelize(catenoid, target="mean", sizes=None)
+    assert quality.overlaps > 100
+    assert np.nanmin(quality.gap_tangential) < 0
+
+
+def test_joint_is_left_open():
+    pattern, _, quality = panelize(torus, joint=0.01, sizes=None)
+    assert np.nanmin(quality.gap_tangential) >= 0.01 - 1e-12
+    assert np.nanmin(quality.gap_tangential) < 0.02 * pattern.edge_length + 0.01
+
+
+def test_tangent_panels_lie_in_tangent_planes():
+    pattern, panels, _ = panelize(torus, orientation="tangent")
+    mean = pattern.normals[pattern.faces.values].reshape(-1, 6, 3).mean(axis=1)
+    assert np.allclose(panels.normal, mean / np.linalg.norm(mean, axis=1)[:, None], atol=1e-12)
+
+
+def test_sizes_follow_a_rigid_motion_and_a_change_of_scale():
+    turn = Rotation.from_rotvec([0.5, 1.0, -2.0]).as_matrix()
+    moved = lambda x, y: 12.5 * torus(x, y) @ turn.T + [30.0, 4.0, -9.0]  # noqa: E731
+    _, here, before = panelize(torus)
+    _, there, after = panelize(moved)
+    assert np.allclose(there.class_length, 12.5 * here.class_length, rtol=1e-8)
+    assert np.allclose(
+        there.polygons.values, 12.5 * here.polygons.values @ turn.T + [30.0, 4.0, -9.0], atol=1e-6
+    )
+    assert after.coverage == pytest.approx(before.coverage, rel=1e-8)
+    assert np.allclose(after.surface_distance, 12.5 * before.surface_distance, atol=1e-7)
+
+
+def test_the_fit_does_not_depend_on_the_sizes():
+    pattern, cmap = hex_pattern(torus, 24, 6), grid_map(torus, 48, 30, -0.1, 1.2)
+    wanted = PanelSettings(sizes=4)
+    fitted = fit_panels(cmap, pattern, wanted)
+    again = quantize(fitted, replace(wanted, sizes=7))
+    direct = rationalize(cmap, pattern, replace(wanted, sizes=7))
+    assert (again.polygons.values == direct.polygons.values).all()
+
+
+def test_edge_range_is_reported_and_held():
+    pattern, cmap = hex_pattern(torus, 24, 6), grid_map(torus, 48, 30, -0.1, 1.2)
+    free = rationalize(cmap, pattern, PanelSettings(sizes=None))
+    low, high = np.quantile(free.edge_length, [0.3, 0.8])
+    panels = rationalize(cmap, pattern, PanelSettings(sizes=6, edge_range=(low, high)))
+    assert panels.edge_length.max() <= high
+    assert set(panels.outside) == set(np.flatnonzero(free.limit < low))
+    assert len(panels.notes) == 2
+
+
+def test_trade_off_falls_and_ends_where_nothing_more_is_gained():
+    _, panels, quality = panelize(torus, sizes=3)
+    curve = panels.trade_off
+    assert (np.diff(curve.uncovered) <= 1e-12).all()
+    assert curve.uncovered[2] == pytest.approx(1 - quality.coverage, abs=1e-12)
+
+
+def test_trimmed_cells_stay_flat_and_apart():
+    """Cells cut at the boundary keep their own shape, one panel each, and no class."""
+    chart = inverted(torus, (0.5, 0.1, 3.0))
+    pattern = hex_pattern(chart, 24, 8, -0.6)
+    whole = pattern.whole.copy()
+    whole[pattern.ring == 0] = False
+    whole[5::7] = False
+    pattern = replace(pattern, whole=whole)
+    cmap = grid_map(chart, 96, 60, -0.7, 1.8)
+    panels = rationalize(cmap, pattern, PanelSettings(joint=0.001))
+    quality = measure(cmap, pattern, panels)
+    assert quality.overlaps == 0
+    assert quality.planarity.max() < 1e-12
+    assert (panels.size[~panels.whole] == -1).all()
+    assert (panels.size[panels.whole] >= 0).all()
+    assert np.nanmin(quality.gap_tangential) >= 0.001 - 1e-12
+    assert panels.n_panels == pattern.n_cells
+
+
+def test_a_joint_wider_than_the_cells_is_refused():
+    with pytest.raises(PanelsError, match="no room"):
+        panelize(torus, joint=10.0)
+
+
+def test_an_increment_longer_than_the_panels_is_refused():
+    with pytest.raises(PanelsError, match="increment") as caught:
+        panelize(torus, increment=10.0)
+    assert caught.value.field == ("panels", "increment")
