@@ -34,8 +34,7 @@ class Poses:
 
     def spokes(self, p: int) -> Floats:
         """(q, p, 3) from the centre to the corners of polygons of edge length 1."""
-        circle = corners(p)
-        return np.asarray(circle[:, :1] * self.x_axis[:, None] + circle[:, 1:] * self.y_axis[:, None])
+        return np.asarray(np.einsum("pe,eqd->qpd", corners(p), np.stack([self.x_axis, self.y_axis])))
 
 
 def corners(p: int) -> Floats:
