@@ -4,17 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from hexwrap_server.files.arrays_npz import result_npz
+from hexwrap_server.files.domain_svg import domain_svg
+from hexwrap_server.files.dxf import panels_dxf
+from hexwrap_server.files.flat import flat_dxf
 from hexwrap_server.files.meta import Meta, NotMadeError, SheetError
 from hexwrap_server.files.obj import panels_obj
 from hexwrap_server.files.picture import panels_png
+from hexwrap_server.files.rhino import panels_3dm
 from hexwrap_server.files.table import panels_csv
 from hexwrap_solver.pipeline import Solution
 
 #: File name → writer; the names of the contract's ``/files/{name}``.
 WRITERS: dict[str, Callable[[Solution, Meta], bytes]] = {
     "panels.obj": panels_obj,
+    "panels.3dm": panels_3dm,
+    "panels.dxf": panels_dxf,
     "panels.csv": panels_csv,
+    "flat.dxf": flat_dxf,
+    "domain.svg": domain_svg,
     "panels.png": panels_png,
+    "result.npz": result_npz,
 }
 
 

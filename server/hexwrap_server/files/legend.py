@@ -27,7 +27,7 @@ def compose(image: Floats, panels: Panels, meta: Meta) -> bytes:
     """PNG of the image (h, w, 3) with the legend on its right."""
     height, width = image.shape[:2]
     figure = Figure(figsize=((width + WIDTH) / DPI, height / DPI), dpi=DPI, facecolor="white")
-    canvas = FigureCanvasAgg(figure)
+    FigureCanvasAgg(figure)
     picture = figure.add_axes((0, 0, width / (width + WIDTH), 1))
     picture.imshow(image, interpolation="none", aspect="auto")
     picture.set_axis_off()
@@ -38,7 +38,7 @@ def compose(image: Floats, panels: Panels, meta: Meta) -> bytes:
     out = io.BytesIO()
     with warnings.catch_warnings():  # a name in a script that the bundled font lacks shows boxes, no warning
         warnings.simplefilter("ignore", UserWarning)
-        canvas.print_png(out)
+        figure.savefig(out, format="png", dpi=DPI)
     return out.getvalue()
 
 

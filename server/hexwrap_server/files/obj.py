@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from hexwrap_server.files.layers import size_name
 from hexwrap_server.files.meta import Meta, panels_of
 from hexwrap_server.files.text import one_line
 from hexwrap_solver.pipeline import Solution
@@ -27,8 +28,3 @@ def panels_obj(solution: Solution, meta: Meta) -> bytes:
             lines.append(f"o {labels[cell[panel]]}")
             lines.append("f " + " ".join(map(str, range(starts[panel], ends[panel]))))
     return ("\n".join(lines) + "\n").encode()
-
-
-def size_name(size: int) -> str:
-    """What a size class is called in files: ``size-03``, or ``cut`` for panels without one."""
-    return "cut" if size < 0 else f"size-{size:02d}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -100,13 +101,10 @@ def draw(camera: Camera, polygons: Polygons) -> tuple[Ints, Floats]:
     nearest = np.zeros(camera.height * camera.width)
     owner = np.full(camera.height * camera.width, -1, dtype=np.int64)
     ends = np.cumsum(last - first)
-    cuts = (
-        np.searchsorted(ends, np.arange(CHUNK, ends[-1] + CHUNK, CHUNK)) if len(ends) else np.array([], int)
-    )
-    start = 0
-    for stop in np.unique(np.append(cuts, len(ends))).tolist():
-        part = slice(start, min(stop + 1, len(ends)))
-        start = part.stop
+    n_samples = int(ends[-1]) if len(ends) else 0
+    cuts = np.searchsorted(ends, np.arange(CHUNK, n_samples, CHUNK)).tolist()
+    for start, stop in pairwise(sorted({0, *cuts, len(ends)})):
+        part = slice(start, stop)
         length = last[part] - first[part]
         which = np.repeat(np.arange(len(length)), length)
         x = np.arange(len(which)) - np.repeat(np.cumsum(length) - length, length) + first[part][which]
@@ -139,11 +137,10 @@ def _spans(camera: Camera, polygons: Polygons, rows: Ints) -> tuple[Ints, Ints, 
     # One sort brings the crossings of each row and line together, from left to right: the whole part
     # of the key tells row and line, the fraction the column (to a thousandth at 10⁹ pairs).
     reach = camera.width + 4.0
-    key = np.sort(
-        owner[crossing] * camera.height + line + (np.clip(x, -1.0, camera.width + 1.0) + 2.0) / reach
-    )
+    column = np.clip(x, -1.0, camera.width + 1.0) + 2.0
+    key = np.sort(owner[crossing] * camera.height + line + column / reach)
     slot = np.floor(key)
-    column = np.clip(np.ceil((key - slot) * reach - 2.5), 0, camera.width).astype(np.int64)
-    slot, first, last = slot[::2].astype(np.int64), column[::2], column[1::2]
+    bounds = np.clip(np.ceil((key - slot) * reach - 2.5), 0, camera.width).astype(np.int64)
+    slot, first, last = slot[::2].astype(np.int64), bounds[::2], bounds[1::2]
     there = last > first
     return (slot // camera.height)[there], (slot % camera.height)[there], first[there], last[there]

@@ -1,4 +1,4 @@
-"""Panels before their surface: a sun with soft shadows, light from the sky, fine outlines, a shadow on the ground."""
+"""Panels before their surface, in sun and sky light, with soft shadows and fine outlines, on white ground."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ SUNLIGHT, SKYLIGHT, GLOSS, GLOSS_EXPONENT = 0.80, 0.36, 0.10, 40.0
 #: Blur radii in pixels, and depths in radii of the model, over which hollows darken.
 HOLLOWS = ((6.0, 0.03), (40.0, 0.25))
 SHELL, BACK = "#4a4f58", "#8d9199"
-#: What is left of the light on an outline, and the panel width in pixels from which outlines have full strength.
+#: What is left of the light on an outline; the panel width in pixels from which outlines have full strength.
 OUTLINE, OUTLINE_FULL = 0.25, 22.0
 GROUND_SHADOW = 0.34
 
@@ -46,7 +46,7 @@ class Scene:
 
 def render(scene: Scene) -> Floats:
     """(height, width, 3) sRGB in 0..1 on white."""
-    points = np.vstack([scene.panels.outline.values, scene.shell.outline.values])
+    points: Floats = np.vstack([scene.panels.outline.values, scene.shell.outline.values]).astype(float)
     radius = float(np.linalg.norm(points, axis=1).max())
     camera = _camera(points, radius, scene.view)
     # From inside one sees the backs of the panels; the shell shows only its outside.
@@ -117,11 +117,10 @@ class Sun:
 
 
 def _sun(scene: Scene, points: Floats, radius: float) -> Sun:
-    right = np.cross([0.0, 0.0, 1.0], scene.view)
+    up = np.array([0.0, 0.0, 1.0])
+    right = np.cross(up, scene.view)
     right /= np.linalg.norm(right)
-    direction = (
-        SUN[0] * right + SUN[1] * np.array([0.0, 0.0, 1.0]) + SUN[2] * np.cross(right, [0.0, 0.0, 1.0])
-    )
+    direction = SUN[0] * right + SUN[1] * up + SUN[2] * np.cross(right, up)
     direction /= np.linalg.norm(direction)
     camera = _aim(points, direction * radius * SUN_DISTANCE, (SUN_MAP, SUN_MAP), 8, 1)
     _, nearest = draw(camera, scene.panels.join(scene.shell))
@@ -129,7 +128,7 @@ def _sun(scene: Scene, points: Floats, radius: float) -> Sun:
 
 
 def _light(scene: Scene, drawn: Polygons, camera: Camera, sun: Sun) -> tuple[Floats, Floats]:
-    """Linear light off each row from the sun and from the sky, (n + 1, 3); the last row is the white ground."""
+    """Linear light from sun and sky off each row, (n + 1, 3); the last row is the white ground."""
     viewer = camera.position - drawn.anchor
     viewer /= np.linalg.norm(viewer, axis=1, keepdims=True)
     side = np.where(np.sum(drawn.normal * viewer, axis=1) < 0, -1.0, 1.0)

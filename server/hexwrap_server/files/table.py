@@ -20,10 +20,21 @@ def panels_csv(solution: Solution, meta: Meta) -> bytes:
     ``neighbours`` names the panels across each edge in order, ``-`` where there is none; gaps are to
     those neighbours, along the surface (``tangential``) and across it (``normal``).
     """
-    pattern, panels = panels_of(solution, "panels.csv")
+    panels_of(solution, "panels.csv")
+    known = columns(solution)
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\r\n")  # RFC 4180
+    writer.writerow(known)
+    writer.writerows(zip(*known.values(), strict=True))
+    return text.getvalue().encode()
+
+
+def columns(solution: Solution) -> dict[str, list[object]]:
+    """Column name → one entry per panel, empty text where something was not measured."""
+    pattern, panels = panels_of(solution, "a table")
     quality, n = solution.quality, panels.n_panels
     labels = np.array(pattern.labels(), dtype=object)
-    columns: dict[str, list[object]] = {
+    known: dict[str, list[object]] = {
         "label": labels[panels.face].tolist(),
         "ring": pattern.ring[panels.face].tolist(),
         "place": pattern.place[panels.face].tolist(),
@@ -35,19 +46,15 @@ def panels_csv(solution: Solution, meta: Meta) -> bytes:
     }
     for name, vectors in (("center", panels.center), ("normal", panels.normal)):
         for axis, letter in enumerate("xyz"):
-            columns[f"{name}_{letter}"] = _numbers(vectors[:, axis], n)
+            known[f"{name}_{letter}"] = _numbers(vectors[:, axis], n)
     for name in ("planarity", "edge_deviation", "angle_deviation", "surface_distance"):
-        columns[name] = _numbers(getattr(quality, name), n)
-    columns["convex"] = [""] * n if quality.convex is None else quality.convex.astype(int).tolist()
+        known[name] = _numbers(getattr(quality, name), n)
+    known["convex"] = [""] * n if quality.convex is None else quality.convex.astype(int).tolist()
     for name in ("gap_tangential", "gap_normal", "kink"):
         for what, numbers in _over_edges(getattr(quality, name), pattern, panels.face).items():
-            columns[f"{name}_{what}"] = _numbers(numbers, n)
-    columns["neighbours"] = [" ".join(names) for names in neighbour_labels(pattern, panels)]
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\r\n")  # RFC 4180
-    writer.writerow(columns)
-    writer.writerows(zip(*columns.values(), strict=True))
-    return text.getvalue().encode()
+            known[f"{name}_{what}"] = _numbers(numbers, n)
+    known["neighbours"] = [" ".join(names) for names in neighbour_labels(pattern, panels)]
+    return known
 
 
 def neighbour_labels(pattern: Pattern, panels: Panels) -> list[list[str]]:

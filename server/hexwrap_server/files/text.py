@@ -13,11 +13,10 @@ def one_line(text: str) -> str:
 
 
 def length(value: float) -> str:
-    """A length to four significant digits, or to the whole unit where it is larger, never in powers of ten."""
-    if value == 0 or not np.isfinite(value):
-        return "0"
-    digits = max(0, 3 - int(np.floor(np.log10(abs(value)))))
-    return f"{value:.{min(digits, 9)}f}"
+    """A length to four significant digits, or to the whole unit where it is larger."""
+    if not 1e-5 < abs(value) < 1e9:
+        return f"{value:.4g}"
+    return f"{value:.{max(0, 3 - int(np.floor(np.log10(abs(value)))))}f}"
 
 
 def angle(value: float) -> str:

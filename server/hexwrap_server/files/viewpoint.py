@@ -1,4 +1,4 @@
-"""From where a picture is taken, so that a tower, a facade, an entrance and a flat ring each show themselves."""
+"""From where a picture is taken, so that towers, facades, entrances and flat rings show themselves."""
 
 from __future__ import annotations
 

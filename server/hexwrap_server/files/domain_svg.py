@@ -1,0 +1,266 @@
+"""``domain.svg``: the unrolled domain with mesh, boundary, pattern, corners and apex (paper, Figure 5)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from xml.sax.saxutils import escape
+
+import numpy as np
+
+from hexwrap_server.files.colours import size_colours
+from hexwrap_server.files.layers import size_name
+from hexwrap_server.files.meta import Meta
+from hexwrap_server.files.text import angle, length, one_line
+from hexwrap_server.files.viewpoint import corners
+from hexwrap_solver.arrays import Complexes, Floats, Ints, Ragged
+from hexwrap_solver.conformal.types import ConformalMap
+from hexwrap_solver.pattern.types import Pattern
+from hexwrap_solver.pipeline import Solution
+
+#: Drawing units: the longer side of the domain, and the room around it.
+SIDE, MARGIN = 1400.0, 90.0
+#: Larger meshes are left out: their lines would be a grey mass of many megabytes.
+MAX_FACES = 30_000
+#: More corners than this are marked, but not named.
+MAX_NAMES = 40
+#: The apex is shown where it is no further from the domain than this many times the domain's size.
+APEX_REACH = 0.6
+#: A cut edge: its two sides stand apart by more than this part of the circumference.
+APART = 1e-6
+
+STYLE = """
+text { font-family: "DejaVu Sans", "Segoe UI", Helvetica, Arial, sans-serif; fill: #23262b; }
+.title { font-size: 26px; font-weight: bold; } .note { font-size: 18px; fill: #70757d; }
+.mesh { fill: none; stroke: #c3c7cd; stroke-width: 0.5; }
+.cells { stroke: #23262b; stroke-linejoin: round; }
+.cut { fill: none; stroke: #e8781e; stroke-width: 2.2; stroke-dasharray: 9 6; }
+.loop0, .loop1 { fill: none; stroke-width: 3.2; stroke-linecap: round; }
+.loop0 { stroke: #16202e; } .loop1 { stroke: #16202e; }
+.corner { fill: #c8202f; stroke: #ffffff; stroke-width: 2; } .angle { font-size: 20px; fill: #c8202f; }
+.halo { paint-order: stroke; stroke: #ffffff; stroke-width: 5; stroke-linejoin: round; }
+.apex { fill: none; stroke: #6a3fa0; stroke-width: 2.5; } .named { font-size: 20px; }
+"""
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Where the plane's points stand in the drawing: y runs down there."""
+
+    low: Floats
+    scale: float
+    width: float
+    height: float
+
+    @classmethod
+    def around(cls, points: Complexes) -> Frame:
+        low = np.array([points.real.min(), points.imag.min()])
+        extent = np.array([np.ptp(points.real), np.ptp(points.imag)])
+        scale = SIDE / float(extent.max())
+        width, height = (extent * scale + 2 * MARGIN).tolist()
+        return cls(low, scale, width, height)
+
+    def place(self, z: Complexes) -> Floats:
+        """(…, 2) drawing coordinates."""
+        x = MARGIN + (z.real - self.low[0]) * self.scale
+        y = self.height - MARGIN - (z.imag - self.low[1]) * self.scale
+        return np.stack([x, y], axis=-1)
+
+
+def domain_svg(solution: Solution, meta: Meta) -> bytes:
+    """SVG 1.1, complete in itself. Cells across the cut are drawn in one piece, in a sheet of their own."""
+    cmap, pattern = solution.map, solution.pattern
+    at = cmap.corners()
+    shown = [at.ravel()]
+    cells = None
+    if pattern is not None:
+        cells = cmap.deck.apply(pattern.uv[np.asarray(pattern.faces.values)], pattern.sheet)
+        shown.append(cells)
+    frame = Frame.around(_with_apex(cmap, np.concatenate(shown)))
+    parts = [_path(frame.place(at), "mesh")] if len(at) <= MAX_FACES else []
+    if pattern is not None and cells is not None:
+        parts += _cells(solution, pattern, frame.place(cells))
+    on_boundary, on_cut = _sides(cmap, at)
+    start, end = at.ravel(), at[:, [1, 2, 0]].ravel()
+    parts.append(_segments(frame, start[on_cut], end[on_cut], "cut"))
+    parts += _loops(cmap, frame, start, end, on_boundary)
+    parts += _corner_marks(cmap, frame, start, on_boundary)
+    parts += _apex_mark(cmap, frame)
+    return _page(frame, parts, solution, meta).encode()
+
+
+def _page(frame: Frame, parts: list[str], solution: Solution, meta: Meta) -> str:
+    head, foot = 74.0, 62.0
+    width, height = max(frame.width, 620.0), frame.height + head + foot
+    title = escape(one_line(meta.name))
+    inside = "\n".join(parts)
+    return f"""<?xml version="1.0" encoding="UTF-8"?>
+<svg xmlns="http://www.w3.org/2000/svg" width="{width:.0f}" height="{height:.0f}"
+ viewBox="0 0 {width:.2f} {height:.2f}">
+<title>{title}: unrolled domain</title>
+<style>{STYLE}</style>
+<rect width="100%" height="100%" fill="#ffffff"/>
+<text class="title" x="{MARGIN}" y="58">{title}</text>
+<g transform="translate({(width - frame.width) / 2:.2f} {head})">
+{inside}
+</g>
+<text class="note" x="{MARGIN}" y="{height - 34:.2f}">{escape(_caption(solution))}</text>
+</svg>
+"""
+
+
+def _caption(solution: Solution) -> str:
+    cmap, pattern = solution.map, solution.pattern
+    turned = "" if cmap.kind == "cylinder" else f", cone angle {angle(cmap.deck.angle)}"
+    words = f"{cmap.kind}{turned}, circumference {length(cmap.circumference)}"
+    if pattern is not None:
+        words += f"; {pattern.n_cells} cells"
+    return words
+
+
+def _with_apex(cmap: ConformalMap, points: Complexes) -> Complexes:
+    """The points, and the apex where it is near enough to be shown."""
+    apex = cmap.deck.apex
+    return points if apex is None or not _apex_near(cmap) else np.append(points, apex)
+
+
+def _apex_near(cmap: ConformalMap) -> bool:
+    apex, uv = cmap.deck.apex, cmap.uv
+    if apex is None:
+        return False
+    size = abs(complex(np.ptp(uv.real), np.ptp(uv.imag)))
+    return bool(np.abs(uv - apex).min() < APEX_REACH * size)
+
+
+def _sides(cmap: ConformalMap, at: Complexes) -> tuple[Ints, Ints]:
+    """Positions in the (m, 3) table of face sides that lie on the boundary, and of those along the cut."""
+    faces = cmap.surface.faces
+    tail, head = faces.ravel(), faces[:, [1, 2, 0]].ravel()
+    start, end = at.ravel(), at[:, [1, 2, 0]].ravel()
+    key = np.minimum(tail, head) * (faces.max() + 1) + np.maximum(tail, head)
+    order = np.argsort(key, kind="stable")
+    paired = np.flatnonzero(key[order][1:] == key[order][:-1])
+    one, two = order[paired], order[paired + 1]
+    boundary = np.ones(len(key), dtype=bool)
+    boundary[one] = boundary[two] = False
+    apart = np.abs(start[one] - end[two]) + np.abs(end[one] - start[two]) > APART * cmap.circumference
+    return np.flatnonzero(boundary), np.concatenate([one[apart], two[apart]])
+
+
+def _cells(solution: Solution, pattern: Pattern, places: Floats) -> list[str]:
+    """Cells filled with the colour of their panel's size, one path per size."""
+    size = np.full(pattern.n_cells, -1)
+    colours: list[str] = []
+    if solution.panels is not None:
+        size[solution.panels.face] = solution.panels.size
+        colours = size_colours(len(solution.panels.class_length))
+    rows = Ragged(places, pattern.faces.offsets)
+    outlines = _outlines(rows)
+    members: dict[int, list[str]] = {}
+    for outline, group in zip(outlines, size.tolist(), strict=True):
+        members.setdefault(group, []).append(outline)
+    thin = float(np.clip(0.02 * np.sqrt(np.median(_areas(rows))), 0.25, 1.6))
+    return [
+        f'<path class="cells {size_name(group)}" stroke-width="{thin:.2f}"'
+        + f' fill="{colours[group] if group >= 0 else "none"}" fill-opacity="0.85"'
+        + f' d="{"".join(members[group])}"/>'
+        for group in sorted(members)
+    ]
+
+
+def _outlines(rows: Ragged) -> list[str]:
+    """A closed path for each row of points."""
+    numbers = np.asarray(rows.values).tolist()
+    words = [f"L{x:.2f} {y:.2f}" for x, y in numbers]
+    bounds = rows.offsets.tolist()
+    return ["M" + "".join(words[a:b])[1:] + "Z" for a, b in pairwise(bounds)]
+
+
+def _areas(rows: Ragged) -> Floats:
+    points = np.asarray(rows.values)
+    z = points[:, 0] + 1j * points[:, 1]
+    return np.abs(np.bincount(rows.row, (np.conj(z) * z[rows.next()]).imag, rows.n_rows)) / 2
+
+
+def _path(polygons: Floats, kind: str) -> str:
+    """One path of closed polygons (n, m, 2)."""
+    return f'<path class="{kind}" d="{"".join(_outlines(Ragged.from_table(polygons)))}"/>'
+
+
+def _segments(frame: Frame, start: Complexes, end: Complexes, kind: str) -> str:
+    """One path of lines, each drawn on where the one before it ends."""
+    ends = np.hstack([frame.place(start), frame.place(end)])
+    words: list[str] = []
+    last = (np.nan, np.nan)
+    for x0, y0, x1, y1 in ends.tolist():
+        if abs(x0 - last[0]) + abs(y0 - last[1]) < 1e-6:
+            words.append(f"L{x1:.2f} {y1:.2f}")
+        else:
+            words.append(f"M{x0:.2f} {y0:.2f}L{x1:.2f} {y1:.2f}")
+        last = (x1, y1)
+    return f'<path class="{kind}" d="{"".join(words)}"/>'
+
+
+def _loop_sides(cmap: ConformalMap, on_boundary: Ints) -> list[Ints]:
+    """Per loop, the face sides along it, in its order (each starts at the loop's vertex)."""
+    tail = cmap.surface.faces.ravel()
+    side = np.full(len(cmap.surface.vertices), -1)
+    side[tail[on_boundary]] = on_boundary
+    return [side[loop] for loop in cmap.surface.loops]
+
+
+def _loops(
+    cmap: ConformalMap, frame: Frame, start: Complexes, end: Complexes, on_boundary: Ints
+) -> list[str]:
+    """Each loop's curve, its name and the way it runs."""
+    parts = []
+    for number, sides in enumerate(_loop_sides(cmap, on_boundary)):
+        parts.append(_segments(frame, start[sides], end[sides], f"loop{number}"))
+        middle = sides[len(sides) // 2]
+        along = end[middle] - start[middle]
+        away = np.array([along / abs(along) * -1j * 34 / frame.scale])
+        x, y = frame.place(start[middle] + away)[0].tolist()
+        turn = -np.degrees(np.angle(along))
+        arrow, turn = ("→", turn) if abs(turn) <= 90 else ("←", turn - np.copysign(180, turn))
+        words = f"loop {number} {arrow}" if arrow == "→" else f"{arrow} loop {number}"
+        parts.append(
+            f'<text class="named halo" text-anchor="middle" dominant-baseline="central" '
+            f'transform="translate({x:.2f} {y:.2f}) rotate({turn:.2f})">{words}</text>'
+        )
+    return parts
+
+
+def _corner_marks(cmap: ConformalMap, frame: Frame, start: Complexes, on_boundary: Ints) -> list[str]:
+    """A dot at each corner of the domain, with its angle."""
+    marked = dict(corners(cmap))
+    parts = []
+    for loop, sides in zip(cmap.surface.loops, _loop_sides(cmap, on_boundary), strict=True):
+        for vertex, side in zip(loop.tolist(), sides.tolist(), strict=True):
+            if vertex not in marked:
+                continue
+            x, y = frame.place(start[[side]])[0].tolist()
+            parts.append(f'<circle class="corner" cx="{x:.2f}" cy="{y:.2f}" r="8"/>')
+            if len(marked) > MAX_NAMES:
+                continue
+            # The inside spans the angle to the left of the side that leaves the corner.
+            face, corner = divmod(side, 3)
+            along = start[3 * face + (corner + 1) % 3] - start[side]
+            away = -along / abs(along) * np.exp(0.5j * marked[vertex]) * 30 / frame.scale
+            x, y = frame.place(start[[side]] + away)[0].tolist()
+            parts.append(
+                f'<text class="angle halo" text-anchor="middle" dominant-baseline="central" '
+                f'x="{x:.2f}" y="{y:.2f}">{angle(marked[vertex])}</text>'
+            )
+    return parts
+
+
+def _apex_mark(cmap: ConformalMap, frame: Frame) -> list[str]:
+    apex = cmap.deck.apex
+    if apex is None or not _apex_near(cmap):
+        return []
+    x, y = frame.place(np.array([apex]))[0].tolist()
+    return [
+        f'<path class="apex" d="M{x - 12:.2f} {y:.2f}h24M{x:.2f} {y - 12:.2f}v24"/>',
+        f'<circle class="apex" cx="{x:.2f}" cy="{y:.2f}" r="7"/>',
+        f'<text class="named halo" x="{x + 16:.2f}" y="{y - 12:.2f}">apex</text>',
+    ]

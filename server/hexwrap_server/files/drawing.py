@@ -1,0 +1,31 @@
+"""What both DXF files share: a document with a layer per size, and its bytes."""
+
+from __future__ import annotations
+
+import io
+
+from ezdxf.document import Drawing
+from ezdxf.filemanagement import new
+
+from hexwrap_server.files.layers import size_layers
+from hexwrap_server.files.text import one_line
+from hexwrap_solver.panels.types import Panels
+
+
+def drawing(panels: Panels, name: str, *others: str) -> Drawing:
+    """An empty drawing without a unit, with a coloured layer per size and further grey ones."""
+    document = new("R2010")
+    document.header["$INSUNITS"] = 0
+    document.header["$PROJECTNAME"] = one_line(name)
+    for layer in size_layers(panels).values():
+        document.layers.add(layer.name).rgb = layer.colour
+    for other in others:
+        document.layers.add(other).rgb = (110, 115, 124)
+    return document
+
+
+def encode(document: Drawing) -> bytes:
+    """The drawing as a DXF file."""
+    text = io.StringIO()
+    document.write(text)
+    return document.encode(text.getvalue())
