@@ -1,0 +1,166 @@
+"""Which nodes of the lattice lie in the domain: every triangle of the map, filled with lattice points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints
+from hexwrap_solver.domain.cover import Cover
+from hexwrap_solver.pattern.lattice import Lattice, Motion
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The unrolled domain in lattice units.
+
+    corners: (m, 3) complex, the triangles; motion: the deck transformation; reach: distance below which a
+    point counts as lying on an edge, in lattice units.
+    """
+
+    corners: Complexes
+    cover: Cover
+    lattice: Lattice
+    motion: Motion
+    reach: float
+
+
+@dataclass(frozen=True)
+class Nodes:
+    """Nodes, each known by every triangle that touches it ("sighting").
+
+    face, point: (k,) and (k, 2) sightings, sorted by key. node: (k,) which node is seen.
+    turns: (k,) the triangle (face, turns) of the cover is the one beside the node's own sighting, so that
+    G^turns(point) = point of the own sighting. own: (n,) position of the sighting that stands for the node.
+    starts: (n + 1,) and sighting: (k,) the sightings of node i are sighting[starts[i]:starts[i + 1]].
+    """
+
+    face: Ints
+    point: Ints
+    node: Ints
+    turns: Ints
+    own: Ints
+    starts: Ints
+    sighting: Ints
+    _keys: Ints
+    _low: Ints
+    _span: Ints
+
+    @property
+    def n(self) -> int:
+        return len(self.own)
+
+    def find(self, face: Ints, point: Ints) -> Ints:
+        """Position of a sighting, −1 where there is none."""
+        key = _key(face, point, self._low, self._span)
+        at = np.minimum(np.searchsorted(self._keys, key), max(len(self._keys) - 1, 0))
+        found = ((point >= self._low) & (point < self._low + self._span)).all(axis=-1)
+        return np.where(found & (self._keys[at] == key), at, -1) if len(self._keys) else np.full(len(face), -1)
+
+
+def _key(face: Ints, point: Ints, low: Ints, span: Ints) -> Ints:
+    return np.asarray((face * span[0] + (point[..., 0] - low[0])) * span[1] + (point[..., 1] - low[1]))
+
+
+def expand(counts: Ints) -> tuple[Ints, Ints]:
+    """(owner, position inside the owner's run) of Σcounts entries."""
+    owner = np.repeat(np.arange(len(counts)), counts)
+    return owner, np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts)
+
+
+def lattice_points_in_triangles(triangles: Floats, reach: float) -> tuple[Ints, Ints]:
+    """(triangle, point (·, 2)) of every integer point inside or within about reach of a triangle.
+
+    triangles: (m, 3, 2) in lattice coordinates. Row by row, so that slivers cost no more than their rows.
+    """
+    a, b = triangles[..., 0], triangles[..., 1]
+    first_row = np.ceil(b.min(axis=1) - reach).astype(np.int64)
+    rows = np.maximum(np.floor(b.max(axis=1) + reach).astype(np.int64) - first_row + 1, 0)
+    owner, step = expand(rows)
+    row = first_row[owner] + step
+    low = np.full(len(owner), np.inf)
+    high = np.full(len(owner), -np.inf)
+    for c in range(3):
+        a0, b0 = a[owner, c], b[owner, c]
+        rise = b[owner, (c + 1) % 3] - b0
+        run = a[owner, (c + 1) % 3] - a0
+        steep = np.where(rise == 0, 1.0, rise)
+        for margin in (-reach, reach):  # a shallow edge stays within reach of the row for a while
+            t = np.where(rise == 0, 0.0, np.clip((row + margin - b0) / steep, 0, 1))
+            meets = abs(b0 + t * rise - row) <= 1.5 * reach
+            at = a0 + t * run
+            low = np.where(meets, np.minimum(low, at), low)
+            high = np.where(meets, np.maximum(high, at), high)
+    met = low <= high
+    owner, row = owner[met], row[met]
+    first = np.ceil(low[met] - reach).astype(np.int64)
+    count = np.maximum(np.floor(high[met] + reach).astype(np.int64) - first + 1, 0)
+    span, step = expand(count)
+    return owner[span], np.stack([first[span] + step, row[span]], axis=1)
+
+
+def edge_distances(corners: Complexes, place: Complexes) -> Floats:
+    """(k, 3) signed distances of a place from the three edges of its triangle, positive inside."""
+    along = np.roll(corners, -1, axis=1) - corners
+    offset = place[:, None] - corners
+    cross = along.real * offset.imag - along.imag * offset.real
+    return np.asarray(cross / np.maximum(abs(along), 1e-300))
+
+
+def find_nodes(layout: Layout) -> Nodes:
+    """All lattice nodes in the domain, each once, also on edges, at vertices and at the cut."""
+    lattice, cover = layout.lattice, layout.cover
+    face, point = lattice_points_in_triangles(lattice.coordinates(layout.corners), layout.reach)
+    wanted = lattice.is_node(point)
+    face, point = face[wanted], point[wanted]
+    low = point.min(axis=0, initial=0)
+    span = point.max(axis=0, initial=0) - low + 1
+    keys = _key(face, point, low, span)
+    order = np.argsort(keys, kind="stable")
+    face, point, keys = face[order], point[order], keys[order]
+    empty = np.zeros(0, dtype=np.int64)
+    seen = Nodes(face, point, empty, empty, empty, empty, empty, keys, low, span)
+    first, second, shift = _same_place(layout, seen, cover)
+    graph = coo_array((np.ones(len(first)), (first, second)), shape=(len(face), len(face)))
+    n, node = connected_components(graph, directed=False)
+    node = node.astype(np.int64)
+    sighting = np.argsort(node, kind="stable")
+    starts = np.searchsorted(node[sighting], np.arange(n + 1))
+    own = sighting[starts[:-1]]
+    turns = _turns(own, first, second, shift, len(face))
+    return Nodes(face, point, node, turns, own, starts, sighting, keys, low, span)
+
+
+def _same_place(layout: Layout, seen: Nodes, cover: Cover) -> tuple[Ints, Ints, Ints]:
+    """Pairs of sightings of one node across an edge it lies on, with the shift of that edge."""
+    place = layout.lattice.position(seen.point)
+    near = abs(edge_distances(layout.corners[seen.face], place)) <= 4 * layout.reach
+    at, c = np.nonzero(near & (cover.across[seen.face] >= 0))
+    across, shift = cover.across[seen.face[at], c], cover.shift[seen.face[at], c]
+    other = seen.find(across, layout.motion.apply(seen.point[at], -shift))
+    found = other >= 0
+    return at[found], other[found], shift[found]
+
+
+def _turns(own: Ints, first: Ints, second: Ints, shift: Ints, size: int) -> Ints:
+    """Sheet of each sighting relative to its node's own one, carried along the links."""
+    turns = np.zeros(size, dtype=np.int64)
+    known = np.ones(size, dtype=bool)
+    known[first] = False
+    known[own] = True
+    while not known.all():
+        new = known[first] & ~known[second]
+        turns[second[new]] = turns[first[new]] + shift[new]
+        known[second[new]] = True
+    return turns
+
+
+def on_boundary(layout: Layout, nodes: Nodes) -> Bools:
+    """(n,) whether a node lies on the boundary of the domain, within reach."""
+    place = layout.lattice.position(nodes.point)
+    near = abs(edge_distances(layout.corners[nodes.face], place)) <= layout.reach
+    touches = (near & (layout.cover.across[nodes.face] < 0)).any(axis=1)
+    return np.bincount(nodes.node, weights=touches, minlength=nodes.n) > 0
