@@ -58,7 +58,7 @@ class Lattice:
     @cached_property
     def steps(self) -> Ints:
         """(order, 2) edge vectors by direction."""
-        return self.rotations @ np.array(self.first_step)
+        return np.asarray(self.rotations @ np.array(self.first_step))
 
     @cached_property
     def edge(self) -> float:
@@ -68,7 +68,7 @@ class Lattice:
     @cached_property
     def cell_area(self) -> float:
         """Area of a cell in square lattice units."""
-        return {"hex": 1.5 * np.sqrt(3), "triangle": 0.75 * np.sqrt(3), "quad": 2.0}[self.kind]
+        return {"hex": 1.5 * 3**0.5, "triangle": 0.75 * 3**0.5, "quad": 2.0}[self.kind]
 
     @cached_property
     def basis(self) -> Ints:
@@ -111,6 +111,21 @@ class Lattice:
         corners = (start + np.array([[0, 0], [1, 0], [0, 1], [1, 1]])) @ self.basis
         return np.asarray(corners[np.argmin(abs(self.position(corners) - wanted))])
 
+    def shortest_towards(self, direction: complex) -> Ints:
+        """The shortest translation along an edge or across a corner."""
+        every = np.stack(
+            [self.rotate(v, j) for v in (self.basis[0], self.basis.sum(axis=0)) for j in range(self.order)]
+        )
+        return np.asarray(every[np.argmin(abs(np.angle(self.position(every) / direction)))])
+
+    def ring_near(self, around: int, direction: complex) -> Ints:
+        """Of all translations with that number of cells around, the nearest in direction."""
+        distance = max(1, round(around / (2 if self.kind == "triangle" else 1)))
+        side = self.rotate(self.basis[0], 1) - self.basis[0]
+        arc = distance * self.basis[0] + np.arange(distance)[:, None] * side
+        ring = np.concatenate([self.rotate(arc, j) for j in range(self.order)])
+        return np.asarray(ring[np.argmin(abs(np.angle(self.position(ring) / direction)))])
+
     def cells_around(self, translation: Ints) -> Ints:
         """Cells in a shortest closed ring of edge-adjacent cells once around along a translation."""
         e1 = self.position(self.basis[0])
@@ -149,6 +164,12 @@ class Motion:
     def rotation(self, s: Ints) -> Ints:
         """By how many units ζ the power G^s turns, modulo the order."""
         return np.asarray(self.turns * np.asarray(s)) % self.lattice.order
+
+    def carry(self, places: Complexes, s: Ints) -> Complexes:
+        """G^s for places of the plane."""
+        at_zero = self.apply(np.zeros((*np.shape(s), 2), dtype=np.int64), np.asarray(s))
+        angle = 2 * np.pi / self.lattice.order * self.rotation(s)
+        return np.asarray(np.exp(1j * angle) * places + self.lattice.position(at_zero))
 
     def apply(self, points: Ints, s: Ints) -> Ints:
         """G^s(points), s broadcast over the points."""

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexwrap_solver.arrays import Ints
+from hexwrap_solver.arrays import Bools, Ints
 from hexwrap_solver.pattern.nodes import Layout, Nodes, edge_distances, expand
-from hexwrap_solver.pattern.walk import Walks, walk
+from hexwrap_solver.pattern.walk import walk
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,8 @@ def _follow(layout: Layout, nodes: Nodes, links: Links, node: Ints, direction: I
     found = walk(layout, nodes.face[seen], start, start + lattice.steps[way])
     arrival = nodes.find(found.face, found.target)
     arrived = (found.exit < 0) & ~blocked & (arrival >= 0)
-    _enter_exits(layout, nodes, links, node, direction, seen, way, found, blocked)
+    out = np.flatnonzero(~arrived)
+    links.exits[node[out], direction[out]] = 3 * found.face[out] + np.maximum(found.exit[out], 0)
     node, direction, seen, arrival = node[arrived], direction[arrived], seen[arrived], arrival[arrived]
     turns = nodes.turns[seen] + found.sheet[arrived] - nodes.turns[arrival]
     head = nodes.node[arrival]
@@ -61,23 +62,7 @@ def _follow(layout: Layout, nodes: Nodes, links: Links, node: Ints, direction: I
     links.turns[head, back] = -turns
 
 
-def _enter_exits(
-    layout: Layout,
-    nodes: Nodes,
-    links: Links,
-    node: Ints,
-    direction: Ints,
-    seen: Ints,
-    way: Ints,
-    found: Walks,
-    blocked: np.ndarray,
-) -> None:
-    out = np.flatnonzero((found.exit >= 0) | blocked)
-    edge = 3 * found.face[out] + np.maximum(found.exit[out], 0)
-    links.exits[node[out], direction[out]] = edge
-
-
-def _departure(layout: Layout, nodes: Nodes, node: Ints, direction: Ints) -> tuple[Ints, Ints, np.ndarray]:
+def _departure(layout: Layout, nodes: Nodes, node: Ints, direction: Ints) -> tuple[Ints, Ints, Bools]:
     """The sighting from which a walk starts into its triangle, the direction there, and whether none does."""
     lattice, motion, order = layout.lattice, layout.motion, layout.lattice.order
     count = np.diff(nodes.starts)[node]
@@ -92,4 +77,5 @@ def _departure(layout: Layout, nodes: Nodes, node: Ints, direction: Ints) -> tup
     at_edge = abs(edge_distances(corners, lattice.position(nodes.point[seen]))) <= 4 * layout.reach
     score = np.where(at_edge, into, 1.0).min(axis=1)
     best = np.lexsort((-score, walker))[np.cumsum(count) - count]
-    return seen[best], way[best], score[best] < -1e-6
+    outward = at_edge & (into < -1e-6) & (layout.cover.across[nodes.face[seen]] < 0)
+    return seen[best], way[best], outward[best].any(axis=1)

@@ -58,7 +58,9 @@ class Nodes:
         key = _key(face, point, self._low, self._span)
         at = np.minimum(np.searchsorted(self._keys, key), max(len(self._keys) - 1, 0))
         found = ((point >= self._low) & (point < self._low + self._span)).all(axis=-1)
-        return np.where(found & (self._keys[at] == key), at, -1) if len(self._keys) else np.full(len(face), -1)
+        return (
+            np.where(found & (self._keys[at] == key), at, -1) if len(self._keys) else np.full(len(face), -1)
+        )
 
 
 def _key(face: Ints, point: Ints, low: Ints, span: Ints) -> Ints:
@@ -125,8 +127,8 @@ def find_nodes(layout: Layout) -> Nodes:
     seen = Nodes(face, point, empty, empty, empty, empty, empty, keys, low, span)
     first, second, shift = _same_place(layout, seen, cover)
     graph = coo_array((np.ones(len(first)), (first, second)), shape=(len(face), len(face)))
-    n, node = connected_components(graph, directed=False)
-    node = node.astype(np.int64)
+    n, part = connected_components(graph, directed=False)
+    node = part.astype(np.int64)
     sighting = np.argsort(node, kind="stable")
     starts = np.searchsorted(node[sighting], np.arange(n + 1))
     own = sighting[starts[:-1]]

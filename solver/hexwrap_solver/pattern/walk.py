@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexwrap_solver.arrays import Bools, Ints
+from hexwrap_solver.arrays import Bools, Complexes, Ints
 from hexwrap_solver.pattern.nodes import Layout, edge_distances
 
 
@@ -89,7 +89,9 @@ def _walk(layout: Layout, face: Ints, start: Ints, target: Ints, *, pass_left: b
     return Walks(face, target, sheet, exit_edge, touched)
 
 
-def _which_edge(corners, origin, goal, beyond, reach, pass_left):  # type: ignore[no-untyped-def]
+def _which_edge(
+    corners: Complexes, origin: Complexes, goal: Complexes, beyond: Bools, reach: float, pass_left: bool
+) -> tuple[Ints, Bools]:
     """Of two edges that both separate the target, the one which the straight line crosses."""
     first = np.where(beyond[:, 0] & beyond[:, 1], 0, np.where(beyond[:, 1] & beyond[:, 2], 1, 2))
     vertex = corners[np.arange(len(first)), (first + 1) % 3]

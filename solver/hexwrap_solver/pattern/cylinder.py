@@ -1,0 +1,140 @@
+"""Placement on a straight cylinder: the translation g must be a lattice vector, from which all follows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hexwrap_solver.arrays import Complexes, Floats, Ints
+from hexwrap_solver.conformal.types import ConformalMap
+from hexwrap_solver.pattern.lattice import Lattice, Motion
+from hexwrap_solver.pattern.placement import Placement, anchor_vertex, edge_angle, is_straight
+from hexwrap_solver.pattern.rows import Rows, rows_along
+from hexwrap_solver.pattern.size import wanted_edge, width_per_cell
+from hexwrap_solver.pattern.types import PatternSettings
+
+#: How far the size may depart from an edge length asked for, or from the default, in search of less stretch.
+ASKED, FREE = 0.02, 0.10
+
+
+@dataclass(frozen=True)
+class _Strip:
+    """The domain turned so that g is the shift by its length along x, and the anchor vertex stands at 0.
+
+    low, high: heights of the two loops; base: 0 or 1, whether the anchor stands on the lower or upper one.
+    """
+
+    place: Complexes
+    length: float
+    low: float
+    high: float
+    lower_loop: int
+    base: int
+
+
+def place_on_cylinder(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings) -> Placement:
+    """Scale and rotation follow from the translation; height and turn from ``align`` and ``phase``."""
+    angle = edge_angle(lattice, settings)
+    notes: list[str] = []
+    align = settings.align
+    if align != "none" and not is_straight(lattice, angle):
+        align = "none"
+        notes.append(
+            f"With edges at {np.rad2deg(angle):.4g}° to the boundary no lattice line can lie on it, so the "
+            "pattern is not aligned."
+        )
+    strip = _strip(cmap, anchor_vertex(cmap))
+    rows = rows_along(lattice, angle, settings.boundary)
+    options = _translations(cmap, lattice, settings, angle)
+    stretches = np.array([_stretch(strip, rows, lattice, T) for T in options])
+    pick = int(np.argmin(abs(np.log(stretches)))) if align == "both" else 0
+    stretch = float(stretches[pick]) if align == "both" else 1.0
+    T = options[pick]
+    along = complex(lattice.position(T))
+    around = int(lattice.cells_around(T))
+    notes += _told(lattice, settings, angle, around, along)
+    scale = abs(along) / strip.length
+    x = strip.place.real * scale + settings.phase[0] * width_per_cell(lattice, angle) * lattice.edge
+    y = _heights(strip, rows, settings, align, scale * stretch)
+    place = (x + 1j * y) * along / abs(along)
+    distortion = max(stretch, 1 / stretch) - 1
+    return Placement(
+        place,
+        Motion(lattice, 0, (int(T[0]), int(T[1]))),
+        angle_taken(lattice, along, angle),
+        around,
+        distortion,
+        tuple(notes),
+    )
+
+
+def angle_taken(lattice: Lattice, along: complex, wanted: float) -> float:
+    """Angle from the direction of g to an edge, of all equivalent ones the nearest to the wanted one."""
+    taken = float(np.angle(lattice.position(lattice.steps[0]) / along))
+    return taken + lattice.quantum * round((wanted - taken) / lattice.quantum)
+
+
+def _strip(cmap: ConformalMap, anchor: int) -> _Strip:
+    t = cmap.deck.translation
+    place = (cmap.uv - cmap.uv[anchor]) * np.conj(t) / abs(t)
+    means = [float(place[loop].imag.mean()) for loop in cmap.surface.loops]
+    lower = int(means[1] < means[0])
+    for loop, mean in zip(cmap.surface.loops, means, strict=True):
+        place[loop] = place[loop].real + 1j * mean  # straight but for rounding; made exactly so
+    base = int(anchor in cmap.surface.loops[1 - lower])
+    return _Strip(place, abs(t), min(means), max(means), lower, base)
+
+
+def _translations(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings, angle: float) -> Ints:
+    """(k, 2) translations of the tiling that g may become, the nearest to what is asked first."""
+    toward = complex(np.exp(-1j * angle) * lattice.position(lattice.steps[0]) / lattice.edge)
+    edges = cmap.circumference / wanted_edge(cmap, lattice, settings, angle)
+    wanted = edges * lattice.edge * toward
+    if not is_straight(lattice, angle):
+        return (
+            lattice.translation_near(wanted)
+            if settings.around is None
+            else lattice.ring_near(settings.around, wanted)
+        )[None]
+    row = lattice.shortest_towards(toward)
+    count = abs(wanted) / abs(complex(lattice.position(row)))
+    spread = 0.0 if settings.around is not None else FREE if settings.edge_length is None else ASKED
+    counts = np.arange(np.ceil(count * (1 - spread)), count * (1 + spread) + 1e-9)
+    counts = np.unique(np.append(counts, max(1, round(count)))).astype(np.int64)
+    return np.asarray(counts[np.argsort(abs(counts - count), kind="stable")][:, None] * row)
+
+
+def _stretch(strip: _Strip, rows: Rows, lattice: Lattice, T: Ints) -> float:
+    """By which factor heights must change for a whole number of rows to fit between the loops."""
+    height = (strip.high - strip.low) * abs(complex(lattice.position(T))) / strip.length
+    return rows.nearest_height(height) / height
+
+
+def _heights(strip: _Strip, rows: Rows, settings: PatternSettings, align: str, scale: float) -> Floats:
+    """Heights in lattice units; a loop that is aligned lies on a row line, exactly."""
+    if align == "none":
+        return strip.place.imag * scale + settings.phase[1] * rows.period
+    if align == "both":
+        on_upper = bool(strip.base)
+    else:
+        on_upper = strip.lower_loop == 1  # loop 0 is the upper one
+    level, line = (strip.high, -rows.first) if on_upper else (strip.low, rows.first)
+    return line + (strip.place.imag - level) * scale
+
+
+def _told(
+    lattice: Lattice, settings: PatternSettings, angle: float, around: int, along: complex
+) -> list[str]:
+    notes = []
+    if settings.around is not None and around != settings.around:
+        notes.append(
+            f"{around} cells around instead of {settings.around}: the nearest number that closes up."
+        )
+    taken = angle_taken(lattice, along, angle)
+    if abs(taken - angle) > 1e-9:
+        notes.append(
+            f"Edges stand at {np.rad2deg(taken):.4f}° to the boundary instead of {np.rad2deg(angle):.4f}°: "
+            "the nearest angle at which the pattern closes up."
+        )
+    return notes

@@ -1,0 +1,48 @@
+"""How large the cells are: from what is asked on the surface to an edge length in the domain."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hexwrap_solver.arrays import Floats
+from hexwrap_solver.conformal.types import ConformalMap
+from hexwrap_solver.pattern.lattice import Lattice
+from hexwrap_solver.pattern.types import PatternSettings
+
+#: Cells around where neither a number nor a length is asked for.
+DEFAULT_AROUND = 48
+
+
+def face_areas(cmap: ConformalMap) -> tuple[Floats, Floats]:
+    """(m,) areas of the triangles on the surface and in the domain."""
+    a, b, c = np.moveaxis(cmap.surface.vertices[cmap.surface.faces], 1, 0)
+    on_surface = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+    p, q, r = cmap.corners().T
+    in_domain = abs(((q - p).conj() * (r - p)).imag) / 2
+    return on_surface, in_domain
+
+
+def mean_stretch(cmap: ConformalMap) -> float:
+    """Length on the surface over length in the domain, averaged over the surface's area."""
+    on_surface, in_domain = face_areas(cmap)
+    stretch = np.sqrt(on_surface / np.maximum(in_domain, 1e-300))
+    return float(stretch @ on_surface / on_surface.sum())
+
+
+def width_per_cell(lattice: Lattice, angle: float) -> float:
+    """Length of a ring of edge-adjacent cells per cell, in edges, when edges are at an angle to the ring."""
+    direction = np.exp(-1j * angle) * lattice.position(lattice.steps[0]) / lattice.edge
+    x, y = lattice.coordinates(np.asarray(direction / lattice.position(lattice.basis[0])))
+    if lattice.kind == "quad":
+        cells = abs(x) + abs(y)
+    else:
+        cells = max(abs(x), abs(y), abs(x + y)) * (2 if lattice.kind == "triangle" else 1)
+    return float(1 / (cells * lattice.edge))
+
+
+def wanted_edge(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings, angle: float) -> float:
+    """Edge length in the domain that gives the size asked for; angle: of the edges to the boundary."""
+    if settings.edge_length is not None:
+        return settings.edge_length / mean_stretch(cmap)
+    around = DEFAULT_AROUND if settings.around is None else settings.around
+    return cmap.circumference / (around * width_per_cell(lattice, angle))

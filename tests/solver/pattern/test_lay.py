@@ -1,0 +1,95 @@
+"""Patterns close up: Euler characteristic, degrees and neighbours on cylinders and cones."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from tests.solver.pattern import annuli
+
+from hexwrap_solver.errors import NotAdaptedError, PatternError
+from hexwrap_solver.pattern import lay_pattern
+from hexwrap_solver.pattern.types import Pattern, PatternSettings
+
+DEGREE = {"hex": 3, "triangle": 6, "quad": 4}
+SIDES = {"hex": 6, "triangle": 3, "quad": 4}
+QUANTUM = {"hex": np.pi / 3, "triangle": np.pi / 3, "quad": np.pi / 2}
+
+
+def check_closed(pattern: Pattern) -> None:
+    """Annulus: χ = 0, two boundary loops, every inner node of full degree, neighbours mutual."""
+    faces, neighbours = pattern.faces, pattern.neighbours
+    sides = SIDES[pattern.kind]
+    assert (faces.lengths == sides).all()
+    tail = faces.values
+    head = tail[faces.next()]
+    n = len(pattern.vertices)
+    directed = tail * n + head
+    assert len(np.unique(directed)) == len(directed)
+    edges = np.unique(np.minimum(tail, head) * n + np.maximum(tail, head))
+    assert n - len(edges) + faces.n_rows == 0
+    open_side = neighbours.values < 0
+    following = dict(zip(tail[open_side].tolist(), head[open_side].tolist(), strict=True))
+    assert len(following) == open_side.sum()
+    loops = 0
+    while following:
+        start = at = next(iter(following))
+        loops += 1
+        while at in following:
+            at = following.pop(at)
+        assert at == start
+    assert loops == 2
+    degree = np.bincount(np.concatenate([edges // n, edges % n]), minlength=n)
+    inner = np.ones(n, dtype=bool)
+    inner[tail[open_side]] = False
+    assert (degree[inner] == DEGREE[pattern.kind]).all()
+    for cell in range(faces.n_rows):
+        for other in neighbours[cell].tolist():
+            assert other < 0 or cell in neighbours[other].tolist()
+
+
+@pytest.mark.parametrize("kind", ["hex", "triangle", "quad"])
+@pytest.mark.parametrize("rotation", ["edge", "vertex", 11.0])
+@pytest.mark.parametrize("align", ["none", "first", "both"])
+def test_pattern_closes_on_a_catenoid(kind, rotation, align):
+    cmap = annuli.revolution(np.cosh, np.linspace(-1, 1.5, 25), 40)
+    pattern = lay_pattern(cmap, PatternSettings(kind=kind, rotation=rotation, align=align))
+    check_closed(pattern)
+    assert len(set(pattern.labels())) == pattern.n_cells
+    assert (np.diff(np.sort(pattern.ring)) <= 1).all()
+
+
+@pytest.mark.parametrize("kind", ["hex", "triangle", "quad"])
+@pytest.mark.parametrize("k", [1, 2, 3, 5, 7, 9, 11, -1, -2, -3, -7, -11])
+def test_pattern_closes_on_flat_cones(kind, k):
+    angle = k * QUANTUM[kind]
+    if abs(angle / (2 * np.pi) % 1) < 1e-9:
+        pytest.skip("a translation")
+    cmap = annuli.flat_cone(angle, 1.0, 2.0, 60, 12, cut=11)
+    pattern = lay_pattern(cmap, PatternSettings(kind=kind, around=36 + 6 * abs(k)))
+    check_closed(pattern)
+    assert len(set(pattern.labels())) == pattern.n_cells
+
+
+def test_interior_hexagons_have_six_neighbours_in_full_rings():
+    cmap = annuli.revolution(np.cosh, np.linspace(-1, 1, 25), 40)
+    pattern = lay_pattern(cmap, PatternSettings(around=36))
+    assert pattern.around == 36
+    assert (np.bincount(pattern.ring)[:-1] == 36).all()
+    table = pattern.neighbours.values.reshape(-1, 6)
+    inner = (pattern.ring > 0) & (pattern.ring < pattern.rings - 2)
+    assert (table[inner] >= 0).all()
+
+
+def test_cone_angle_off_the_quantum_is_refused_and_the_nearest_named():
+    cmap = annuli.flat_cone(1.3, 1.0, 2.0, 60, 12)
+    with pytest.raises(NotAdaptedError) as caught:
+        lay_pattern(cmap, PatternSettings())
+    assert caught.value.data["nearest"] == pytest.approx([np.pi / 3, 2 * np.pi / 3])
+
+
+def test_too_many_and_too_large_cells_are_refused():
+    cmap = annuli.revolution(np.cosh, np.linspace(-1, 1, 25), 40)
+    with pytest.raises(PatternError, match="limit"):
+        lay_pattern(cmap, PatternSettings(around=2000, max_cells=10_000))
+    with pytest.raises(PatternError):
+        lay_pattern(cmap, PatternSettings(around=4, align="none"))
