@@ -28,11 +28,13 @@ def opposite_lengths(vertices: Floats, faces: Ints) -> Floats:
 
     Differences come first, so a far-away origin costs no digits beyond those the data has lost already.
     """
-    corner = vertices[faces]
-    edge = np.stack([corner[:, (k + 2) % 3] - corner[:, (k + 1) % 3] for k in range(3)])
-    largest = np.abs(edge).max(initial=0.0) or 1.0
-    edge /= largest  # squares must neither overflow nor vanish
-    return np.asarray(np.sqrt(np.einsum("kmd,kmd->km", edge, edge)) * largest)
+    scale = np.ptp(vertices, axis=0).max() or 1.0  # squares must neither overflow nor vanish
+    square = np.zeros((3, len(faces)))
+    for coordinate in vertices.T:
+        corner = coordinate[faces.T]
+        edge = (corner[[2, 0, 1]] - corner[[1, 2, 0]]) / scale
+        square += edge * edge
+    return np.asarray(np.sqrt(square) * scale)
 
 
 @dataclass(frozen=True)
@@ -87,6 +89,7 @@ class Energy:
     def __init__(self, surface: Surface, targets: Targets) -> None:
         self.targets = targets
         self.n = len(surface.vertices)
+        self._vertices = surface.vertices
         self.corner = np.ascontiguousarray(surface.faces.T)
         self.lengths = opposite_lengths(surface.vertices, surface.faces)
         self.dof, self.n_dof = _unknowns(targets)
@@ -94,6 +97,14 @@ class Energy:
         for tie in range(1, len(targets.tie_angle)):
             self.target[self.dof[np.argmax(targets.tie == tie)]] = targets.tie_angle[tie]
         self._find_pattern()
+
+    @property
+    def points(self) -> Floats:
+        """(n_dof, 3) where each unknown stands, NaN for unknowns that many vertices share."""
+        points = np.full((self.n_dof, 3), np.nan)
+        alone = np.flatnonzero((self.dof >= 0) & (self.targets.tie < 0))
+        points[self.dof[alone]] = self._vertices[alone]
+        return points
 
     def _find_pattern(self) -> None:
         first, second = self.dof[self.corner[[1, 2, 0]].ravel()], self.dof[self.corner[[2, 0, 1]].ravel()]
