@@ -93,7 +93,7 @@ class Energy:
         self.corner = np.ascontiguousarray(surface.faces.T)
         self.lengths = opposite_lengths(surface.vertices, surface.faces)
         self.dof, self.n_dof = _unknowns(targets)
-        self.target = self._reduce(np.where(targets.tie < 0, targets.angle, 0.0))
+        self.target = self.reduce(np.where(targets.tie < 0, targets.angle, 0.0))
         for tie in range(1, len(targets.tie_angle)):
             self.target[self.dof[np.argmax(targets.tie == tie)]] = targets.tie_angle[tie]
         self._find_pattern()
@@ -116,7 +116,7 @@ class Energy:
         pairs, self._pair = np.unique(self._low * self.n_dof + high[self._to_low], return_inverse=True)
         self.rows, self.columns = pairs % self.n_dof, pairs // self.n_dof
 
-    def _reduce(self, per_vertex: Floats) -> Floats:
+    def reduce(self, per_vertex: Floats) -> Floats:
         """Sums over the vertices that share an unknown; pinned ones fall away."""
         return total(self.dof + 1, per_vertex, self.n_dof + 1)[1:]
 
@@ -147,7 +147,7 @@ class Energy:
 
     def gradient(self, corners: Corners) -> Floats:
         """(n_dof,) Θ − Σ angles."""
-        return self.target - self._reduce(self.angle_sums(corners))
+        return self.target - self.reduce(self.angle_sums(corners))
 
     def hessian(self, corners: Corners) -> tuple[Floats, Floats]:
         """(n_dof,) diagonal and (e,) off-diagonal values of half the cotangent Laplacian."""
