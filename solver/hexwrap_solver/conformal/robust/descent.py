@@ -15,7 +15,7 @@ from hexwrap_solver.arrays import Floats, Ints, Progress
 from hexwrap_solver.conformal.energy import Energy
 from hexwrap_solver.conformal.factor import Factorisation
 from hexwrap_solver.conformal.robust.delaunay import make_delaunay
-from hexwrap_solver.conformal.robust.metric import Metric, angle_sums, laplacian_entries, measure
+from hexwrap_solver.conformal.robust.metric import Metric, angle_sums, edge_weights, measure
 from hexwrap_solver.conformal.robust.mirror import MirrorMesh
 
 MAX_STEPS = 200
@@ -26,6 +26,8 @@ OVERSHOOT = 0.1
 MAX_TRIALS = 40
 #: The largest entry of the gradient bottoms out at rounding, about this times √(number of unknowns).
 ROUNDING = 1e-14
+#: Added to the diagonal, relative to it and to 1, where rounding has made the Hessian indefinite.
+LIFT = 1e-9
 #: Above this the answer is not accepted: boundary angles must be right to 1e-9.
 ACCEPTED = 3e-10
 
@@ -48,6 +50,7 @@ class FlipEnergy:
         self.plain = plain
         self.mesh = mesh
         self.flips = 0
+        self._system: _System | None = None
 
     def at(self, x: Floats) -> tuple[Metric, Floats]:
         """The Delaunay metric at the unknowns x, and the gradient."""
@@ -57,18 +60,39 @@ class FlipEnergy:
         return metric, self.plain.target - self.plain.reduce(angle_sums(self.mesh, metric))
 
     def newton_direction(self, metric: Metric, gradient: Floats) -> Floats:
-        tail, head, weight = laplacian_entries(self.mesh, metric)
-        tail, head = self.plain.dof[tail], self.plain.dof[head]
-        apart = tail != head
-        low, high, weight = np.minimum(tail, head)[apart], np.maximum(tail, head)[apart], weight[apart]
-        n = self.plain.n_dof
-        both = np.concatenate([low, high]) + 1
-        diagonal = _sums(both, np.tile(weight, 2), n + 1)[1:]
-        inside = low >= 0
-        pairs, which = np.unique(low[inside] * n + high[inside], return_inverse=True)
-        factorisation = Factorisation(n, pairs % n, pairs // n)
-        factorisation.factorise(diagonal, -_sums(which, weight[inside], len(pairs)))
-        return -factorisation.solve(gradient)
+        """−H⁻¹∇E. The symbolic analysis lasts until the next flip."""
+        if self._system is None or self._system.flips != self.flips:
+            self._system = _System(self)
+        return self._system.solve(metric, -gradient)
+
+
+class _System:
+    """The Hessian on one triangulation: a graph Laplacian of the unknowns."""
+
+    def __init__(self, energy: FlipEnergy) -> None:
+        self.flips = energy.flips
+        self.mesh = energy.mesh
+        dof, n = energy.plain.dof, energy.plain.n_dof
+        edges = np.flatnonzero(~self.mesh.crossing)
+        tail, head = dof[self.mesh.origin[2 * edges]], dof[self.mesh.origin[2 * edges + 1]]
+        low, high = np.minimum(tail, head), np.maximum(tail, head)
+        apart = low != high  # an edge from a vertex to itself, or inside one tie, does not change
+        self.edges, self.low, self.high = edges[apart], low[apart], high[apart]
+        self.inside = self.low >= 0  # both ends free
+        pairs, self.pair = np.unique(self.low[self.inside] * n + self.high[self.inside], return_inverse=True)
+        self.n, self.n_pairs = n, len(pairs)
+        self.factorisation = Factorisation(energy.plain.points, pairs % n, pairs // n)
+
+    def solve(self, metric: Metric, right: Floats) -> Floats:
+        weight = edge_weights(metric, self.edges)
+        both = np.concatenate([self.low, self.high]) + 1
+        diagonal = _sums(both, np.tile(weight, 2), self.n + 1)[1:]
+        off_diagonal = -_sums(self.pair, weight[self.inside], self.n_pairs)
+        try:
+            self.factorisation.factorise(diagonal, off_diagonal)
+        except np.linalg.LinAlgError:  # semidefinite to rounding
+            self.factorisation.factorise(diagonal * (1 + LIFT) + LIFT, off_diagonal)
+        return self.factorisation.solve(right)
 
 
 def descend(energy: FlipEnergy, start: Floats, progress: Progress) -> Descent:

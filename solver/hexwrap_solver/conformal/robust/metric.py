@@ -63,8 +63,6 @@ def angle_sums(mesh: MirrorMesh, metric: Metric) -> Floats:
     return total
 
 
-def laplacian_entries(mesh: MirrorMesh, metric: Metric) -> tuple[Ints, Ints, Floats]:
-    """(e,) end vertices and weights: the Hessian is the graph Laplacian of these edges."""
-    weight = 0.5 * (metric.cotangent[::2] + metric.cotangent[1::2])
-    keep = (~mesh.crossing) & (mesh.origin[::2] != mesh.origin[1::2])
-    return mesh.origin[::2][keep], mesh.origin[1::2][keep], weight[keep]
+def edge_weights(metric: Metric, edges: Ints) -> Floats:
+    """(k,) of edges that do not cross the mirror line: the Hessian is their graph Laplacian."""
+    return np.asarray(0.5 * (metric.cotangent[2 * edges] + metric.cotangent[2 * edges + 1]))

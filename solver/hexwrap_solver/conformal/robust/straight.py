@@ -8,6 +8,9 @@ from hexwrap_solver.arrays import Complexes, Ints
 from hexwrap_solver.conformal.types import Deck, Targets
 from hexwrap_solver.surface.types import Surface
 
+#: Target angles this near to π are meant to be π.
+ROUNDING = 1e-13
+
 
 def straighten(surface: Surface, targets: Targets, uv: Complexes, sheet: Ints, deck: Deck) -> Complexes:
     """uv with the boundary vertices of target angle π moved onto the line between the corners of their side.
@@ -23,7 +26,7 @@ def straighten(surface: Surface, targets: Targets, uv: Complexes, sheet: Ints, d
     along = following[tail] == head
     step[tail[along]] = (np.roll(sheet, -1, axis=1) - sheet).ravel()[along]
     for loop in surface.loops:
-        corner = (targets.angle[loop] != np.pi) | (targets.tie[loop] >= 0)
+        corner = (np.abs(targets.angle[loop] - np.pi) > ROUNDING) | (targets.tie[loop] >= 0)
         if corner.any():
             loop = np.roll(loop, -int(np.argmax(corner)))
             _project(uv, loop, np.roll(corner, -int(np.argmax(corner))), step[loop], deck)
