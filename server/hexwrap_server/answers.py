@@ -1,0 +1,52 @@
+"""Bytes → responses: JSON, problems, packed bodies."""
+
+from __future__ import annotations
+
+import asyncio
+import gzip
+from typing import Any
+
+from starlette.datastructures import Headers
+from starlette.requests import Request
+from starlette.responses import Response
+
+from hexwrap_server.problems import MEDIA_TYPE, dumped, problem
+from hexwrap_solver.errors import HexwrapError
+
+JSON = "application/json"
+#: Smaller answers are not worth packing.
+WORTH_PACKING = 1024
+
+
+def json_response(document: object, status: int = 200, headers: dict[str, str] | None = None) -> Response:
+    """A small document."""
+    return Response(dumped(document), status, headers, JSON)
+
+
+def problem_response(error: HexwrapError | dict[str, Any]) -> Response:
+    """A refusal, or the problem of a failed job."""
+    document = error if isinstance(error, dict) else problem(error)
+    headers = {"Cache-Control": "no-store"} | getattr(error, "headers", {})
+    if document["status"] == 503:
+        headers.setdefault("Retry-After", "5")
+    return Response(dumped(document), document["status"], headers, MEDIA_TYPE)
+
+
+async def packed_response(
+    request: Request, data: bytes, media_type: str = JSON, headers: dict[str, str] | None = None
+) -> Response:
+    """A large body, gzip where the client takes it; packed off the event loop."""
+    headers = {"Vary": "Accept-Encoding"} | (headers or {})
+    if len(data) >= WORTH_PACKING and takes_gzip(request.headers):
+        data = await asyncio.to_thread(gzip.compress, data, 1)
+        headers["Content-Encoding"] = "gzip"
+    return Response(data, headers=headers, media_type=media_type)
+
+
+def takes_gzip(headers: Headers) -> bool:
+    """Whether Accept-Encoding names gzip with a quality above 0."""
+    for entry in headers.get("accept-encoding", "").split(","):
+        name, *parameters = (word.strip().lower() for word in entry.split(";"))
+        if name in ("gzip", "*"):
+            return not any(p.replace(" ", "") in ("q=0", "q=0.0", "q=0.00", "q=0.000") for p in parameters)
+    return False

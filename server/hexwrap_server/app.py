@@ -1,0 +1,170 @@
+"""The application and the server around it."""
+
+from __future__ import annotations
+
+import logging
+import signal
+import socket
+import sys
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from types import FrameType
+from typing import Any
+
+import uvicorn
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from starlette.exceptions import HTTPException
+from starlette.middleware.gzip import GZipMiddleware
+from starlette.responses import Response
+
+from hexwrap_server import __version__
+from hexwrap_server.answers import WORTH_PACKING, problem_response
+from hexwrap_server.engine import Engine
+from hexwrap_server.observe import Observer, set_up_logging
+from hexwrap_server.problems import HttpError
+from hexwrap_server.routes import JobFailedError, router
+from hexwrap_server.security import Doorkeeper
+from hexwrap_server.service import Service
+from hexwrap_server.settings import Settings
+from hexwrap_server.worker import InternalError
+from hexwrap_solver.errors import HexwrapError
+
+#: Seconds that open connections get when the server stops.
+GRACE = 2
+log = logging.getLogger("hexwrap.server")
+
+
+class PortTakenError(Exception):
+    """Somebody else listens there."""
+
+
+def create_app(settings: Settings | None = None, engine: Engine | None = None) -> FastAPI:
+    """The application. engine: where jobs run, if not as the settings say.
+
+    Raises FolderInUseError, OSError where the data folder cannot be used.
+    """
+    settings = settings or Settings.from_environment()
+    service = Service(settings, engine)
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        await service.start()
+        try:
+            yield
+        finally:
+            await service.stop()
+
+    app = FastAPI(
+        title="hexwrap",
+        version=__version__,
+        summary="Seamless hexagonal, quad and triangle panels on tube-like surfaces",
+        lifespan=lifespan,
+        redirect_slashes=False,
+    )
+    app.state.service = service
+    app.include_router(router)
+    app.add_exception_handler(HexwrapError, _on_error)
+    app.add_exception_handler(HTTPException, _on_http_exception)
+    app.add_exception_handler(RequestValidationError, _on_parameters)
+    app.add_exception_handler(Exception, _on_fault)
+    app.add_middleware(GZipMiddleware, minimum_size=WORTH_PACKING, compresslevel=1)
+    app.add_middleware(Doorkeeper, settings=settings)
+    app.add_middleware(Observer, metrics=service.metrics)
+    return app
+
+
+def serve(settings: Settings) -> None:
+    """Serve until Ctrl-C or SIGTERM. Raises PortTakenError, FolderInUseError, OSError."""
+    set_up_logging(settings.log_level)
+    # uvicorn raises the signal again once it has shut down; that shall end the program quietly
+    signal.signal(signal.SIGTERM, lambda number, frame: None)
+    listener = open_listener(settings)
+    try:
+        app = create_app(settings)
+        config = uvicorn.Config(
+            app,
+            log_config=None,
+            access_log=False,
+            server_header=False,
+            timeout_graceful_shutdown=GRACE,
+            h11_max_incomplete_event_size=64 * 1024,
+        )
+        _Server(config, app.state.service).run(sockets=[listener])
+    except KeyboardInterrupt:
+        return
+    finally:
+        listener.close()
+
+
+class _Server(uvicorn.Server):
+    """Ends long polls and event streams as soon as a signal comes, so that nothing waits for them."""
+
+    def __init__(self, config: uvicorn.Config, service: Service) -> None:
+        super().__init__(config)
+        self._service = service
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        super().handle_exit(sig, frame)
+        self._service.manager.close_waits()
+
+
+def open_listener(settings: Settings) -> socket.socket:
+    """The socket to serve on; port 0 takes a free one. Raises PortTakenError."""
+    family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
+    # asyncio sends without delay only where the protocol is named
+    listener = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
+    if sys.platform != "win32":  # there it would let two servers share the port
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listener.bind((settings.host, settings.port))
+        listener.listen(128)
+    except OSError as error:
+        listener.close()
+        raise PortTakenError(
+            f"Cannot listen on {settings.host}:{settings.port} ({error.strerror or error}). If a hexwrap "
+            "server runs there already, use it; otherwise choose another --port."
+        ) from None
+    host, port = listener.getsockname()[:2]
+    log.info("listening on http://%s:%s", f"[{host}]" if ":" in host else host, port)
+    return listener
+
+
+async def _on_error(request: Request, error: Exception) -> Response:
+    assert isinstance(error, HexwrapError)
+    return problem_response(error.document if isinstance(error, JobFailedError) else error)
+
+
+async def _on_http_exception(request: Request, error: Exception) -> Response:
+    assert isinstance(error, HTTPException)
+    title, detail = {
+        404: (
+            "No such address",
+            f"There is nothing at {request.url.path[:200]}; the routes are listed at /docs.",
+        ),
+        405: ("Method not allowed", f"{request.method} is not possible at {request.url.path[:200]}."),
+    }.get(error.status_code, (str(error.detail), str(error.detail)))
+    slug = {404: "not-found", 405: "method-not-allowed"}.get(error.status_code, "http")
+    return problem_response(HttpError(error.status_code, slug, title, detail, dict(error.headers or {})))
+
+
+async def _on_parameters(request: Request, error: Exception) -> Response:
+    """Faults in the path or the query; bodies have their own way (``schemas``)."""
+    assert isinstance(error, RequestValidationError)
+    listed: list[dict[str, Any]] = [
+        {"pointer": "", "parameter": ".".join(map(str, e["loc"][1:])), "detail": e["msg"]}
+        for e in error.errors()
+    ]
+    detail = f"Parameter '{listed[0]['parameter']}': {listed[0]['detail']}."
+    return problem_response(
+        HttpError(422, "invalid-request", "The request does not have the right form", detail, errors=listed)
+    )
+
+
+async def _on_fault(request: Request, error: Exception) -> Response:
+    log.error("a fault while answering %s %s", request.method, request.url.path, exc_info=error)
+    return problem_response(
+        InternalError(
+            "The server could not answer because of a fault in hexwrap, not in the request; please report it."
+        )
+    )

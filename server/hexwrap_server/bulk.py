@@ -1,0 +1,107 @@
+"""Large arrays of a JSON body: checked as a whole, searched for the fault only when there is one."""
+
+from __future__ import annotations
+
+from itertools import chain, islice
+from typing import Any
+
+import numpy as np
+
+from hexwrap_solver.arrays import Floats, Ints, Ragged
+
+
+class Fault(ValueError):
+    """What is wrong, and where (JSON pointer)."""
+
+    def __init__(self, pointer: str, detail: str) -> None:
+        super().__init__(detail)
+        self.pointer = pointer
+        self.detail = detail
+
+
+def table(rows: object, pointer: str, width: int, most: int) -> Floats:
+    """(n, width) finite numbers. Raises Fault."""
+    listed = _rows(rows, pointer, (width,), most)
+    return _finite(listed, pointer, width).reshape(-1, width)
+
+
+def numbers(row: object, pointer: str, most: int) -> Floats:
+    """(n,) finite numbers. Raises Fault."""
+    if not isinstance(row, list):
+        raise Fault(pointer, f"must be a list of numbers, not {_kind(row)}")
+    if len(row) > most:
+        raise Fault(pointer, f"{len(row)} numbers, at most {most} are taken")
+    parent, _, last = pointer.rpartition("/")
+    if not set(map(type, row)) <= {int, float}:
+        i = next(i for i, x in enumerate(row) if type(x) not in (int, float))
+        raise Fault(f"{parent}/{last}/{i}", f"must be a number, not {_kind(row[i])}")
+    values = np.array(row, dtype=float)
+    if not np.isfinite(values).all():
+        raise Fault(f"{pointer}/{np.flatnonzero(~np.isfinite(values))[0]}", "must be a finite number")
+    return values
+
+
+def faces(rows: object, pointer: str, n_vertices: int, most: int) -> Ragged:
+    """Rows of three or four indices in 0 … n_vertices − 1. Raises Fault."""
+    listed = _rows(rows, pointer, (3, 4), most)
+    lengths = np.fromiter(map(len, listed), dtype=np.int64, count=len(listed))
+    offsets = np.concatenate([[0], np.cumsum(lengths)])
+    if not set(map(type, chain.from_iterable(listed))) <= {int}:
+        _raise_not_whole(listed, pointer)
+    try:
+        values: Ints = np.fromiter(chain.from_iterable(listed), dtype=np.int64, count=int(offsets[-1]))
+    except OverflowError:
+        values = np.array([min(x, 2**62) for x in chain.from_iterable(listed)], dtype=np.int64)
+    wrong = np.flatnonzero((values < 0) | (values >= n_vertices))
+    if len(wrong):
+        face = int(np.searchsorted(offsets, wrong[0], side="right")) - 1
+        corner = int(wrong[0] - offsets[face])
+        raise Fault(
+            f"{pointer}/{face}/{corner}",
+            f"vertex {listed[face][corner]} of a mesh of {n_vertices} vertices (0 to {n_vertices - 1})",
+        )
+    return Ragged(values, offsets)
+
+
+def _rows(rows: object, pointer: str, widths: tuple[int, ...], most: int) -> list[list[Any]]:
+    if not isinstance(rows, list):
+        raise Fault(pointer, f"must be a list, not {_kind(rows)}")
+    if len(rows) > most:
+        raise Fault(pointer, f"{len(rows)} entries, this server takes at most {most}")
+    wanted = " or ".join(map(str, widths))
+    if not set(map(type, rows)) <= {list}:
+        i = next(i for i, row in enumerate(rows) if type(row) is not list)
+        raise Fault(f"{pointer}/{i}", f"must be a list of {wanted} numbers, not {_kind(rows[i])}")
+    if not set(map(len, rows)) <= set(widths):
+        i = next(i for i, row in enumerate(rows) if len(row) not in widths)
+        raise Fault(f"{pointer}/{i}", f"must be a list of {wanted} numbers, not of {len(rows[i])}")
+    return rows
+
+
+def _finite(rows: list[list[Any]], pointer: str, width: int) -> Floats:
+    if not set(map(type, chain.from_iterable(rows))) <= {int, float}:
+        at = next(i for i, x in enumerate(chain.from_iterable(rows)) if type(x) not in (int, float))
+        found = next(islice(chain.from_iterable(rows), at, None))
+        raise Fault(f"{pointer}/{at // width}/{at % width}", f"must be a number, not {_kind(found)}")
+    values = np.fromiter(chain.from_iterable(rows), dtype=float, count=width * len(rows))
+    wrong = np.flatnonzero(~np.isfinite(values))
+    if len(wrong):
+        raise Fault(f"{pointer}/{wrong[0] // width}/{wrong[0] % width}", "must be a finite number")
+    return values
+
+
+def _raise_not_whole(rows: list[list[Any]], pointer: str) -> None:
+    for i, row in enumerate(rows):
+        for k, x in enumerate(row):
+            if type(x) is not int:
+                raise Fault(f"{pointer}/{i}/{k}", f"must be a vertex index, not {_kind(x)}")
+
+
+def _kind(value: object) -> str:
+    if value is None:
+        return "null"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, (int, float)):
+        return f"{value!r}"[:40]
+    return "text" if isinstance(value, str) else "a list" if isinstance(value, list) else "an object"

@@ -1,0 +1,178 @@
+"""Jobs on a dask.distributed cluster that somebody else runs (extra ``dask``).
+
+dask cannot stop a task that runs, and it starts a task again when its machine is lost. So the job itself is
+done by a worker process inside the task, which can be killed from here, and a lost machine ends the job as a
+lost worker process does.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import threading
+import uuid
+from collections.abc import Callable
+from typing import Any
+
+from distributed import Client, get_worker
+
+from hexwrap_server.engine import ENGINE_PRELOAD
+from hexwrap_server.worker import Report, WorkerDiedError, WorkerProcess
+
+#: Seconds between two looks at whether the machine of a job is still there.
+CHECK_INTERVAL = 0.5
+#: Seconds within which the scheduler has to answer at start.
+CONNECT_SECONDS = 15
+_TOPIC = "hexwrap-progress"
+log = logging.getLogger("hexwrap.dask")
+
+
+class DaskEngine:
+    """One job per thread of the cluster's workers, which must have the same hexwrap installed."""
+
+    shares_disk = False
+
+    def __init__(self, scheduler: str) -> None:
+        self._address = scheduler
+        self._client: Any = None
+        self._listeners: dict[str, Callable[..., None]] = {}
+        self._places: dict[str, str] = {}
+
+    @property
+    def capacity(self) -> int:
+        threads: list[int] = [machine["nthreads"] for machine in self._machines().values()]
+        return max(1, sum(threads))
+
+    @property
+    def is_ready(self) -> bool:
+        return bool(self._machines())
+
+    async def start(self) -> None:
+        """Raises OSError when the scheduler does not answer."""
+        client: Any = Client
+        self._client = await client(self._address, asynchronous=True, timeout=CONNECT_SECONDS)
+        self._client.subscribe_topic(_TOPIC, self._hear)
+
+    async def stop(self) -> None:
+        if self._client is not None:
+            with contextlib.suppress(OSError):
+                await self._client.run(_close_idle, on_error="ignore")
+            await self._client.close()
+
+    async def run(self, function: str, *arguments: Any, report: Report, seconds: float, mib: float) -> Any:
+        assert self._client is not None
+        ticket = uuid.uuid4().hex
+        self._listeners[ticket] = report
+        future = self._client.submit(
+            _in_process,
+            ticket,
+            function,
+            arguments,
+            seconds,
+            mib,
+            key=f"hexwrap-{ticket}",
+            pure=False,
+            retries=0,
+        )
+        try:
+            return await self._answer(future, ticket)
+        except BaseException:
+            await self._kill(future, ticket)
+            raise
+        finally:
+            del self._listeners[ticket]
+            self._places.pop(ticket, None)
+
+    async def _answer(self, future: Any, ticket: str) -> Any:
+        answer = asyncio.ensure_future(_result(future))
+        try:
+            first = ""
+            while True:
+                done, _ = await asyncio.wait([answer], timeout=CHECK_INTERVAL)
+                if done:
+                    return answer.result()
+                place = self._places.get(ticket, "")
+                first = first or place
+                if first and (place != first or first not in self._machines()):
+                    raise WorkerDiedError(
+                        f"The machine that ran the job ({first}) left the cluster; other jobs are not "
+                        "affected. Send the job again."
+                    )
+        finally:
+            answer.cancel()
+
+    async def _kill(self, future: Any, ticket: str) -> None:
+        assert self._client is not None
+        with contextlib.suppress(OSError, asyncio.CancelledError):
+            await future.cancel(force=True)
+            await self._client.run(_stop, ticket, on_error="ignore")
+
+    def _machines(self) -> dict[str, Any]:
+        if self._client is None or self._client.status != "running":
+            return {}
+        workers: dict[str, Any] = self._client.scheduler_info(n_workers=-1)["workers"]
+        return workers
+
+    def _hear(self, event: tuple[Any, Any]) -> None:
+        ticket, *content = event[1]
+        if ticket not in self._listeners:
+            return
+        if content[0] == "place":
+            self._places[ticket] = content[1]
+        else:
+            self._listeners[ticket](*content)
+
+
+async def _result(future: Any) -> Any:
+    return await future
+
+
+# What follows runs on the cluster's machines.
+
+_GUARD = threading.Lock()
+_IDLE: list[WorkerProcess] = []
+_BUSY: dict[str, WorkerProcess] = {}
+_STOPPED: set[str] = set()
+
+
+def _in_process(ticket: str, function: str, arguments: tuple[Any, ...], seconds: float, mib: float) -> Any:
+    """The task: one call in a worker process that ``_stop`` can kill."""
+    machine = get_worker()
+    machine.log_event(_TOPIC, [ticket, "place", machine.address])
+
+    def report(stage: str, fraction: float, what: str) -> None:
+        machine.log_event(_TOPIC, [ticket, stage, fraction, what])
+
+    with _GUARD:
+        process = _IDLE.pop() if _IDLE else WorkerProcess(ENGINE_PRELOAD)
+        _BUSY[ticket] = process
+    try:
+        if not process.is_alive:
+            process.close()
+            process.start()
+            process.wait_ready()
+        if ticket in _STOPPED:
+            raise WorkerDiedError("The job was stopped before it began.")
+        return process.run(function, arguments, report, seconds, mib)
+    finally:
+        with _GUARD:
+            del _BUSY[ticket]
+            if process.is_alive:
+                _IDLE.append(process)
+            else:
+                process.close()
+
+
+def _stop(ticket: str) -> None:
+    """Runs on every machine of the cluster; one of them has the job."""
+    with _GUARD:
+        _STOPPED.add(ticket)
+        if ticket in _BUSY:
+            _BUSY[ticket].stop()
+
+
+def _close_idle() -> None:
+    with _GUARD:
+        while _IDLE:
+            _IDLE.pop().close()

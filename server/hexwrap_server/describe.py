@@ -1,0 +1,145 @@
+"""What OpenAPI says about bodies and answers that the routes read and write by hand."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hexwrap_server.schemas import Body, Meshing
+
+_NUMBER = {"type": "number"}
+
+
+def _list(items: dict[str, Any], length: int | None = None) -> dict[str, Any]:
+    sized = {"minItems": length, "maxItems": length} if length is not None else {}
+    return {"type": "array", "items": items} | sized
+
+
+def _object(required: tuple[str, ...] = (), more: bool = True, **properties: Any) -> dict[str, Any]:
+    closed = {} if more else {"additionalProperties": False}
+    return {"type": "object", "properties": properties, "required": list(required)} | closed
+
+
+def _nullable(schema: dict[str, Any]) -> dict[str, Any]:
+    return {"anyOf": [schema, {"type": "null"}]}
+
+
+_POINT = _list(_NUMBER, 3)
+_PLANE = _list(_NUMBER, 2)
+_MESH = _object(
+    ("vertices", "faces"),
+    more=False,
+    vertices=_list(_POINT),
+    faces=_list(_list({"type": "integer", "minimum": 0}) | {"minItems": 3, "maxItems": 4}),
+    normals=_nullable(_list(_POINT)),
+)
+_NURBS = _object(
+    ("nurbs",),
+    more=False,
+    nurbs=_object(
+        ("degree", "knots", "control_points"),
+        more=False,
+        degree=_list({"type": "integer", "minimum": 1, "maximum": 25}, 2),
+        knots=_list(_list(_NUMBER), 2),
+        control_points=_list(_list(_list(_NUMBER) | {"minItems": 3, "maxItems": 4})),
+        closed=_list({"type": "boolean"}, 2),
+    ),
+    mesh=_nullable(Meshing.model_json_schema()),
+)
+_SURFACE = {"anyOf": [_MESH, _NURBS, _object(("id",), more=False, id={"type": "string"})]}
+
+_JOB = _object(
+    ("id", "name", "status", "stage", "progress", "created", "started", "finished", "timings", "problem"),
+    id={"type": "string"},
+    name={"type": "string"},
+    status={"enum": ["queued", "running", "done", "failed", "cancelled"]},
+    stage={"type": "string"},
+    progress={"type": "number", "minimum": 0, "maximum": 1},
+    created={"type": "string", "format": "date-time"},
+    started=_nullable({"type": "string", "format": "date-time"}),
+    finished=_nullable({"type": "string", "format": "date-time"}),
+    timings={"type": "object", "additionalProperties": _NUMBER},
+    found={"type": "object", "additionalProperties": {"type": "string"}},
+    problem=_nullable({"type": "object"}),
+    queue_position=_nullable({"type": "integer"}),
+)
+_PROBLEM = _object(
+    ("type", "title", "status", "detail", "errors"),
+    type={"type": "string"},
+    title={"type": "string"},
+    status={"type": "integer"},
+    detail={"type": "string"},
+    errors=_list(_object(("pointer", "detail"), pointer={"type": "string"}, detail={"type": "string"})),
+)
+_RESULT = _object()
+_HEALTH = _object(("status", "version", "workers", "queued", "running"), status={"const": "ok"})
+
+
+def _answers(media: dict[str, Any], status: int = 200, *problems: int) -> dict[str, Any]:
+    refused = {"description": "Refused", "content": {"application/problem+json": {"schema": _PROBLEM}}}
+    good: dict[str, Any] = {"description": "Done"} | ({"content": media} if media else {})
+    return {str(status): good} | {str(code): refused for code in (401, 403, 421, 422, *problems)}
+
+
+def _json(schema: dict[str, Any]) -> dict[str, Any]:
+    return {"application/json": {"schema": schema}}
+
+
+def _route(
+    answers: dict[str, Any], body: dict[str, Any] | None = None, parameters: bool = False
+) -> dict[str, Any]:
+    content = {"requestBody": {"required": True, "content": body}} if body else {}
+    return {"responses": answers} | content
+
+
+def _request_schema() -> dict[str, Any]:
+    """The request with its definitions inside, so that it can stand anywhere in the document."""
+    schema = _inlined(Body.model_json_schema())
+    schema["properties"] = {"surface": _SURFACE} | schema["properties"]
+    schema["required"] = ["surface"]
+    return schema
+
+
+def _inlined(schema: dict[str, Any]) -> dict[str, Any]:
+    definitions = schema.pop("$defs", {})
+
+    def resolve(part: Any) -> Any:
+        if isinstance(part, dict):
+            if "$ref" in part:
+                target = resolve(definitions[part["$ref"].rpartition("/")[2]])
+                return target | {k: v for k, v in part.items() if k != "$ref"}
+            return {k: resolve(v) for k, v in part.items()}
+        return [resolve(p) for p in part] if isinstance(part, list) else part
+
+    resolved: dict[str, Any] = resolve(schema)
+    return resolved
+
+
+_BODY_FAULTS = (400, 413, 415)
+_FILE = {"multipart/form-data": {"schema": _object(("file",), file={"type": "string", "format": "binary"})}}
+_POINTS = _object(("points",), more=False, points=_list(_PLANE))
+_PLACES = _object(("points",), more=False, points=_list(_POINT))
+
+HEALTH = _route(_answers(_json(_HEALTH)))
+READY = _route(_answers(_json(_HEALTH), 200, 503))
+METRICS = _route(_answers({"text/plain": {"schema": {"type": "string"}}}))
+JOBS = _route(_answers(_json(_object(("jobs",), jobs=_list(_JOB)))))
+JOB = _route(_answers(_json(_JOB), 200, 404))
+EVENTS = _route(_answers({"text/event-stream": {"schema": {"type": "string"}}}, 200, 404))
+RESULT = _route(_answers(_json(_RESULT), 200, 404, 409, 410, 500, 503))
+DELETE_JOB = _route(_answers({}, 204, 404))
+POST_JOB = _route(_answers(_json(_JOB), 202, *_BODY_FAULTS, 503), _json(_request_schema()))
+SOLVE = _route(_answers(_json(_RESULT), 200, *_BODY_FAULTS, 409, 410, 500, 503), _json(_request_schema()))
+SURFACES = _route(
+    _answers(_json(_object(("id", "vertices", "faces", "loops", "repairs"))), 201, *_BODY_FAULTS, 500, 503),
+    _json({"anyOf": [_MESH, _NURBS]}) | _FILE,
+)
+LIFT = _route(
+    _answers(_json(_object(("points", "normals", "inside"))), 200, *_BODY_FAULTS, 404, 409, 410, 503),
+    _json(_POINTS),
+)
+FLATTEN = _route(
+    _answers(_json(_object(("uv", "distance"))), 200, *_BODY_FAULTS, 404, 409, 410, 503), _json(_PLACES)
+)
+FILES = _route(
+    _answers({"application/octet-stream": {"schema": {"type": "string"}}}, 200, 404, 409, 410, 500, 503)
+)

@@ -1,0 +1,368 @@
+"""The queue: jobs come in, works are run, everybody who waits is told."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import gzip
+import logging
+import time
+import uuid
+from collections import OrderedDict
+from collections.abc import AsyncIterator
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from hexwrap_server.codec import digest
+from hexwrap_server.engine import Engine
+from hexwrap_server.metrics import Metrics
+from hexwrap_server.parts import chosen
+from hexwrap_server.problems import FormError, HttpError, not_found, plain, problem
+from hexwrap_server.requests import CacheSettings, Outcome, ParsedRequest
+from hexwrap_server.settings import MIB, Settings
+from hexwrap_server.store import Job, Store, Work
+from hexwrap_server.version import service_version
+from hexwrap_server.worker import InternalError, WorkError
+from hexwrap_solver.errors import HexwrapError
+
+#: A work that was running this often when the server died is not started again.
+MAX_ATTEMPTS = 3
+#: Seconds between two rounds of pruning.
+PRUNE_INTERVAL = 600.0
+#: Results kept in memory as they go over the wire.
+HOT_RESULT_BYTES = 64 * MIB
+log = logging.getLogger("hexwrap.jobs")
+
+
+class AttemptsError(WorkError):
+    slug = "too-many-attempts"
+    title = "The job was given up"
+
+
+@dataclass(eq=False)
+class _Item:
+    """A work that waits or runs, and the jobs that want it."""
+
+    work: Work
+    jobs: dict[str, Job] = field(default_factory=dict)
+    task: asyncio.Task[None] | None = None
+
+
+class JobManager:
+    """Belongs to one event loop."""
+
+    def __init__(self, store: Store, engine: Engine, settings: Settings, metrics: Metrics) -> None:
+        self.store = store
+        self._engine = engine
+        self._settings = settings
+        self._metrics = metrics
+        self._items: dict[str, _Item] = {}  # by identity
+        self._live: dict[str, _Item] = {}  # by job
+        self._queue: OrderedDict[str, _Item] = OrderedDict()
+        self._running: set[_Item] = set()
+        self._changed: dict[str, asyncio.Event] = {}
+        self._hot: OrderedDict[str, bytes] = OrderedDict()
+        self._pruning: asyncio.Task[None] | None = None
+        self._closing = asyncio.Event()
+
+    @property
+    def caching(self) -> CacheSettings:
+        folder = str(self.store.stages) if self._engine.shares_disk else ""
+        return CacheSettings(folder, int(self._settings.memory_cache_mib * MIB))
+
+    @property
+    def n_queued(self) -> int:
+        return len(self._queue)
+
+    @property
+    def n_running(self) -> int:
+        return len(self._running)
+
+    async def start(self) -> None:
+        """Take up what an earlier server left."""
+        for job in self.store.unfinished():
+            self._resume(job)
+        self._pruning = asyncio.create_task(self._prune_forever())
+        self._pump()
+
+    def close_waits(self) -> None:
+        """End all long polls and event streams; the server stops."""
+        self._closing.set()
+        for event in self._changed.values():
+            event.set()
+
+    async def stop(self) -> None:
+        """Stop everything; what is unfinished is taken up by the next server."""
+        self.close_waits()
+        self._queue.clear()
+        tasks = [item.task for item in self._running if item.task]
+        if self._pruning:
+            tasks.append(self._pruning)
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+    # what clients do
+
+    def submit(self, parsed: ParsedRequest) -> Job:
+        """Raises HttpError when the queue is full, FormError when the surface is unknown."""
+        identity = digest(service_version(), parsed.surface_id, parsed.wanted)
+        job = Job(uuid.uuid4().hex, identity, parsed.name, created=time.time())
+        finished = self.store.finished_work(identity)
+        if finished is not None:
+            job = _reused(job, finished)
+            self.store.add(job, finished)
+            self._metrics.jobs.labels("reused").inc()
+            return job
+        if not self.store.has_surface(parsed.surface_id):
+            raise FormError.at("/surface/id", "no such surface is kept here; send it to /v1/surfaces again")
+        item = self._items.get(identity)
+        if item is None and len(self._queue) >= self._settings.max_queue:
+            raise HttpError(
+                503,
+                "queue-full",
+                "The queue is full",
+                f"{len(self._queue)} jobs are waiting, the limit of this server; try again in a few seconds.",
+                {"Retry-After": "5"},
+            )
+        if item is not None and item in self._running:
+            job = replace(job, status="running", started=job.created)
+        self.store.add(job, Work(identity, parsed.surface_id, parsed.wanted))
+        self._attach(job, item, Work(identity, parsed.surface_id, parsed.wanted))
+        self._log(job, "accepted")
+        self._pump()
+        return job
+
+    def get(self, id: str) -> Job:
+        """Raises HttpError 404."""
+        item = self._live.get(id)
+        job = item.jobs[id] if item else self.store.job(id)
+        if job is None:
+            raise not_found("job", f"There is no job '{id[:64]}' here; it may have been forgotten.")
+        return job
+
+    def latest(self, limit: int) -> list[Job]:
+        """Newest first."""
+        return [self.get(job.id) if job.id in self._live else job for job in self.store.jobs(limit)]
+
+    def position(self, job: Job) -> int | None:
+        """Number of works before this one, None unless it is queued."""
+        if job.status != "queued":
+            return None
+        return next((i for i, identity in enumerate(self._queue) if identity == job.identity), 0)
+
+    def document(self, job: Job) -> dict[str, Any]:
+        return job.document(self.position(job))
+
+    async def wait(self, id: str, seconds: float | None) -> Job:
+        """The job when it is over, or after seconds (None: however long), or when the server stops."""
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(seconds):
+                while not self.get(id).is_over and not self._closing.is_set():
+                    await self._event(id).wait()
+        return self.get(id)
+
+    async def changes(self, id: str, heartbeat: float) -> AsyncIterator[Job | None]:
+        """The job now and after each change until it is over; None after heartbeat seconds without one."""
+        while True:
+            job = self.get(id)
+            yield job
+            if job.is_over:
+                return
+            while True:
+                try:
+                    async with asyncio.timeout(heartbeat):
+                        await self._event(id).wait()
+                    break
+                except TimeoutError:
+                    yield None
+            if self._closing.is_set():
+                return
+
+    async def delete(self, id: str) -> None:
+        """Stop a job that waits or runs, forget one that is over."""
+        job = self.get(id)
+        if job.is_over:
+            self.store.forget(id)
+            return
+        item = self._live[id]
+        self._end([replace(job, status="cancelled", finished=time.time())])
+        if item.jobs:
+            return
+        self._queue.pop(item.work.identity, None)
+        if self._items.get(item.work.identity) is item:
+            del self._items[item.work.identity]
+        if item.task:
+            item.task.cancel()
+            await asyncio.wait([item.task], timeout=2.0)
+
+    async def result(self, job: Job) -> tuple[bytes, Work]:
+        """The packed Result, and where its parts stand. Raises HttpError where there is none."""
+        work = self.store.finished_work(job.identity)
+        if work is None:
+            raise HttpError(
+                410, "gone", "The result is no longer kept", "The result was pruned; send the job again."
+            )
+        if job.identity not in self._hot:
+            self._heat(job.identity, await asyncio.to_thread(self.store.result_path(job.identity).read_bytes))
+        self._hot.move_to_end(job.identity)
+        return self._hot[job.identity], work
+
+    # how works run
+
+    def _attach(self, job: Job, item: _Item | None, work: Work) -> None:
+        if item is None:
+            item = _Item(work)
+            self._items[work.identity] = item
+            self._queue[work.identity] = item
+        item.jobs[job.id] = job
+        self._live[job.id] = item
+
+    def _resume(self, job: Job) -> None:
+        work = self.store.work(job.identity)
+        if work is None or not self.store.has_surface(work.surface):
+            lost = InternalError("The surface of this job was lost while the server was down; send it again.")
+            self._end([_failed(job, lost)])
+        elif work.parts is not None and self.store.result_path(job.identity).exists():
+            self._end([_reused(job, work)])
+        elif work.attempts >= MAX_ATTEMPTS:
+            gave_up = AttemptsError(
+                f"The server died {work.attempts} times while this job was running, so it is not tried "
+                "again; make the mesh or the pattern coarser."
+            )
+            self._end([_failed(job, gave_up)])
+        else:
+            self.store.update([job])
+            self._attach(job, self._items.get(job.identity), work)
+            self._log(job, "taken up again")
+
+    def _pump(self) -> None:
+        while self._queue and len(self._running) < self._engine.capacity and not self._closing.is_set():
+            _, item = self._queue.popitem(last=False)
+            self._running.add(item)
+            item.task = asyncio.create_task(self._run(item))
+        self._metrics.queued.set(len(self._queue))
+        self._metrics.running.set(len(self._running))
+
+    async def _run(self, item: _Item) -> None:
+        identity = item.work.identity
+        try:
+            self.store.start_work(identity)
+            now = time.time()
+            self._change(item, written=True, status="running", started=now)
+            outcome = await self._compute(item)
+            await asyncio.to_thread(self.store.keep_outcome, identity, outcome)
+            self.store.finish_work(identity, outcome)
+            self._heat(identity, outcome.result)
+            self._end([_done(job, outcome) for job in item.jobs.values()])
+        except asyncio.CancelledError:
+            self.store.take_back(identity)
+            raise
+        except HexwrapError as error:
+            self._end([_failed(job, error) for job in item.jobs.values()])
+        except Exception as error:
+            log.exception("a job failed unexpectedly")
+            fault = InternalError(f"The server could not finish the job ({type(error).__name__}: {error}).")
+            self._end([_failed(job, fault) for job in item.jobs.values()])
+        finally:
+            self._running.discard(item)
+            if self._items.get(identity) is item:
+                del self._items[identity]
+            self._pump()
+
+    async def _compute(self, item: _Item) -> Outcome:
+        surface = await asyncio.to_thread(self.store.surface, item.work.surface)
+
+        def report(stage: str, fraction: float, what: str) -> None:
+            self._change(item, stage=stage, progress=round(max(0.0, min(1.0, fraction)), 4))
+
+        outcome: Outcome = await self._engine.run(
+            "hexwrap_server.work:solve",
+            surface,
+            item.work.wanted,
+            self.caching,
+            report=report,
+            seconds=self._settings.job_seconds,
+            mib=self._settings.job_mib,
+        )
+        return outcome
+
+    def _change(self, item: _Item, *, written: bool = False, **changes: Any) -> None:
+        for id, job in item.jobs.items():
+            item.jobs[id] = replace(job, **changes)
+        if written:
+            self.store.update(item.jobs.values())
+        for id in item.jobs:
+            self._tell(id)
+
+    def _end(self, jobs: list[Job]) -> None:
+        """Write the end of jobs, then tell."""
+        self.store.update(jobs)
+        for job in jobs:
+            item = self._live.pop(job.id, None)
+            if item is not None:
+                item.jobs.pop(job.id, None)
+            self._tell(job.id)
+            self._metrics.ended(job)
+            self._log(job, job.status)
+
+    def _event(self, id: str) -> asyncio.Event:
+        return self._changed.setdefault(id, asyncio.Event())
+
+    def _tell(self, id: str) -> None:
+        event = self._changed.pop(id, None)
+        if event:
+            event.set()
+
+    def _heat(self, identity: str, packed: bytes) -> None:
+        self._hot[identity] = packed
+        while len(self._hot) > 1 and sum(map(len, self._hot.values())) > HOT_RESULT_BYTES:
+            self._hot.popitem(last=False)
+
+    async def _prune_forever(self) -> None:
+        s = self._settings
+        while True:
+            works = self.store.prune_rows(s.results_days, s.results_mib * MIB)
+            await asyncio.to_thread(self.store.prune_files, works, s.results_mib * MIB, s.cache_mib * MIB)
+            await asyncio.sleep(PRUNE_INTERVAL)
+
+    def _log(self, job: Job, what: str) -> None:
+        seconds = round(job.finished - job.started, 3) if job.finished and job.started else None
+        extra = {"job": job.id, "job_name": job.name, "seconds": seconds, "found": job.found}
+        log.info("job %s", what, extra=extra)
+
+
+def unpacked(packed: bytes, work: Work, include: list[str] | None) -> bytes:
+    """The Result as JSON, or some of its parts."""
+    text = gzip.decompress(packed)
+    return text if include is None else chosen(text, work.parts or {}, include)
+
+
+def _done(job: Job, outcome: Outcome) -> Job:
+    return replace(
+        job,
+        status="done",
+        stage="done",
+        progress=1.0,
+        finished=time.time(),
+        timings=outcome.timings,
+        found=outcome.found,
+    )
+
+
+def _reused(job: Job, work: Work) -> Job:
+    now = time.time()
+    return replace(
+        job,
+        status="done",
+        stage="done",
+        progress=1.0,
+        started=job.created,
+        finished=now,
+        timings=dict.fromkeys(work.timings, 0.0),
+        found=dict.fromkeys(work.timings, "result"),
+    )
+
+
+def _failed(job: Job, error: HexwrapError) -> Job:
+    return replace(job, status="failed", finished=time.time(), problem=plain(problem(error)))

@@ -1,0 +1,99 @@
+"""Every answer that is no success is a problem (RFC 9457).
+
+HexwrapError            (hexwrap_solver.errors) refused by the solver: 422
+├── FormError           the body does not have the form it should: 400, 413 or 422
+├── HttpError           about the request as such: no such job, host not allowed, queue full …
+└── WorkError           (worker) the job ended without a result: limits 422, a dead worker 503, a bug 500
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, ClassVar
+
+import orjson
+
+from hexwrap_solver.errors import HexwrapError
+
+MEDIA_TYPE = "application/problem+json"
+#: Statuses of the errors that are not 422.
+STATUS = {"not-json": 400, "gone": 410, "worker-died": 503, "internal": 500}
+#: More faults than these are not listed, the first ones tell enough.
+MOST_LISTED = 100
+
+
+class FormError(HexwrapError):
+    """The body is not what the route takes. faults: (JSON pointer, what is wrong there)."""
+
+    slug: ClassVar[str] = "invalid-request"
+    title: ClassVar[str] = "The request does not have the right form"
+
+    def __init__(self, faults: Sequence[tuple[str, str]] | str = ()) -> None:
+        if isinstance(faults, str):  # rebuilt after the way between processes; the rest is in __dict__
+            super().__init__(faults)
+            self.faults: list[tuple[str, str]] = []
+            return
+        pointer, detail = faults[0]
+        more = f" ({len(faults) - 1} more faults are listed in 'errors'.)" if len(faults) > 1 else ""
+        super().__init__(f"{pointer or 'The body'}: {detail.rstrip('.')}.{more}")
+        self.faults = list(faults[:MOST_LISTED])
+
+    @classmethod
+    def at(cls, pointer: str, detail: str) -> FormError:
+        return cls([(pointer, detail)])
+
+
+class HttpError(HexwrapError):
+    """A refusal by the service itself."""
+
+    def __init__(
+        self,
+        status: int,
+        slug: str,
+        title: str,
+        detail: str,
+        headers: dict[str, str] | None = None,
+        errors: Sequence[dict[str, Any]] = (),
+    ) -> None:
+        super().__init__(detail)
+        self.status = status
+        self.own_slug = slug
+        self.own_title = title
+        self.headers = headers or {}
+        self.errors = list(errors)
+
+
+def problem(error: HexwrapError) -> dict[str, Any]:
+    """The members of a problem document."""
+    if isinstance(error, HttpError):
+        return _document(error.own_slug, error.own_title, error.status, error.detail, error.errors)
+    faults = error.faults if isinstance(error, FormError) else []
+    errors = [{"pointer": pointer, "detail": detail} for pointer, detail in faults]
+    if not errors and error.field:
+        errors = [{"pointer": "".join(f"/{step}" for step in error.field), "detail": error.detail}]
+    data: dict[str, Any] = dict(error.data)
+    for name in ("vertices", "faces", "edges"):
+        if getattr(error, name):
+            data[name] = getattr(error, name)
+    return _document(error.slug, error.title, STATUS.get(error.slug, 422), error.detail, errors) | data
+
+
+def _document(
+    slug: str, title: str, status: int, detail: str, errors: list[dict[str, Any]]
+) -> dict[str, Any]:
+    return {"type": f"/problems/{slug}", "title": title, "status": status, "detail": detail, "errors": errors}
+
+
+def dumped(document: object) -> bytes:
+    """JSON of a small document, numpy numbers included; numbers that JSON does not have become null."""
+    return orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_NON_STR_KEYS, default=str)
+
+
+def plain(document: dict[str, Any]) -> dict[str, Any]:
+    """A document as a client reads it: no numpy numbers, no NaN."""
+    read: dict[str, Any] = orjson.loads(dumped(document))
+    return read
+
+
+def not_found(what: str, detail: str) -> HttpError:
+    return HttpError(404, "not-found", f"No such {what}", detail)

@@ -1,0 +1,72 @@
+"""What goes to a worker, after everything about its form has been checked, and what comes back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from hexwrap_solver.conformal.types import BoundaryCondition
+from hexwrap_solver.panels.types import PanelSettings
+from hexwrap_solver.pattern.types import PatternSettings
+from hexwrap_solver.surface.types import MeshSettings, NurbsSurface, SentMesh
+
+
+@dataclass(frozen=True)
+class SentSurface:
+    """A surface as it was sent: a mesh, or a NURBS surface and how to mesh it."""
+
+    mesh: SentMesh | None = None
+    nurbs: NurbsSurface | None = None
+    meshing: MeshSettings | None = None
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What is to be done with a surface; identical for identical work."""
+
+    boundary: BoundaryCondition
+    pattern: PatternSettings | None
+    panels: PanelSettings | None
+    support: bool = False
+
+
+@dataclass(frozen=True)
+class ParsedRequest:
+    """A request that was read from JSON. surface: encoded, None where an id was given."""
+
+    name: str
+    surface_id: str
+    surface: bytes | None
+    wanted: Wanted
+
+
+@dataclass(frozen=True)
+class CacheSettings:
+    """folder: where stages are kept on the worker's machine, or none. memory_bytes: in the worker itself."""
+
+    folder: str
+    memory_bytes: int
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A finished job. result: the Result, gzip. parts: where each part stands in the unpacked text.
+
+    solution: for lift, flatten and files. found: per stage ``memory``, ``disk`` or ``computed``.
+    """
+
+    result: bytes
+    parts: dict[str, tuple[int, int]]
+    size: int
+    solution: bytes
+    timings: dict[str, float]
+    found: dict[str, str]
+
+
+@dataclass(frozen=True)
+class Intake:
+    """A surface that was checked: what POST /v1/surfaces answers, and what is kept."""
+
+    id: str
+    surface: bytes
+    answer: dict[str, Any] = field(default_factory=dict)

@@ -1,0 +1,313 @@
+"""The contract's routes."""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+from collections import OrderedDict
+from collections.abc import AsyncIterator
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Path, Query, Request
+from starlette.responses import Response, StreamingResponse
+
+from hexwrap_server import codec, describe
+from hexwrap_server.answers import (
+    JSON,
+    json_response,
+    packed_response,
+    problem_response,
+    takes_gzip,
+)
+from hexwrap_server.bodies import read_body
+from hexwrap_server.jobs import JobManager, unpacked
+from hexwrap_server.metrics import MEDIA_TYPE as METRICS_TYPE
+from hexwrap_server.parsing import loads, read_request
+from hexwrap_server.parts import PARTS, names
+from hexwrap_server.problems import HttpError, dumped, not_found
+from hexwrap_server.requests import Intake, ParsedRequest
+from hexwrap_server.schemas import parse_points
+from hexwrap_server.service import Service
+from hexwrap_server.store import Job
+
+#: Bodies up to this size are read in a thread, larger ones in a process: reading holds the interpreter.
+SMALL_BODY = 1_000_000
+#: Longest time that ``?wait=`` holds an answer.
+MAX_WAIT = 60.0
+#: Seconds between two signs of life on an event stream.
+HEARTBEAT = 15.0
+#: Files of a finished job and their media types; ``hexwrap_server.files`` writes them.
+FILES = {
+    "panels.obj": "model/obj",
+    "panels.3dm": "model/vnd.3dm",
+    "panels.dxf": "image/vnd.dxf",
+    "panels.csv": "text/csv; charset=utf-8",
+    "flat.dxf": "image/vnd.dxf",
+    "domain.svg": "image/svg+xml",
+    "panels.png": "image/png",
+    "result.json": JSON,
+    "result.npz": "application/octet-stream",
+}
+
+router = APIRouter()
+JobId = Annotated[str, Path(description="a job's id", max_length=64)]
+
+
+def service_of(request: Request) -> Service:
+    service: Service = request.app.state.service
+    return service
+
+
+def manager_of(request: Request) -> JobManager:
+    return service_of(request).manager
+
+
+@router.get("/health", openapi_extra=describe.HEALTH)
+async def health(request: Request) -> Response:
+    """Whether the server lives."""
+    return json_response(service_of(request).health())
+
+
+@router.get("/ready", openapi_extra=describe.READY)
+async def ready(request: Request) -> Response:
+    """Whether a job would be run now."""
+    service = service_of(request)
+    if not service.is_ready:
+        raise HttpError(
+            503, "not-ready", "Not ready", "The worker processes are starting.", {"Retry-After": "1"}
+        )
+    return json_response(service.health())
+
+
+@router.get("/metrics", openapi_extra=describe.METRICS)
+async def metrics(request: Request) -> Response:
+    """Prometheus text."""
+    return Response(service_of(request).metrics.text(), media_type=METRICS_TYPE)
+
+
+@router.post("/v1/jobs", status_code=202, openapi_extra=describe.POST_JOB)
+async def post_job(request: Request) -> Response:
+    """Have a surface panelized."""
+    manager = manager_of(request)
+    job = manager.submit(await _read(request))
+    return json_response(manager.document(job), 202, {"Location": f"/v1/jobs/{job.id}"})
+
+
+@router.get("/v1/jobs", openapi_extra=describe.JOBS)
+async def list_jobs(request: Request, limit: Annotated[int, Query(ge=1, le=1000)] = 100) -> Response:
+    """Jobs, newest first."""
+    manager = manager_of(request)
+    return json_response({"jobs": [manager.document(job) for job in manager.latest(limit)]})
+
+
+@router.get("/v1/jobs/{id}", openapi_extra=describe.JOB)
+async def get_job(
+    request: Request, id: JobId, wait: Annotated[float, Query(ge=0, le=MAX_WAIT, allow_inf_nan=False)] = 0.0
+) -> Response:
+    """A job, at once or when it ends."""
+    manager = manager_of(request)
+    job = await manager.wait(id, wait) if wait else manager.get(id)
+    return json_response(manager.document(job), headers={"Cache-Control": "no-store"} | _timing(job))
+
+
+@router.get("/v1/jobs/{id}/events", openapi_extra=describe.EVENTS)
+async def events(request: Request, id: JobId) -> Response:
+    """A job's progress as Server-Sent Events."""
+    manager = manager_of(request)
+    manager.get(id)
+    return StreamingResponse(
+        _events(manager, id),
+        media_type="text/event-stream",
+        headers={"Cache-Control": "no-store", "X-Accel-Buffering": "no"},
+    )
+
+
+@router.get("/v1/jobs/{id}/result", openapi_extra=describe.RESULT)
+async def get_result(
+    request: Request, id: JobId, include: Annotated[str | None, Query(description=", ".join(PARTS))] = None
+) -> Response:
+    """A job's Result, or its problem."""
+    return await _result(request, manager_of(request).get(id), _parts(include))
+
+
+@router.delete("/v1/jobs/{id}", status_code=204, openapi_extra=describe.DELETE_JOB)
+async def delete_job(request: Request, id: JobId) -> Response:
+    """Stop a job, or forget it."""
+    await manager_of(request).delete(id)
+    return Response(status_code=204)
+
+
+@router.post("/v1/solve", openapi_extra=describe.SOLVE)
+async def solve(
+    request: Request, include: Annotated[str | None, Query(description=", ".join(PARTS))] = None
+) -> Response:
+    """The Result itself, when it is there."""
+    manager = manager_of(request)
+    parts = _parts(include)
+    job = manager.submit(await _read(request))
+    job = await manager.wait(job.id, None)
+    return await _result(request, job, parts)
+
+
+@router.post("/v1/surfaces", status_code=201, openapi_extra=describe.SURFACES)
+async def post_surface(
+    request: Request,
+    name: Annotated[str | None, Query(max_length=200, description="name of a raw file")] = None,
+) -> Response:
+    """Send a surface once, as JSON or as a file."""
+    service = service_of(request)
+    settings, caching = service.settings, service.manager.caching
+    kind = request.headers.get("content-type", "")
+    body = await read_body(request, settings.max_body_mib)
+    if name is not None or kind.lower().startswith("multipart/"):
+        arguments: tuple[Any, ...] = (
+            body,
+            kind,
+            name or "",
+            settings.max_vertices,
+            caching,
+        )
+        intake: Intake = await service.errand("hexwrap_server.uploads:read_upload", *arguments)
+    else:
+        intake = await service.errand(
+            "hexwrap_server.work:read_surface", body, settings.max_vertices, caching
+        )
+    await asyncio.to_thread(service.store.keep_surface, intake.id, intake.surface)
+    return json_response({"id": intake.id} | intake.answer, 201)
+
+
+@router.post("/v1/jobs/{id}/lift", openapi_extra=describe.LIFT)
+async def lift(request: Request, id: JobId) -> Response:
+    """Points of the unrolled domain → points of the surface."""
+    return await _carry(request, id, "lift", 2)
+
+
+@router.post("/v1/jobs/{id}/flatten", openapi_extra=describe.FLATTEN)
+async def flatten(request: Request, id: JobId) -> Response:
+    """Points near the surface → points of the unrolled domain."""
+    return await _carry(request, id, "flatten", 3)
+
+
+@router.get("/v1/jobs/{id}/files/{name}", openapi_extra=describe.FILES)
+async def get_file(request: Request, id: JobId, name: Annotated[str, Path(max_length=64)]) -> Response:
+    """The finished work as a file."""
+    if name not in FILES:
+        raise not_found("file", f"There is no file '{name[:64]}'; there are {', '.join(FILES)}.")
+    service = service_of(request)
+    job = service.manager.get(id)
+    _finished(job)
+    if name == "result.json":
+        packed, work = await service.manager.result(job)
+        data = await asyncio.to_thread(unpacked, packed, work, None)
+    else:
+        path = str(service.store.solution_path(job.identity))
+        data = await service.errand("hexwrap_server.work:write_file", path, name, job.name, job.timings)
+    headers = {"Content-Disposition": f'attachment; filename="{name}"'}
+    return await packed_response(request, data, FILES[name], headers)
+
+
+async def _read(request: Request) -> ParsedRequest:
+    """The request of a body; the same bytes again are not read again."""
+    service = service_of(request)
+    settings = service.settings
+    body = await read_body(request, settings.max_body_mib)
+    known: OrderedDict[str, ParsedRequest] = service.known_bodies
+    mark = await asyncio.to_thread(lambda: hashlib.sha256(body).hexdigest())
+    if mark in known and service.store.has_surface(known[mark].surface_id):
+        known.move_to_end(mark)
+        return known[mark]
+    limits = (settings.max_vertices, settings.max_panels)
+    if len(body) <= SMALL_BODY:
+        parsed = await asyncio.to_thread(read_request, service.nobody, body, *limits)
+    else:
+        parsed = await service.errand("hexwrap_server.parsing:read_request", body, *limits)
+    if parsed.surface is not None:
+        await asyncio.to_thread(service.store.keep_surface, parsed.surface_id, parsed.surface)
+    return service.remember_body(mark, parsed)
+
+
+async def _carry(request: Request, id: str, what: str, dimension: int) -> Response:
+    service = service_of(request)
+    job = service.manager.get(id)
+    body = await read_body(request, service.settings.max_body_mib)
+    points = await asyncio.to_thread(
+        lambda: parse_points(loads(body), dimension, service.settings.max_points)
+    )
+    _finished(job)
+    path = str(service.store.solution_path(job.identity))
+    data = await service.errand(f"hexwrap_server.carrying:{what}", path, codec.encode(points))
+    return await packed_response(request, data)
+
+
+async def _result(request: Request, job: Job, include: list[str] | None) -> Response:
+    if job.status == "failed" and job.problem:
+        return problem_response(job.problem)
+    _finished(job)
+    packed, work = await manager_of(request).result(job)
+    headers = {"Content-Location": f"/v1/jobs/{job.id}/result", "Vary": "Accept-Encoding"} | _timing(job)
+    if include is None and takes_gzip(request.headers):
+        return Response(packed, headers=headers | {"Content-Encoding": "gzip"}, media_type=JSON)
+    text = await asyncio.to_thread(unpacked, packed, work, include)
+    if include is None:
+        return Response(text, headers=headers, media_type=JSON)
+    return await packed_response(request, text, headers=headers)
+
+
+def _finished(job: Job) -> None:
+    """Raises HttpError unless the job is done."""
+    if job.status == "failed" and job.problem:
+        raise JobFailedError(job.problem)
+    if job.status == "cancelled":
+        raise HttpError(
+            409, "cancelled", "The job was cancelled", "The job was cancelled, so it has no result."
+        )
+    if job.status != "done":
+        raise HttpError(
+            409,
+            "not-finished",
+            "The job is not finished",
+            f"The job is {job.status}; wait with GET …?wait=60.",
+            {"Retry-After": "1"},
+        )
+
+
+class JobFailedError(HttpError):
+    """Carries a failed job's own problem."""
+
+    def __init__(self, document: dict[str, Any]) -> None:
+        super().__init__(document["status"], "", document["title"], document["detail"])
+        self.document = document
+
+
+def _parts(include: str | None) -> list[str] | None:
+    if include is None:
+        return None
+    known, unknown = names(include)
+    if unknown or not known:
+        detail = f"'include' names parts of the Result: {', '.join(PARTS)}."
+        raise HttpError(
+            422,
+            "invalid-request",
+            "The request does not have the right form",
+            detail,
+            errors=[{"pointer": "", "parameter": "include", "detail": detail}],
+        )
+    return known
+
+
+def _timing(job: Job) -> dict[str, str]:
+    """Server-Timing: milliseconds per stage and where it came from."""
+    entries = [
+        f'{stage};dur={seconds * 1000:.1f};desc="{job.found.get(stage, "computed")}"'
+        for stage, seconds in job.timings.items()
+    ]
+    return {"Server-Timing": ", ".join(entries)} if entries else {}
+
+
+async def _events(manager: JobManager, id: str) -> AsyncIterator[bytes]:
+    async for job in manager.changes(id, HEARTBEAT):
+        if job is None:
+            yield b": still here\n\n"
+        else:
+            name = job.status if job.is_over else "progress"
+            yield b"event: %s\ndata: %s\n\n" % (name.encode(), dumped(manager.document(job)))

@@ -1,0 +1,100 @@
+"""All that one running server holds together: settings, store, engines, jobs."""
+
+from __future__ import annotations
+
+import time
+from collections import OrderedDict
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import platformdirs
+
+from hexwrap_server import __version__
+from hexwrap_server.engine import Engine, ProcessEngine, nobody
+from hexwrap_server.jobs import JobManager
+from hexwrap_server.metrics import Metrics
+from hexwrap_server.requests import ParsedRequest
+from hexwrap_server.settings import Settings
+from hexwrap_server.store import FolderInUseError, Store
+
+#: Longest errand (reading a body, writing a file), seconds.
+ERRAND_SECONDS = 120.0
+#: Bodies whose contents are remembered by their hash.
+KNOWN_BODIES = 256
+
+
+class Service:
+    """Made with the application, started and stopped with the server."""
+
+    nobody = staticmethod(nobody)
+
+    def __init__(self, settings: Settings, engine: Engine | None = None) -> None:
+        """Raises FolderInUseError, OSError."""
+        self.settings = settings
+        self.store = open_store(settings)
+        self.metrics = Metrics()
+        self.engine = engine or make_engine(settings)
+        self.errands = ProcessEngine(1)
+        self.manager = JobManager(self.store, self.engine, settings, self.metrics)
+        self.known_bodies: OrderedDict[str, ParsedRequest] = OrderedDict()
+        self._since = time.time()
+
+    async def start(self) -> None:
+        await self.engine.start()
+        await self.errands.start()
+        await self.manager.start()
+
+    async def stop(self) -> None:
+        await self.manager.stop()
+        await self.engine.stop()
+        await self.errands.stop()
+        self.store.close()
+
+    @property
+    def is_ready(self) -> bool:
+        return self.engine.is_ready
+
+    def health(self) -> dict[str, Any]:
+        return {
+            "status": "ok",
+            "version": __version__,
+            "workers": self.engine.capacity,
+            "queued": self.manager.n_queued,
+            "running": self.manager.n_running,
+            "uptime": round(time.time() - self._since, 1),
+        }
+
+    async def errand(self, function: str, *arguments: Any) -> Any:
+        """A short piece of work beside the jobs, in a process of its own."""
+        return await self.errands.run(
+            function, *arguments, report=nobody, seconds=ERRAND_SECONDS, mib=self.settings.job_mib
+        )
+
+    def remember_body(self, mark: str, parsed: ParsedRequest) -> ParsedRequest:
+        """The surface itself is on disk; only what points to it is remembered."""
+        light = replace(parsed, surface=None)
+        self.known_bodies[mark] = light
+        while len(self.known_bodies) > KNOWN_BODIES:
+            self.known_bodies.popitem(last=False)
+        return light
+
+
+def make_engine(settings: Settings) -> Engine:
+    """The engine that the settings name."""
+    if settings.engine == "dask":
+        from hexwrap_server.dask_engine import DaskEngine  # an extra: installed only where it is used
+
+        return DaskEngine(settings.scheduler)
+    return ProcessEngine(settings.workers)
+
+
+def open_store(settings: Settings) -> Store:
+    """The store in ``--data``; without it, in the user's data folder, beside other servers."""
+    if settings.data:
+        return Store(Path(settings.data))
+    base = Path(platformdirs.user_data_dir("hexwrap", appauthor=False))
+    try:
+        return Store(base)
+    except FolderInUseError:
+        return Store(base / f"port-{settings.port}")

@@ -1,0 +1,300 @@
+"""What survives the server: jobs and works in SQLite, surfaces, results and solutions as files beside it.
+
+A *work* is what has to be computed, known by the SHA-256 of all it depends on; a *job* is one client's wish
+for it. Every transition is written here before anybody is told. The write-ahead log keeps what was written
+when the process is killed at any moment.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import re
+import sqlite3
+import time
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, field, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Literal
+
+from hexwrap_server import codec
+from hexwrap_server.cache import prune, write_whole
+from hexwrap_server.requests import Outcome, Wanted
+
+Status = Literal["queued", "running", "done", "failed", "cancelled"]
+HEX_ID = re.compile(r"[0-9a-f]{64}")
+
+_SCHEMA = """
+CREATE TABLE IF NOT EXISTS works (
+    identity TEXT PRIMARY KEY, surface TEXT NOT NULL, wanted BLOB NOT NULL,
+    attempts INTEGER NOT NULL DEFAULT 0, parts TEXT, size INTEGER NOT NULL DEFAULT 0,
+    timings TEXT NOT NULL DEFAULT '{}', used REAL NOT NULL
+);
+CREATE TABLE IF NOT EXISTS jobs (
+    number INTEGER PRIMARY KEY AUTOINCREMENT, id TEXT UNIQUE NOT NULL, identity TEXT NOT NULL,
+    name TEXT NOT NULL, status TEXT NOT NULL, stage TEXT NOT NULL,
+    progress REAL NOT NULL, created REAL NOT NULL, started REAL,
+    finished REAL, timings TEXT NOT NULL, found TEXT NOT NULL, problem TEXT
+);
+CREATE INDEX IF NOT EXISTS jobs_by_work ON jobs (identity);
+CREATE INDEX IF NOT EXISTS jobs_by_status ON jobs (status);
+"""
+_COLUMNS = "id, identity, name, status, stage, progress, created, started, finished, timings, found, problem"
+
+
+@dataclass(frozen=True)
+class Job:
+    """One client's wish. timings: seconds per stage; found: where each came from. Times are Unix times."""
+
+    id: str
+    identity: str
+    name: str
+    status: Status = "queued"
+    stage: str = ""
+    progress: float = 0.0
+    created: float = 0.0
+    started: float | None = None
+    finished: float | None = None
+    timings: dict[str, float] = field(default_factory=dict)
+    found: dict[str, str] = field(default_factory=dict)
+    problem: dict[str, Any] | None = None
+
+    @property
+    def is_over(self) -> bool:
+        return self.status in ("done", "failed", "cancelled")
+
+    def document(self, position: int | None = None) -> dict[str, Any]:
+        """The contract's Job. position: jobs that run before it."""
+        content = asdict(self)
+        del content["identity"]
+        for name in ("created", "started", "finished"):
+            content[name] = content[name] and _iso(content[name])
+        return content | {"queue_position": position}
+
+
+@dataclass(frozen=True)
+class Work:
+    """parts: where each part stands in the unpacked result; None until it is finished."""
+
+    identity: str
+    surface: str
+    wanted: Wanted
+    attempts: int = 0
+    parts: dict[str, tuple[int, int]] | None = None
+    timings: dict[str, float] = field(default_factory=dict)
+
+
+class FolderInUseError(Exception):
+    """Another server works in this folder."""
+
+
+class Store:
+    """All methods are short; those that read or write whole files say so."""
+
+    def __init__(self, folder: Path) -> None:
+        """Raises FolderInUseError, OSError."""
+        self.folder = folder
+        self.surfaces = folder / "surfaces"
+        self.results = folder / "results"
+        self.stages = folder / "stages"
+        for path in (self.surfaces, self.results, self.stages):
+            path.mkdir(parents=True, exist_ok=True)
+        self._lock = _locked(folder / "lock.sqlite3")
+        self._db = sqlite3.connect(folder / "hexwrap.sqlite3", check_same_thread=False, isolation_level=None)
+        self._db.execute("PRAGMA journal_mode = WAL")
+        self._db.execute("PRAGMA synchronous = NORMAL")
+        self._db.executescript(_SCHEMA)
+
+    def close(self) -> None:
+        self._db.close()
+        self._lock.close()
+
+    # surfaces (files)
+
+    def keep_surface(self, id: str, data: bytes) -> None:
+        path = self._surface(id)
+        if path.exists():
+            path.touch()
+        else:
+            write_whole(path, data)
+
+    def has_surface(self, id: str) -> bool:
+        return HEX_ID.fullmatch(id) is not None and self._surface(id).exists()
+
+    def surface(self, id: str) -> bytes:
+        """Raises OSError."""
+        return self._surface(id).read_bytes()
+
+    # works
+
+    def work(self, identity: str) -> Work | None:
+        row = self._db.execute(
+            "SELECT identity, surface, wanted, attempts, parts, timings FROM works WHERE identity = ?",
+            (identity,),
+        ).fetchone()
+        if row is None:
+            return None
+        identity, surface, wanted, attempts, parts, timings = row
+        return Work(
+            identity,
+            surface,
+            codec.decode(wanted),
+            attempts,
+            json.loads(parts or "null"),
+            json.loads(timings),
+        )
+
+    def finished_work(self, identity: str) -> Work | None:
+        """The work, if its result is there."""
+        work = self.work(identity)
+        if work is None or work.parts is None or not self.result_path(identity).exists():
+            return None
+        self._db.execute("UPDATE works SET used = ? WHERE identity = ?", (time.time(), identity))
+        return work
+
+    def keep_outcome(self, identity: str, outcome: Outcome) -> None:
+        """The files of a result; ``done`` comes after. Raises OSError."""
+        write_whole(self.solution_path(identity), outcome.solution)
+        write_whole(self.result_path(identity), outcome.result)
+
+    def result_path(self, identity: str) -> Path:
+        return self.results / f"{identity}.json.gz"
+
+    def solution_path(self, identity: str) -> Path:
+        return self.results / f"{identity}.solution"
+
+    # jobs and their transitions
+
+    def add(self, job: Job, work: Work) -> None:
+        with self._transaction():
+            self._db.execute(
+                "INSERT INTO works (identity, surface, wanted, used) VALUES (?, ?, ?, ?) "
+                "ON CONFLICT (identity) DO UPDATE SET used = excluded.used",
+                (work.identity, work.surface, codec.encode(work.wanted), time.time()),
+            )
+            marks = ", ".join("?" * len(_COLUMNS.split(",")))
+            self._db.execute(f"INSERT INTO jobs ({_COLUMNS}) VALUES ({marks})", _row(job))
+
+    def start_work(self, identity: str) -> None:
+        self._db.execute("UPDATE works SET attempts = attempts + 1 WHERE identity = ?", (identity,))
+
+    def take_back(self, identity: str) -> None:
+        """The server stops before the work is done, through no fault of the work."""
+        self._db.execute("UPDATE works SET attempts = MAX(attempts - 1, 0) WHERE identity = ?", (identity,))
+
+    def finish_work(self, identity: str, outcome: Outcome) -> None:
+        size = len(outcome.result) + len(outcome.solution)
+        self._db.execute(
+            "UPDATE works SET attempts = 0, parts = ?, size = ?, timings = ?, used = ? WHERE identity = ?",
+            (json.dumps(outcome.parts), size, json.dumps(outcome.timings), time.time(), identity),
+        )
+
+    def update(self, jobs: Iterable[Job]) -> None:
+        """Write the present state of jobs."""
+        with self._transaction():
+            self._db.executemany(
+                "UPDATE jobs SET status = ?, stage = ?, progress = ?, started = ?, finished = ?, "
+                "timings = ?, found = ?, problem = ? WHERE id = ?",
+                [(j.status, j.stage, j.progress, j.started, j.finished, *_row(j)[-3:], j.id) for j in jobs],
+            )
+
+    def job(self, id: str) -> Job | None:
+        row = self._db.execute(f"SELECT {_COLUMNS} FROM jobs WHERE id = ?", (id,)).fetchone()
+        return row and _job(row)
+
+    def jobs(self, limit: int) -> list[Job]:
+        """Newest first."""
+        rows = self._db.execute(f"SELECT {_COLUMNS} FROM jobs ORDER BY number DESC LIMIT ?", (limit,))
+        return [_job(row) for row in rows]
+
+    def unfinished(self) -> list[Job]:
+        """Oldest first."""
+        rows = self._db.execute(
+            f"SELECT {_COLUMNS} FROM jobs WHERE status IN ('queued', 'running') ORDER BY number"
+        )
+        return [replace(_job(row), status="queued", stage="", progress=0.0, started=None) for row in rows]
+
+    def forget(self, id: str) -> None:
+        self._db.execute("DELETE FROM jobs WHERE id = ?", (id,))
+
+    def prune_rows(self, days: float, result_bytes: float) -> dict[str, str]:
+        """Forget jobs and works that are too old or too much, oldest first; the rest with surfaces."""
+        oldest = time.time() - days * 86400
+        over = "status IN ('done', 'failed', 'cancelled')"
+        busy = "SELECT identity FROM jobs WHERE status IN ('queued', 'running')"
+        with self._transaction():
+            self._db.execute(f"DELETE FROM jobs WHERE {over} AND finished < ?", (oldest,))
+            listed = self._db.execute(
+                f"SELECT identity, size, used FROM works WHERE identity NOT IN ({busy}) ORDER BY used DESC"
+            ).fetchall()
+            gone, total = [], 0
+            for identity, size, used in listed:
+                total += size
+                if total > result_bytes or used < oldest:
+                    gone.append((identity,))
+            self._db.executemany(f"DELETE FROM jobs WHERE identity = ? AND {over}", gone)
+            self._db.executemany("DELETE FROM works WHERE identity = ?", gone)
+        return dict(self._db.execute("SELECT identity, surface FROM works"))
+
+    def prune_files(self, works: dict[str, str], result_bytes: float, stage_bytes: float) -> None:
+        """Delete the files that no work needs any more. Touches many files."""
+        surfaces = set(works.values())
+        prune(self.results, 0.0, keep=lambda name: name.partition(".")[0] in works)
+        prune(self.surfaces, result_bytes, keep=lambda name: name.partition(".")[0] in surfaces)
+        prune(self.stages, stage_bytes)
+
+    @contextlib.contextmanager
+    def _transaction(self) -> Any:
+        self._db.execute("BEGIN IMMEDIATE")
+        try:
+            yield
+        except BaseException:
+            self._db.execute("ROLLBACK")
+            raise
+        self._db.execute("COMMIT")
+
+    def _surface(self, id: str) -> Path:
+        return self.surfaces / f"{id}.surface"
+
+
+def _locked(path: Path) -> sqlite3.Connection:
+    """A lock that every system frees when the process ends, in whatever way."""
+    lock = sqlite3.connect(path, timeout=0, check_same_thread=False, isolation_level=None)
+    try:
+        lock.execute("PRAGMA locking_mode = EXCLUSIVE")
+        lock.execute("BEGIN EXCLUSIVE")
+    except sqlite3.OperationalError:
+        lock.close()
+        raise FolderInUseError(
+            f"Another hexwrap server works in {path.parent}; give this one its own --data."
+        ) from None
+    return lock
+
+
+def _row(job: Job) -> tuple[Any, ...]:
+    return (
+        job.id,
+        job.identity,
+        job.name,
+        job.status,
+        job.stage,
+        job.progress,
+        job.created,
+        job.started,
+        job.finished,
+        json.dumps(job.timings),
+        json.dumps(job.found),
+        None if job.problem is None else json.dumps(job.problem),
+    )
+
+
+def _job(row: tuple[Any, ...]) -> Job:
+    values = dict(zip(_COLUMNS.split(", "), row, strict=True))
+    for name in ("timings", "found", "problem"):
+        values[name] = values[name] and json.loads(values[name])
+    return Job(**values)
+
+
+def _iso(moment: float) -> str:
+    return datetime.fromtimestamp(moment, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")

@@ -1,0 +1,72 @@
+"""Uploaded files, read in a worker process under its limits."""
+
+from __future__ import annotations
+
+import io
+from typing import Any
+
+import python_multipart
+from python_multipart.exceptions import FormParserError
+
+from hexwrap_server.problems import FormError
+from hexwrap_server.reading import read_surface
+from hexwrap_server.requests import CacheSettings, Intake, SentSurface
+from hexwrap_server.work import checked
+from hexwrap_server.worker import Report
+from hexwrap_solver.surface.types import MeshSettings, NurbsSurface
+
+
+class UploadError(FormError):
+    slug = "upload"
+    title = "The upload cannot be read"
+
+
+class TooManyVerticesError(FormError):
+    slug = "too-many-vertices"
+    title = "The surface has too many vertices"
+
+
+def read_upload(
+    report: Report,
+    body: bytes,
+    content_type: str,
+    name: str,
+    max_vertices: int,
+    caching: CacheSettings,
+) -> Intake:
+    """A file sent raw (with its name) or in a form → checked surface. Raises UploadError, SurfaceError."""
+    if content_type.lower().startswith("multipart/"):
+        name, body = only_file(body, content_type)
+    read = read_surface(body, name)
+    if isinstance(read, NurbsSurface):
+        return checked(
+            report, SentSurface(nurbs=read, meshing=MeshSettings(max_vertices=max_vertices)), caching
+        )
+    if len(read.vertices) > max_vertices:
+        raise TooManyVerticesError(
+            f"The file holds {len(read.vertices)} vertices, this server takes at most {max_vertices}; send a "
+            "coarser mesh, or start the server with a larger --max-vertices."
+        )
+    return checked(report, SentSurface(mesh=read), caching)
+
+
+def only_file(body: bytes, content_type: str) -> tuple[str, bytes]:
+    """Name and contents of the one file in a multipart form. Raises UploadError."""
+    files: list[tuple[str, bytes]] = []
+
+    def take(file: Any) -> None:
+        file.file_object.seek(0)
+        files.append(((file.file_name or b"").decode("utf-8", "replace"), file.file_object.read()))
+        file.close()
+
+    headers: dict[str, Any] = {
+        "Content-Type": content_type.encode(),
+        "Content-Length": str(len(body)).encode(),
+    }
+    try:
+        python_multipart.parse_form(headers, io.BytesIO(body), lambda field: None, take)
+    except (FormParserError, ValueError) as error:
+        raise UploadError(f"The multipart form cannot be read: {error}.") from None
+    if len(files) != 1:
+        raise UploadError(f"The form holds {len(files)} files; send exactly one.")
+    return files[0]

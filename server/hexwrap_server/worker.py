@@ -1,0 +1,276 @@
+"""One worker process, seen from inside (``main``) and from outside (``WorkerProcess``).
+
+The two talk in frames (a length, then a pickle) over the worker's standard input and output. Every worker
+has pipes of its own, so that one that is killed in the middle of a sentence garbles nobody else's. When the
+parent dies, however it dies, the worker reads the end of its input and leaves.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import pickle
+import queue
+import signal
+import struct
+import subprocess
+import sys
+import threading
+import time
+import traceback
+from collections.abc import Callable
+from importlib import import_module
+from typing import IO, Any
+
+import psutil
+
+from hexwrap_solver.errors import HexwrapError
+
+#: Two workers with two BLAS threads each are many times slower than with one each.
+ONE_THREAD = dict.fromkeys(
+    (
+        "OMP_NUM_THREADS",
+        "OPENBLAS_NUM_THREADS",
+        "MKL_NUM_THREADS",
+        "VECLIB_MAXIMUM_THREADS",
+        "NUMEXPR_NUM_THREADS",
+    ),
+    "1",
+)
+#: Seconds between two looks at a worker's memory and clock.
+WATCH_INTERVAL = 0.1
+#: Seconds between two progress messages of one job.
+REPORT_INTERVAL = 0.05
+_LENGTH = struct.Struct("<Q")
+
+#: A function's listener: stage, fraction of the whole 0..1, a few words.
+Report = Callable[[str, float, str], None]
+
+
+class WorkError(HexwrapError):
+    """The work ended without a result, and not because of what was asked."""
+
+
+class TimeLimitError(WorkError):
+    slug = "time-limit"
+    title = "The job took too long"
+
+
+class MemoryLimitError(WorkError):
+    slug = "memory-limit"
+    title = "The job needed too much memory"
+
+
+class WorkerDiedError(WorkError):
+    slug = "worker-died"
+    title = "The worker process died"
+
+
+class InternalError(WorkError):
+    slug = "internal"
+    title = "A fault in hexwrap"
+
+
+class WorkerProcess:
+    """A worker seen from its parent. All methods but ``stop`` belong to one thread."""
+
+    def __init__(self, preload: str = "") -> None:
+        self._preload = preload
+        self._process: subprocess.Popen[bytes] | None = None
+        self._reason: WorkError | None = None
+        self._stopped = False
+
+    def start(self) -> None:
+        """Start the process; it imports what it needs while the parent goes on."""
+        paths = [os.path.abspath(p) for p in sys.path if p]
+        self._stopped = False
+        environment = os.environ | ONE_THREAD | {"PYTHONPATH": os.pathsep.join(paths)}
+        self._process = subprocess.Popen(
+            [sys.executable, "-P", "-c", "from hexwrap_server.worker import main; main()", self._preload],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            env=environment,
+        )
+
+    def wait_ready(self) -> None:
+        """Until the worker has imported everything. Raises WorkerDiedError."""
+        if self._read()[0] != "ready":
+            raise self._death()
+
+    @property
+    def pid(self) -> int:
+        return self._process.pid if self._process else 0
+
+    @property
+    def is_alive(self) -> bool:
+        return not self._stopped and self._process is not None and self._process.poll() is None
+
+    def run(
+        self, function: str, arguments: tuple[Any, ...], report: Report, seconds: float, mib: float
+    ) -> Any:
+        """Call ``module:function`` with a listener and the arguments in the worker.
+
+        Raises what the function raised if that is a HexwrapError, or a WorkError.
+        """
+        self._reason = None
+        done = threading.Event()
+        watch = threading.Thread(target=self._watch, args=(done, seconds, mib), daemon=True)
+        watch.start()
+        try:
+            self._write((function, arguments))
+            while True:
+                kind, *content = self._read()
+                if kind == "progress":
+                    report(*content)
+                elif kind == "result":
+                    return content[0]
+                elif kind == "error":
+                    raise content[0]
+                else:
+                    raise self._death()
+        finally:
+            done.set()
+            watch.join()
+
+    def stop(self) -> None:
+        """Kill the worker, whatever it does. Safe from any thread."""
+        self._stopped = True
+        process = self._process
+        if process is not None:
+            with contextlib.suppress(OSError):
+                process.kill()
+
+    def close(self) -> None:
+        """Kill the worker and leave nothing of it."""
+        process = self._process
+        if process is None:
+            return
+        self.stop()
+        process.wait()
+        for pipe in (process.stdin, process.stdout):
+            with contextlib.suppress(OSError):
+                if pipe:
+                    pipe.close()
+        self._process = None
+
+    def _watch(self, done: threading.Event, seconds: float, mib: float) -> None:
+        deadline = time.monotonic() + seconds
+        try:
+            process = psutil.Process(self.pid)
+            while not done.wait(WATCH_INTERVAL):
+                used = process.memory_info().rss / 2**20
+                if time.monotonic() > deadline:
+                    self._reason = _too_long(seconds)
+                elif used > mib:
+                    self._reason = _too_much(used, mib)
+                if self._reason:
+                    self.stop()
+                    return
+        except psutil.NoSuchProcess:  # it ended by itself; the reader finds out
+            return
+
+    def _write(self, message: object) -> None:
+        assert self._process is not None
+        assert self._process.stdin is not None
+        try:
+            _write_frame(self._process.stdin, message)
+        except OSError:
+            raise self._death() from None
+
+    def _read(self) -> tuple[Any, ...]:
+        assert self._process is not None
+        assert self._process.stdout is not None
+        return _read_frame(self._process.stdout) or ("end",)
+
+    def _death(self) -> WorkError:
+        assert self._process is not None
+        code = self._process.wait()
+        return self._reason or WorkerDiedError(
+            f"The worker process that ran the job ended unexpectedly (exit status {code}); other jobs are "
+            "not affected. Send the job again; if it happens again, make the mesh or the pattern coarser.",
+            data={"exit_status": code},
+        )
+
+
+def _too_long(seconds: float) -> WorkError:
+    return TimeLimitError(
+        f"The job was stopped after {seconds:g} s, the limit of this server; make the mesh or the pattern "
+        "coarser, or start the server with a larger --job-seconds."
+    )
+
+
+def _too_much(used: float, mib: float) -> WorkError:
+    return MemoryLimitError(
+        f"The job was stopped at {used:.0f} MiB of memory, the limit of this server is {mib:g} MiB; make the "
+        "mesh or the pattern coarser, or start the server with a larger --job-mib."
+    )
+
+
+def main() -> None:
+    """The life of a worker: take a call, answer, until the parent is gone."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C goes to the whole console; the parent decides
+    inlet = os.fdopen(os.dup(0), "rb")
+    outlet = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # whatever libraries print must not end up between the frames
+    calls: queue.SimpleQueue[tuple[str, tuple[Any, ...]]] = queue.SimpleQueue()
+    threading.Thread(target=_listen, args=(inlet, calls), daemon=True).start()
+    for module in filter(None, sys.argv[1:]):
+        import_module(module)
+    _write_frame(outlet, ("ready",))
+    while True:
+        function, arguments = calls.get()
+        _write_frame(outlet, _answer(function, arguments, _reporter(outlet)))
+
+
+def _listen(inlet: IO[bytes], calls: queue.SimpleQueue[tuple[str, tuple[Any, ...]]]) -> None:
+    while (call := _read_frame(inlet)) is not None:
+        calls.put((call[0], call[1]))
+    os._exit(0)
+
+
+def _answer(function: str, arguments: tuple[Any, ...], report: Report) -> tuple[Any, ...]:
+    try:
+        module, name = function.split(":")
+        return "result", getattr(import_module(module), name)(report, *arguments)
+    except HexwrapError as error:
+        return "error", error
+    except MemoryError:
+        return "error", MemoryLimitError("The job ran out of memory; make the mesh or the pattern coarser.")
+    except Exception as error:
+        traceback.print_exc()
+        return "error", InternalError(
+            f"The job failed because of a fault in hexwrap, not in the request "
+            f"({type(error).__name__}: {error}); please report it together with the request."
+        )
+
+
+def _reporter(outlet: IO[bytes]) -> Report:
+    last = ("", 0.0)
+
+    def report(stage: str, fraction: float, what: str) -> None:
+        nonlocal last
+        now = time.monotonic()
+        if stage != last[0] or now - last[1] >= REPORT_INTERVAL:
+            last = (stage, now)
+            _write_frame(outlet, ("progress", stage, fraction, what))
+
+    return report
+
+
+def _write_frame(pipe: IO[bytes], message: object) -> None:
+    data = pickle.dumps(message, protocol=5)
+    pipe.write(_LENGTH.pack(len(data)))
+    pipe.write(data)
+    pipe.flush()
+
+
+def _read_frame(pipe: IO[bytes]) -> tuple[Any, ...] | None:
+    try:
+        head = pipe.read(_LENGTH.size)
+        if len(head) < _LENGTH.size:
+            return None
+        (length,) = _LENGTH.unpack(head)
+        data = pipe.read(length)
+        return pickle.loads(data) if len(data) == length else None
+    except (OSError, EOFError, ValueError):
+        return None

@@ -1,0 +1,60 @@
+"""A real server on a free port of this machine, in a thread of the test process."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import httpx
+import uvicorn
+
+from hexwrap_server.app import create_app, open_listener
+from hexwrap_server.engine import Engine
+from hexwrap_server.service import Service
+from hexwrap_server.settings import Settings
+
+
+class Live(httpx.Client):
+    """A client of a running server, and the server's inside."""
+
+    service: Service
+
+
+@contextmanager
+def running(data: Path, engine: Engine | None = None, **settings: Any) -> Iterator[Live]:
+    """A server that keeps its things in data."""
+    settings = {"workers": 2, "data": str(data)} | settings
+    app = create_app(Settings(**settings), engine)
+    listener = open_listener(Settings(port=0))
+    server = uvicorn.Server(
+        uvicorn.Config(
+            app, log_level="warning", access_log=False, timeout_graceful_shutdown=1, server_header=False
+        )
+    )
+    thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
+    thread.start()
+    try:
+        while not server.started and thread.is_alive():
+            time.sleep(0.01)
+        port = listener.getsockname()[1]
+        with Live(base_url=f"http://127.0.0.1:{port}", timeout=60, trust_env=False) as client:
+            client.service = app.state.service
+            yield client
+    finally:
+        server.should_exit = True
+        thread.join(20)
+        listener.close()
+
+
+def finished(client: httpx.Client, id: str, seconds: float = 60) -> dict[str, Any]:
+    """The job when it is over."""
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline:
+        job: dict[str, Any] = client.get(f"/v1/jobs/{id}", params={"wait": 10}).json()
+        if job["status"] in ("done", "failed", "cancelled"):
+            return job
+    raise AssertionError(f"job {id} is not over after {seconds} s")

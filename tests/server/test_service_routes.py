@@ -1,0 +1,174 @@
+"""The contract's routes, against a real server."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from tests.server.bodies import request, tube
+from tests.server.live import Live, finished, running
+
+
+@pytest.fixture(scope="module")
+def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Live]:
+    with running(tmp_path_factory.mktemp("data"), workers=1) as live:
+        yield live
+
+
+@pytest.fixture(scope="module")
+def done(client: Live) -> str:
+    """Id of a finished job."""
+    id: str = client.post("/v1/jobs", json=request(name="tower")).json()["id"]
+    assert finished(client, id)["status"] == "done"
+    return id
+
+
+def test_health_tells_version_and_load(client: Live) -> None:
+    answer = client.get("/health")
+    assert answer.json()["status"] == "ok"
+    assert {"version", "workers", "queued", "running"} <= answer.json().keys()
+    assert answer.headers["server"].startswith("hexwrap/")
+
+
+def test_job_is_accepted_with_its_address(client: Live) -> None:
+    answer = client.post("/v1/jobs", json=request(pattern={"around": 10}))
+    assert answer.status_code == 202
+    assert answer.headers["location"] == f"/v1/jobs/{answer.json()['id']}"
+    job = finished(client, answer.json()["id"])
+    assert job["status"] == "done"
+    assert job["progress"] == 1.0
+    assert job["timings"].keys() >= {"surface", "map", "pattern", "panels", "quality"}
+
+
+def test_result_has_every_part_and_the_parts_agree(client: Live, done: str) -> None:
+    result = client.get(f"/v1/jobs/{done}/result").json()
+    assert {"mesh", "map", "pattern", "panels", "sizes", "quality"} <= result.keys()
+    n, m = len(result["mesh"]["vertices"]), len(result["mesh"]["faces"])
+    assert np.shape(result["map"]["uv"]) == (n, 2)
+    assert np.shape(result["map"]["sheet"]) == (m, 3)
+    panels = result["panels"]
+    assert {len(v) for v in panels.values() if isinstance(v, list)} == {len(panels["polygons"])}
+    assert sum(size["count"] for size in result["sizes"]) == len(panels["polygons"])
+    assert len(set(panels["label"])) == len(panels["label"])
+    assert result["quality"]["overlaps"] == 0
+
+
+def test_corners_of_faces_have_the_scaled_lengths(client: Live, done: str) -> None:
+    """The contract's reading of uv, sheet and deck: e^{(u_i+u_j)/2} l_ij is measured in the plane."""
+    result = client.get(f"/v1/jobs/{done}/result", params={"include": "mesh,map"}).json()
+    vertices, faces = np.array(result["mesh"]["vertices"]), np.array(result["mesh"]["faces"])
+    uv = np.array(result["map"]["uv"]) @ [1, 1j]
+    deck = result["map"]["deck"]
+    assert deck["angle"] == 0
+    corners = uv[faces] + np.array(result["map"]["sheet"]) * complex(*deck["translation"])
+    u = np.array(result["map"]["log_scale"])[faces]
+    scale = np.exp((u + np.roll(u, -1, 1)) / 2)
+    length = np.linalg.norm(vertices[faces] - vertices[np.roll(faces, -1, 1)], axis=2)
+    assert np.allclose(np.abs(corners - np.roll(corners, -1, 1)), scale * length, rtol=1e-7)
+
+
+def test_include_picks_parts(client: Live, done: str) -> None:
+    full = client.get(f"/v1/jobs/{done}/result").json()
+    some = client.get(f"/v1/jobs/{done}/result", params={"include": "sizes,map"}).json()
+    assert some == {"map": full["map"], "sizes": full["sizes"]}
+    wrong = client.get(f"/v1/jobs/{done}/result", params={"include": "sizes,mops"})
+    assert wrong.status_code == 422
+    assert wrong.json()["errors"][0]["parameter"] == "include"
+
+
+def test_solve_answers_with_the_result_itself(client: Live, done: str) -> None:
+    answer = client.post("/v1/solve", json=request(name="tower"))
+    assert answer.status_code == 200
+    assert answer.json() == client.get(f"/v1/jobs/{done}/result").json()
+
+
+@pytest.mark.parametrize(
+    ("left_out", "parts"),
+    [({"panels": None}, ("panels",)), ({"pattern": None}, ("pattern", "panels"))],
+)
+def test_null_stops_after_a_stage(client: Live, left_out: dict[str, None], parts: tuple[str, ...]) -> None:
+    result = client.post("/v1/solve", json=request(**left_out)).json()
+    assert all(result[part] is None for part in parts)
+    assert result["quality"]["scale_ratio"] >= 1
+
+
+def test_surface_is_sent_once_and_named_afterwards(client: Live) -> None:
+    answer = client.post("/v1/surfaces", json=tube())
+    assert answer.status_code == 201
+    known = answer.json()
+    assert (known["vertices"], known["faces"], len(known["loops"])) == (240, 432, 2)
+    by_id = client.post("/v1/solve", json={"surface": {"id": known["id"]}, "pattern": {"around": 12}})
+    assert by_id.json() == client.post("/v1/solve", json=request()).json()
+
+
+def test_jobs_are_listed_newest_first(client: Live, done: str) -> None:
+    newer = client.post("/v1/jobs", json=request(name="newer")).json()["id"]
+    listed = [job["id"] for job in client.get("/v1/jobs", params={"limit": 1000}).json()["jobs"]]
+    assert listed.index(newer) < listed.index(done)
+    assert len(client.get("/v1/jobs", params={"limit": 1}).json()["jobs"]) == 1
+
+
+def test_events_end_with_how_the_job_ended(client: Live) -> None:
+    id = client.post("/v1/jobs", json=request(pattern={"around": 14})).json()["id"]
+    with client.stream("GET", f"/v1/jobs/{id}/events") as stream:
+        assert stream.headers["content-type"].startswith("text/event-stream")
+        lines = list(stream.iter_lines())
+    names = [line.removeprefix("event: ") for line in lines if line.startswith("event: ")]
+    assert names[-1] == "done"
+    assert set(names[:-1]) == {"progress"}
+
+
+def test_finished_job_is_forgotten(client: Live) -> None:
+    id = client.post("/v1/jobs", json=request(name="short-lived")).json()["id"]
+    finished(client, id)
+    assert client.delete(f"/v1/jobs/{id}").status_code == 204
+    assert client.get(f"/v1/jobs/{id}").status_code == 404
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "status", "slug"),
+    [
+        ("GET", "/nowhere", 404, "not-found"),
+        ("PUT", "/v1/jobs", 405, "method-not-allowed"),
+        ("GET", "/v1/jobs/unknown", 404, "not-found"),
+        ("DELETE", "/v1/jobs/unknown", 404, "not-found"),
+        ("GET", "/v1/jobs/unknown/events", 404, "not-found"),
+        ("GET", "/v1/jobs?limit=0", 422, "invalid-request"),
+        ("GET", "/v1/jobs/unknown?wait=nan", 422, "invalid-request"),
+        ("GET", "/v1/jobs/unknown/files/panels.exe", 404, "not-found"),
+        ("GET", "/v1/jobs/../../etc/passwd", 404, "not-found"),
+    ],
+)
+def test_refusals_are_problems(client: Live, method: str, path: str, status: int, slug: str) -> None:
+    answer = client.request(method, path)
+    assert answer.status_code == status
+    assert answer.headers["content-type"] == "application/problem+json"
+    assert answer.json()["type"] == f"/problems/{slug}"
+    assert answer.json()["status"] == status
+
+
+def test_unsolvable_surface_is_a_problem_with_its_faults(client: Live) -> None:
+    open_disk = {"vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "faces": [[0, 1, 2]]}
+    id = client.post("/v1/jobs", json={"surface": open_disk}).json()["id"]
+    job = finished(client, id)
+    assert job["status"] == "failed"
+    answer = client.get(f"/v1/jobs/{id}/result")
+    assert answer.status_code == 422
+    assert answer.json() == job["problem"] == client.post("/v1/solve", json={"surface": open_disk}).json()
+    assert client.post("/v1/surfaces", json=open_disk).json()["type"] == job["problem"]["type"]
+
+
+@pytest.mark.parametrize(
+    "name", ["panels.obj", "panels.3dm", "panels.dxf", "panels.csv", "flat.dxf", "domain.svg", "result.npz"]
+)
+def test_files_are_written(client: Live, done: str, name: str) -> None:
+    answer = client.get(f"/v1/jobs/{done}/files/{name}")
+    assert answer.status_code == 200
+    assert answer.headers["content-disposition"] == f'attachment; filename="{name}"'
+    assert len(answer.content) > 1000
+
+
+def test_result_file_is_the_result(client: Live, done: str) -> None:
+    file = client.get(f"/v1/jobs/{done}/files/result.json")
+    assert file.json() == client.get(f"/v1/jobs/{done}/result").json()
