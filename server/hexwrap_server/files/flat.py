@@ -22,7 +22,7 @@ SPACE = 0.04
 SHEET = (6, 4)
 #: Heights of the texts and the distance of the neighbours' names from their edges, in parts of the inradius
 #: (of a triangle these leave room for one another, too).
-LABEL, SIZE, NEIGHBOUR, INSET = 0.20, 0.13, 0.09, 0.10
+LABEL, SIZE, NEIGHBOUR, INSET = 0.20, 0.13, 0.11, 0.11
 
 
 @dataclass(frozen=True)

@@ -127,20 +127,19 @@ def _spans(camera: Camera, polygons: Polygons, rows: Ints) -> tuple[Ints, Ints, 
     wanted[rows] = True
     edge = np.flatnonzero(wanted[outline.row])
     p, q, owner = flat[edge], flat[outline.next()[edge]], outline.row[edge]
-    top = np.clip(np.ceil(np.minimum(p[:, 1], q[:, 1]) - 0.5), 0, camera.height).astype(np.int64)
-    bottom = np.clip(np.ceil(np.maximum(p[:, 1], q[:, 1]) - 0.5), 0, camera.height).astype(np.int64)
+    # From the upper end, so that two polygons round the edge between them alike and leave no crack.
+    upper = ((p[:, 1] < q[:, 1]) | ((p[:, 1] == q[:, 1]) & (p[:, 0] < q[:, 0])))[:, None]
+    p, q = np.where(upper, p, q), np.where(upper, q, p)
+    top, bottom = (np.clip(np.ceil(z[:, 1] - 0.5), 0, camera.height).astype(np.int64) for z in (p, q))
     count = bottom - top
     crossing = np.repeat(np.arange(len(edge)), count)
-    line = np.arange(len(crossing)) - np.repeat(np.cumsum(count) - count, count) + top[crossing]
+    line = np.arange(len(crossing)) - np.repeat(np.cumsum(count) - count - top, count)
     slope = np.divide(q[:, 0] - p[:, 0], q[:, 1] - p[:, 1], out=np.zeros(len(edge)), where=count > 0)
     x = p[crossing, 0] + slope[crossing] * (line + 0.5 - p[crossing, 1])
-    # One sort brings the crossings of each row and line together, from left to right: the whole part
-    # of the key tells row and line, the fraction the column (to a thousandth at 10⁹ pairs).
-    reach = camera.width + 4.0
-    column = np.clip(x, -1.0, camera.width + 1.0) + 2.0
-    key = np.sort(owner[crossing] * camera.height + line + column / reach)
-    slot = np.floor(key)
-    bounds = np.clip(np.ceil((key - slot) * reach - 2.5), 0, camera.width).astype(np.int64)
-    slot, first, last = slot[::2].astype(np.int64), bounds[::2], bounds[1::2]
+    column = np.clip(np.ceil(x - 0.5), 0, camera.width).astype(np.int64)
+    # One sort brings the crossings of each row and line together, from left to right.
+    reach = camera.width + 1
+    slot, column = np.divmod(np.sort((owner[crossing] * camera.height + line) * reach + column), reach)
+    slot, first, last = slot[::2], column[::2], column[1::2]
     there = last > first
     return (slot // camera.height)[there], (slot % camera.height)[there], first[there], last[there]

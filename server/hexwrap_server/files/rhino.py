@@ -80,7 +80,7 @@ def _mesh(vertices: list[Any], faces: list[Any]) -> rhino3dm.Mesh:
     mesh = rhino3dm.Mesh()
     mesh.Vertices.UseDoublePrecisionVertices = True
     for point in vertices:
-        mesh.Vertices.AddPoint3d(rhino3dm.Point3d(*point))
+        mesh.Vertices.AddPoint3d(*point)
     for face in faces:
         mesh.Faces.AddFace(*face)
     mesh.Normals.ComputeNormals()

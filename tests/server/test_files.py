@@ -1,0 +1,321 @@
+"""Every file is read back by a program that did not write it, and says what the arrays say."""
+
+from __future__ import annotations
+
+import csv
+import io
+import xml.etree.ElementTree as ET
+from dataclasses import replace
+from itertools import pairwise
+
+import ezdxf
+import numpy as np
+import pytest
+import rhino3dm
+import trimesh
+from matplotlib.image import imread
+from tests.server.analytic import cylinder
+
+from hexwrap_server.files import WRITERS, Meta, NotMadeError, SheetError, scene, write
+from hexwrap_server.files.dxf import object_coordinates
+from hexwrap_server.files.flat import lay_flat, pack
+from hexwrap_solver.arrays import Ragged
+from hexwrap_solver.panels.types import Components, Support
+from hexwrap_solver.pipeline import Solution
+
+ODD = Meta("Türme 塔 <&\"'> \n$x^2$")
+NEEDS_PANELS = ["panels.obj", "panels.3dm", "panels.dxf", "panels.csv", "flat.dxf", "panels.png"]
+
+
+@pytest.fixture(scope="module")
+def solution() -> Solution:
+    return cylinder()
+
+
+@pytest.fixture
+def small_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, value in {"HEIGHT": 400, "WIDTH": 420, "MARGIN": 20, "FINE": 1, "SUN_MAP": 300}.items():
+        monkeypatch.setattr(scene, name, value)
+
+
+def panels_of(solution: Solution) -> np.ndarray:
+    assert solution.panels is not None
+    return np.asarray(solution.panels.polygons.values).reshape(-1, 6, 3)
+
+
+def labels_of(solution: Solution) -> list[str]:
+    assert solution.pattern is not None
+    return solution.pattern.labels()
+
+
+def read_dxf(data: bytes) -> ezdxf.document.Drawing:
+    document = ezdxf.read(io.StringIO(data.decode()))
+    assert not document.audit().errors
+    return document
+
+
+def test_names_are_the_contracts() -> None:
+    assert set(WRITERS) == {*NEEDS_PANELS, "domain.svg", "result.json", "result.npz"}
+
+
+@pytest.mark.usefixtures("small_pictures")
+@pytest.mark.parametrize("name", WRITERS)
+def test_any_name_of_a_job_is_written(solution: Solution, name: str) -> None:
+    assert len(write(name, solution, ODD)) > 500
+
+
+@pytest.mark.parametrize("name", NEEDS_PANELS)
+def test_missing_stages_are_told(solution: Solution, name: str) -> None:
+    with pytest.raises(NotMadeError, match=r'"pattern": null'):
+        write(name, replace(solution, pattern=None, panels=None), ODD)
+    with pytest.raises(NotMadeError, match=r'"panels": null'):
+        write(name, replace(solution, panels=None), ODD)
+
+
+@pytest.mark.parametrize("name", NEEDS_PANELS)
+def test_a_pattern_without_a_panel_is_told(solution: Solution, name: str) -> None:
+    assert solution.panels is not None
+    empty = {key: getattr(solution.panels, key)[:0] for key in ("face", "size", "center", "normal")}
+    none = replace(
+        solution, panels=replace(solution.panels, polygons=Ragged(np.zeros((0, 3)), np.zeros(1, int)), **empty)
+    )
+    with pytest.raises(NotMadeError, match="no cell of the pattern became one"):
+        write(name, none, ODD)
+
+
+@pytest.mark.parametrize("name", ["domain.svg", "result.npz", "result.json"])
+def test_other_files_need_only_the_map(solution: Solution, name: str) -> None:
+    for less in (replace(solution, pattern=None, panels=None), replace(solution, panels=None)):
+        assert len(write(name, less, ODD)) > 500
+
+
+def test_obj_holds_every_panel_under_its_label(solution: Solution) -> None:
+    lines = write("panels.obj", solution, ODD).decode().splitlines()
+    vertices = np.array([line.split()[1:] for line in lines if line.startswith("v ")], dtype=float)
+    faces = {}
+    for name, face in pairwise(lines):
+        if name.startswith("o "):
+            faces[name[2:]] = vertices[np.array(face.split()[1:], dtype=int) - 1]
+    assert sorted(faces) == sorted(labels_of(solution))
+    ordered = np.array([faces[label] for label in labels_of(solution)])
+    assert ordered == pytest.approx(panels_of(solution), rel=1e-14)
+    assert [line for line in lines if line.startswith("g ")] == ["g size-00", "g size-01", "g size-02"]
+
+
+def test_obj_is_read_by_trimesh(solution: Solution) -> None:
+    mesh = trimesh.load(io.BytesIO(write("panels.obj", solution, ODD)), file_type="obj", force="mesh")
+    assert solution.panels is not None
+    assert mesh.area == pytest.approx(float(np.sum(1.5 * np.sqrt(3) * solution.panels.edge_length**2)))
+
+
+def test_csv_reads_back_to_the_last_digit(solution: Solution) -> None:
+    rows = list(csv.DictReader(io.StringIO(write("panels.csv", solution, ODD).decode(), newline="")))
+    assert solution.panels is not None
+    assert [row["label"] for row in rows] == labels_of(solution)
+    assert [float(row["edge_length"]) for row in rows] == solution.panels.edge_length.tolist()
+    for axis, letter in enumerate("xyz"):
+        assert [float(row[f"center_{letter}"]) for row in rows] == solution.panels.center[:, axis].tolist()
+
+
+def test_csv_neighbours_name_each_other(solution: Solution) -> None:
+    rows = csv.DictReader(io.StringIO(write("panels.csv", solution, ODD).decode(), newline=""))
+    names = {row["label"]: row["neighbours"].split() for row in rows}
+    for label, around in names.items():
+        assert len(around) == 6
+        assert all(label in names[other] for other in around if other != "-")
+    inner = [around for label, around in names.items() if label[:3] not in ("R00", "R04")]
+    assert all("-" not in around for around in inner)
+
+
+def test_csv_leaves_empty_what_was_not_measured(solution: Solution) -> None:
+    assert solution.quality.planarity is not None
+    unknown = solution.quality.planarity.copy()
+    unknown[0] = np.nan
+    less = replace(solution, quality=replace(solution.quality, planarity=unknown, surface_distance=None))
+    rows = list(csv.DictReader(io.StringIO(write("panels.csv", less, ODD).decode(), newline="")))
+    assert rows[0]["planarity"] == ""
+    assert rows[1]["planarity"] == "0.0"
+    assert all(row["surface_distance"] == "" for row in rows)
+
+
+def test_3dm_has_a_coloured_layer_per_size_and_data_on_every_panel(solution: Solution) -> None:
+    model = rhino3dm.File3dm.FromByteArray(write("panels.3dm", solution, ODD))
+    layers = {layer.Index: layer for layer in model.Layers}
+    names = [layer.Name for layer in layers.values()]
+    assert names == ["panels", "size-00 (0.8600)", "size-01 (0.8800)", "size-02 (0.9000)", "labels"]
+    assert len({layer.Color for layer in layers.values() if layer.Name.startswith("size")}) == 3
+    curves = [o for o in model.Objects if o.Geometry.ObjectType == rhino3dm.ObjectType.Curve]
+    assert [o.Attributes.Name for o in curves] == labels_of(solution)
+    for item, polygon in zip(curves, panels_of(solution), strict=True):
+        points = np.array([[p.X, p.Y, p.Z] for p in item.Geometry.ToPolyline()])
+        assert item.Geometry.IsClosed
+        assert points[:-1] == pytest.approx(polygon, abs=1e-12)
+        assert item.Attributes.GetUserString("label") == item.Attributes.Name
+        assert layers[item.Attributes.LayerIndex].Name.startswith(
+            f"size-{int(item.Attributes.GetUserString('size')):02d}"
+        )
+    dots = [o for o in model.Objects if o.Geometry.ObjectType == rhino3dm.ObjectType.TextDot]
+    assert [o.Geometry.Text for o in dots] == labels_of(solution)
+
+
+def test_3dm_carries_components_and_support(solution: Solution) -> None:
+    assert solution.panels is not None
+    assert solution.pattern is not None
+    n = solution.panels.n_panels
+    tetrahedron = np.tile(np.eye(4)[:, 1:] + np.array([1e6, 0, 0]), (n, 1, 1))
+    faces = np.tile(np.array([0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3]), (n, 1))
+    axes = np.eye(3)[np.zeros(n, dtype=int)]
+    components = Components(
+        solution.panels.polygons, solution.panels.center, axes, axes, axes,
+        Ragged.from_table(tetrahedron), Ragged.from_table(faces),
+    )  # fmt: skip
+    strips = np.array([[[0, 0, 0], [1, 0, 0], [1, 0, -0.5], [0, 0, -0.5]]], dtype=float)
+    support = Support(
+        np.array([[0, 0, 0], [1.0, 0, 0]]), np.array([[0, 0, 1.0]] * 2), np.array([[0, 1]]), strips,
+        np.zeros(1), np.zeros(2),
+    )  # fmt: skip
+    data = write("panels.3dm", replace(solution, components=components, support=support), ODD)
+    model = rhino3dm.File3dm.FromByteArray(data)
+    meshes = [o.Geometry for o in model.Objects if o.Geometry.ObjectType == rhino3dm.ObjectType.Mesh]
+    assert len(meshes) == n + 1
+    assert all(mesh.IsClosed for mesh in meshes[:n])
+    corner = meshes[0].Vertices.Point3dAt(1)
+    assert (corner.X, corner.Y, corner.Z) == (1e6 + 1, 0, 0)
+    lines = [o.Geometry for o in model.Objects if isinstance(o.Geometry, rhino3dm.LineCurve)]
+    assert [line.PointAtEnd.Z for line in lines] == [-0.5, -0.5]
+
+
+def test_dxf_in_space_has_the_panels_where_they_are(solution: Solution) -> None:
+    document = read_dxf(write("panels.dxf", solution, ODD))
+    lines = list(document.modelspace().query("POLYLINE"))
+    assert all(line.is_closed and line.is_3d_polyline for line in lines)
+    points = np.array([[v.dxf.location.xyz for v in line.vertices] for line in lines])
+    assert points == pytest.approx(panels_of(solution), abs=1e-9)
+    assert solution.panels is not None
+    assert [line.dxf.layer[:7] for line in lines] == [f"size-{s:02d}" for s in solution.panels.size]
+
+
+def test_dxf_labels_stand_at_the_centres(solution: Solution) -> None:
+    document = read_dxf(write("panels.dxf", solution, ODD))
+    assert solution.panels is not None
+    texts = list(document.modelspace().query("TEXT"))
+    assert [text.dxf.text for text in texts] == labels_of(solution)
+    places = np.array([text.ocs().to_wcs(text.dxf.align_point).xyz for text in texts])
+    assert places == pytest.approx(solution.panels.center, abs=1e-9)
+
+
+def test_object_coordinates_agree_with_ezdxf_on_every_side() -> None:
+    rng = np.random.default_rng(3)
+    normals = np.vstack([rng.normal(size=(50, 3)), np.eye(3), -np.eye(3), [[0.01, 0.0, 1.0]]])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    points = rng.normal(size=normals.shape)
+    expected = [ezdxf.math.OCS(n).from_wcs(p).xyz for n, p in zip(normals.tolist(), points, strict=True)]
+    assert object_coordinates(points, normals) == pytest.approx(np.array(expected), abs=1e-12)
+
+
+def test_flat_outlines_are_congruent_to_the_panels_and_apart(solution: Solution) -> None:
+    document = read_dxf(write("flat.dxf", solution, ODD))
+    query = document.modelspace().query("LWPOLYLINE")
+    outlines = np.array([line.get_points("xy") for line in query if line.dxf.layer != "sheets"])
+    assert solution.panels is not None
+    radius = np.linalg.norm(outlines - outlines.mean(axis=1, keepdims=True), axis=2)
+    assert radius == pytest.approx(np.repeat(solution.panels.edge_length[:, None], 6, 1), rel=1e-9)
+    low, high = outlines.min(axis=1), outlines.max(axis=1)
+    apart = np.any((low[:, None] > high) | (high[:, None] < low), axis=2)
+    assert np.all(apart | np.eye(len(low), dtype=bool))
+    sheets = np.array([line.get_points("xy") for line in query if line.dxf.layer == "sheets"])
+    inside = np.all((low[:, None] > sheets.min(axis=1)) & (high[:, None] < sheets.max(axis=1)), axis=2)
+    assert np.all(inside.sum(axis=1) == 1)
+
+
+def test_flat_outlines_name_panel_size_and_neighbours(solution: Solution) -> None:
+    document = read_dxf(write("flat.dxf", solution, ODD))
+    words = [text.dxf.text for text in document.modelspace().query('TEXT[layer=="labels"]')]
+    assert words[::2] == labels_of(solution)
+    assert words[1] == "00 / 0.8600"
+    assert solution.pattern is not None
+    neighbours = [text.dxf.text for text in document.modelspace().query('TEXT[layer=="neighbours"]')]
+    across = np.asarray(solution.pattern.neighbours.values)
+    assert neighbours == [labels_of(solution)[i] for i in across[across >= 0].tolist()]
+
+
+def test_flat_outlines_are_seen_from_outside(solution: Solution) -> None:
+    assert solution.panels is not None
+    corners = np.asarray(lay_flat(solution.panels).corners.values).reshape(-1, 6, 2)
+    z = corners[..., 0] + 1j * corners[..., 1]
+    assert np.all(np.sum((np.conj(z) * np.roll(z, -1, axis=1)).imag, axis=1) > 0)
+    assert z[:, 1] - z[:, 0] == pytest.approx(solution.panels.edge_length)
+
+
+def test_sheets_that_are_too_small_are_told(solution: Solution) -> None:
+    with pytest.raises(SheetError, match=r"60 panels are larger .* the first is R00-P000") as caught:
+        write("flat.dxf", solution, Meta(sheet=(1.0, 1.0)))
+    assert caught.value.data["panels"] == labels_of(solution)
+
+
+def test_sheets_of_a_given_size_are_kept_to() -> None:
+    extent = np.tile([2.0, 1.0], (7, 1))
+    places = pack(extent, np.zeros(7, dtype=int), (4.5, 2.5), ["x"] * 7)
+    assert places.sheet.tolist() == [0, 0, 0, 0, 1, 1, 1]
+    assert np.all(places.corner + extent <= [4.5, 2.5])
+
+
+def test_svg_draws_every_cell_once_in_one_piece(solution: Solution) -> None:
+    root = ET.fromstring(write("domain.svg", solution, ODD))
+    ns = {"s": "http://www.w3.org/2000/svg"}
+    paths = {p.attrib["class"]: p.attrib["d"] for p in root.iterfind(".//s:path", ns)}
+    cells = "".join(d for name, d in paths.items() if name.startswith("cells")).split("Z")[:-1]
+    assert len(cells) == len(labels_of(solution))
+    corners = np.array([[p.split() for p in cell[1:].split("L")] for cell in cells], dtype=float)
+    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+    assert sides == pytest.approx(np.full(sides.shape, sides.mean()), abs=0.02)
+    assert {"mesh", "cut", "loop0", "loop1"} <= set(paths)
+    assert [t.text for t in root.iterfind(".//s:text[@class='named halo']", ns)] == ["loop 0 →", "← loop 1"]
+    words = " ".join(t.text or "" for t in root.iterfind(".//s:text", ns))
+    assert "Türme 塔 <&\"'> $x^2$" in words
+    assert "cylinder, circumference 18.00; 60 cells" in words
+
+
+def test_svg_marks_corners_with_their_angles(solution: Solution) -> None:
+    bottom = solution.map.boundary_angles[0].copy()
+    bottom[[3, 5]] = 4 * np.pi / 3, np.pi / 3
+    cornered = replace(solution.map, boundary_angles=(bottom, solution.map.boundary_angles[1]))
+    root = ET.fromstring(write("domain.svg", replace(solution, map=cornered), ODD))
+    ns = {"s": "http://www.w3.org/2000/svg"}
+    assert [t.text for t in root.iterfind(".//s:text[@class='angle halo']", ns)] == ["4π/3", "π/3"]
+    assert len(root.findall(".//s:circle[@class='corner']", ns)) == 2
+
+
+def test_npz_holds_the_arrays_themselves(solution: Solution) -> None:
+    arrays = np.load(io.BytesIO(write("result.npz", solution, ODD)), allow_pickle=False)
+    assert solution.panels is not None
+    assert str(arrays["name"]) == ODD.name
+    assert np.array_equal(arrays["panels.polygons.values"], solution.panels.polygons.values)
+    assert np.array_equal(arrays["map.uv"][:, 0], solution.map.uv.real)
+    assert np.array_equal(arrays["mesh.loops.1"], solution.map.surface.loops[1])
+
+
+def test_picture_is_large_and_shows_every_size_and_white_around_it(solution: Solution) -> None:
+    image = imread(io.BytesIO(write("panels.png", solution, ODD)))
+    assert image.shape[0] >= 1600 or image.shape[1] >= 1600
+    assert np.all(image[[0, 0, -1], [0, -1, -1], :3] > 0.99)
+    hue = image[..., 0] - image[..., 2]
+    assert hue.max() > 0.3  # the longest edges are red, the shortest blue
+    assert hue.min() < -0.2
+
+
+@pytest.mark.usefixtures("small_pictures")
+@pytest.mark.parametrize("name", WRITERS)
+def test_far_from_the_origin_nothing_is_lost(name: str) -> None:
+    far = cylinder(around=6, rings=2, origin=(4.5e6, -5.4e6, 1e3))
+    assert len(write(name, far, ODD)) > 500
+
+
+@pytest.mark.usefixtures("small_pictures")
+def test_pictures_far_from_the_origin_are_the_same() -> None:
+    near, far = (
+        imread(io.BytesIO(write("panels.png", cylinder(6, 2, origin=at), Meta())))
+        for at in ((0, 0, 0), (4.5e6, -5.4e6, 1e3))
+    )
+    assert near.shape == far.shape
+    assert np.mean(np.abs(near - far) > 0.05) < 0.001
