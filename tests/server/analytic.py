@@ -43,7 +43,7 @@ def _bend(uv: Floats, turn: float, origin: Floats) -> tuple[Floats, Floats]:
 
 def _map(turn: float, height: float, columns: int, rows: int, origin: Floats) -> ConformalMap:
     x, y = np.meshgrid(np.arange(columns), np.arange(rows + 1))
-    uv = np.stack([x.ravel() * turn / columns, y.ravel() * height  / rows], axis=1)
+    uv = np.stack([x.ravel() * turn / columns, y.ravel() * height / rows], axis=1)
     points, normals = _bend(uv, turn, origin)
     i, j = (c.ravel() for c in np.meshgrid(np.arange(columns), np.arange(rows)))
     a, b = j * columns + i, j * columns + (i + 1) % columns

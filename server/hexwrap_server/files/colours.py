@@ -7,7 +7,7 @@ import numpy as np
 from hexwrap_solver.arrays import Floats, Ints
 
 #: From the shortest edge to the longest: cold and dark to warm, lightest in the middle.
-ANCHORS = ("#2b3a78", "#2f77a8", "#5fb3b0", "#b9dcae", "#f3e3a0", "#f0b265", "#dc6f4b", "#a32b45")
+ANCHORS = ("#34489c", "#3382c0", "#5dbcc0", "#b4dfb0", "#f6e6a2", "#f5b968", "#e6774d", "#b5304a")
 #: Panels without a size class (cut at the boundary).
 UNSIZED = "#b4b7bc"
 

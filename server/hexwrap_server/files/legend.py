@@ -29,7 +29,7 @@ def compose(image: Floats, panels: Panels, meta: Meta) -> bytes:
     figure = Figure(figsize=((width + WIDTH) / DPI, height / DPI), dpi=DPI, facecolor="white")
     FigureCanvasAgg(figure)
     picture = figure.add_axes((0, 0, width / (width + WIDTH), 1))
-    picture.imshow(image, interpolation="none", aspect="auto")
+    picture.imshow(np.rint(255 * image).astype(np.uint8), interpolation="none", aspect="auto")
     picture.set_axis_off()
     axes = figure.add_axes((width / (width + WIDTH), 0, WIDTH / (width + WIDTH), 1))
     axes.set(xlim=(0, WIDTH), ylim=(height, 0))

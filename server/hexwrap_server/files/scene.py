@@ -12,23 +12,24 @@ from hexwrap_server.files.raster import Camera, Polygons, draw, planes
 from hexwrap_solver.arrays import Bools, Floats, Ints
 
 #: Pixels: the model is fitted into this box, with room around it for its shadow on the ground.
-HEIGHT, WIDTH, MARGIN = 1600, 1700, 80
+HEIGHT, WIDTH, MARGIN = 1600, 1760, 110
 #: Samples per pixel and direction.
 FINE = 3
 #: Degrees: small, so that parallels stay nearly parallel.
 FIELD = 22.0
 #: The sun, relative to the view: right, up, towards the viewer. Its distance in radii of the model.
-SUN, SUN_DISTANCE = (-0.55, 0.70, 0.46), 40.0
+SUN, SUN_DISTANCE = (-0.52, 0.62, 0.72), 40.0
 #: Samples of the map of distances from the sun; places looked up per pixel; blur of a shadow's edge on the
 #: model and on the ground, in those samples; how much nearer, in radii, a thing must be to cast a shadow.
 SUN_MAP, TAPS, PENUMBRA, GROUND_BLUR, BIAS = 1200, 24, 5.0, 26.0, 0.012
-SUNLIGHT, SKYLIGHT, GLOSS, GLOSS_EXPONENT = 0.80, 0.36, 0.10, 40.0
+SUNLIGHT, SKYLIGHT, GLOSS, GLOSS_EXPONENT = 0.70, 0.52, 0.10, 40.0
 #: Blur radii in pixels, and depths in radii of the model, over which hollows darken.
 HOLLOWS = ((6.0, 0.03), (40.0, 0.25))
 SHELL, BACK = "#4a4f58", "#8d9199"
 #: What is left of the light on an outline; the panel width in pixels from which outlines have full strength.
 OUTLINE, OUTLINE_FULL = 0.25, 22.0
-GROUND_SHADOW = 0.34
+#: Darkest shadow on the ground; it fades towards the rim of the picture over this many pixels.
+GROUND_SHADOW, FADE = 0.32, 220.0
 
 
 @dataclass(frozen=True)
@@ -168,8 +169,15 @@ def _lit(
         near = meets & (depth < 4 * np.linalg.norm(camera.position))
         share = np.ones(len(down))
         share[near] = sun.reaches(down[near] * depth[near, None] + camera.position, GROUND_BLUR, 0.0)
-        lit[~hit] = share
+        lit[~hit] = 1 - (1 - share) * _fade(owner.shape)[~hit]
     return lit
+
+
+def _fade(shape: tuple[int, ...]) -> Floats:
+    """(h, w) from 0 at the rim of the picture to 1 inside, smoothly."""
+    rows, columns = (np.minimum(np.arange(n), n - 1 - np.arange(n)) for n in shape)
+    t = np.clip(np.minimum(rows[:, None], columns) / FADE, 0, 1)
+    return np.asarray(t * t * (3 - 2 * t))
 
 
 def _openness(nearest: Floats, radius: float) -> Floats:

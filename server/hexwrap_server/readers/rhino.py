@@ -17,7 +17,7 @@ SURFACES = (rhino3dm.Mesh, rhino3dm.Brep, rhino3dm.Surface)
 
 def read_3dm(data: bytes) -> SentMesh | NurbsSurface:
     """The only surface of the file. Raises SeveralObjectsError, UnreadableFileError."""
-    model: Any = rhino3dm.File3dm.FromByteArray(data)  # type: ignore[arg-type]  # its stubs want a list
+    model: Any = rhino3dm.File3dm.FromByteArray(data)
     if model is None:
         raise UnreadableFileError("The file is no Rhino file, or it is cut short: save it again from Rhino.")
     objects = [item for item in model.Objects if not item.Attributes.IsInstanceDefinitionObject]

@@ -40,7 +40,8 @@ class Poses:
 def corners(p: int) -> Floats:
     """(p, 2) corners of the regular p-gon of edge length 1 around the origin, the first on the x axis."""
     angle = 2 * np.pi * np.arange(p) / p
-    return np.stack([np.cos(angle), np.sin(angle)], axis=1) / (2 * np.sin(np.pi / p))
+    corner: Floats = np.stack([np.cos(angle), np.sin(angle)], axis=1) / (2 * np.sin(np.pi / p))
+    return corner
 
 
 def nearest_regular(points: Floats) -> Poses:
