@@ -52,6 +52,18 @@ def cone_angle(boundary_angles: Floats) -> float:
     return float((np.pi - boundary_angles).sum())
 
 
+def cone_angle_of(targets: Targets, sums: Floats, surface: Surface) -> float:
+    """K of a solution, exactly as prescribed where it is: Σκ over loop 0, or −Σκ over a tied loop 1.
+
+    sums: (n,) angle sums, prescribed or found.
+    """
+    if len(targets.tie_angle) > 1:
+        angle = float(targets.tie_angle[1]) - len(surface.loops[1]) * np.pi
+    else:
+        angle = cone_angle(sums[surface.loops[0]])
+    return snapped(angle)
+
+
 def snapped(angle: float) -> float:
     """The cone angle without rounding, see SNAP."""
     nearest = nearest_multiple(angle, np.pi / 6)

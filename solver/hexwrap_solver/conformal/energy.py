@@ -28,11 +28,13 @@ def opposite_lengths(vertices: Floats, faces: Ints) -> Floats:
 
     Differences come first, so a far-away origin costs no digits beyond those the data has lost already.
     """
-    corner = vertices[faces]
-    edge = np.stack([corner[:, (k + 2) % 3] - corner[:, (k + 1) % 3] for k in range(3)])
-    largest = np.abs(edge).max(initial=0.0) or 1.0
-    edge /= largest  # squares must neither overflow nor vanish
-    return np.asarray(np.sqrt(np.einsum("kmd,kmd->km", edge, edge)) * largest)
+    scale = np.ptp(vertices, axis=0).max() or 1.0  # squares must neither overflow nor vanish
+    square = np.zeros((3, len(faces)))
+    for coordinate in vertices.T:
+        corner = coordinate[faces.T]
+        edge = (corner[[2, 0, 1]] - corner[[1, 2, 0]]) / scale
+        square += edge * edge
+    return np.asarray(np.sqrt(square) * scale)
 
 
 @dataclass(frozen=True)
@@ -87,13 +89,22 @@ class Energy:
     def __init__(self, surface: Surface, targets: Targets) -> None:
         self.targets = targets
         self.n = len(surface.vertices)
+        self._vertices = surface.vertices
         self.corner = np.ascontiguousarray(surface.faces.T)
         self.lengths = opposite_lengths(surface.vertices, surface.faces)
         self.dof, self.n_dof = _unknowns(targets)
-        self.target = self._reduce(np.where(targets.tie < 0, targets.angle, 0.0))
+        self.target = self.reduce(np.where(targets.tie < 0, targets.angle, 0.0))
         for tie in range(1, len(targets.tie_angle)):
             self.target[self.dof[np.argmax(targets.tie == tie)]] = targets.tie_angle[tie]
         self._find_pattern()
+
+    @property
+    def points(self) -> Floats:
+        """(n_dof, 3) where each unknown stands, NaN for unknowns that many vertices share."""
+        points = np.full((self.n_dof, 3), np.nan)
+        alone = np.flatnonzero((self.dof >= 0) & (self.targets.tie < 0))
+        points[self.dof[alone]] = self._vertices[alone]
+        return points
 
     def _find_pattern(self) -> None:
         first, second = self.dof[self.corner[[1, 2, 0]].ravel()], self.dof[self.corner[[2, 0, 1]].ravel()]
@@ -105,7 +116,7 @@ class Energy:
         pairs, self._pair = np.unique(self._low * self.n_dof + high[self._to_low], return_inverse=True)
         self.rows, self.columns = pairs % self.n_dof, pairs // self.n_dof
 
-    def _reduce(self, per_vertex: Floats) -> Floats:
+    def reduce(self, per_vertex: Floats) -> Floats:
         """Sums over the vertices that share an unknown; pinned ones fall away."""
         return total(self.dof + 1, per_vertex, self.n_dof + 1)[1:]
 
@@ -136,7 +147,7 @@ class Energy:
 
     def gradient(self, corners: Corners) -> Floats:
         """(n_dof,) Θ − Σ angles."""
-        return self.target - self._reduce(self.angle_sums(corners))
+        return self.target - self.reduce(self.angle_sums(corners))
 
     def hessian(self, corners: Corners) -> tuple[Floats, Floats]:
         """(n_dof,) diagonal and (e,) off-diagonal values of half the cotangent Laplacian."""

@@ -103,7 +103,7 @@ def _close(
     disagreement = float(np.abs(offsets - translation).max())
     uv = right
     deck = Deck(cone_angle, translation)
-    uv, deck, circumference = _normalise(uv, deck, cut, faces, loops)
+    uv, deck, circumference = normalise(uv, deck, int(cut.path[0]), loops)
     return Layout(uv, cut.sheet, deck, circumference, disagreement / circumference)
 
 
@@ -114,11 +114,12 @@ def _mean_position(vertex: Ints, position: Complexes, n: int) -> Complexes:
     return np.asarray((real + 1j * imaginary) / count)
 
 
-def _normalise(
-    uv: Complexes, deck: Deck, cut: Cut, faces: Ints, loops: tuple[Ints, Ints]
+def normalise(
+    uv: Complexes, deck: Deck, foot_vertex: int, loops: tuple[Ints, Ints]
 ) -> tuple[Complexes, Deck, float]:
-    """Moves the sheet into its standard place (see lay_out). Also gives the circumference."""
-    foot = uv[cut.path[0]]
+    """Moves the sheet, whose cut starts at ``foot_vertex`` on loop 0, into its standard place (see lay_out).
+    Also gives the circumference."""
+    foot = uv[foot_vertex]
     if abs(deck.angle) < FULL_TURN:
         turn = abs(deck.translation) / deck.translation
         moved = (uv - foot) * turn

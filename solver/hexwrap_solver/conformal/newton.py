@@ -48,7 +48,7 @@ def minimise(energy: Energy, start: Floats | None = None, progress: Progress = n
     Stops at rounding: when the residual is below what angle sums of this many triangles can resolve, or
     when a full Newton step near the minimum no longer lowers it.
     """
-    factorisation = Factorisation(energy.n_dof, energy.rows, energy.columns)
+    factorisation = Factorisation(energy.points, energy.rows, energy.columns)
     x = np.zeros(energy.n_dof) if start is None else energy.unknowns_of(start)
     corners = energy.corners(energy.scale_of(x))
     gradient = energy.gradient(corners)
@@ -89,7 +89,7 @@ def _newton_direction(
         diagonal = diagonal + 1e-10 * max(float(np.abs(diagonal).max()), 1.0)
     try:
         factorisation.factorise(diagonal, off_diagonal)
-    except RuntimeError:
+    except np.linalg.LinAlgError:
         return None
     direction = -factorisation.solve(gradient)
     return direction if np.isfinite(direction).all() and gradient @ direction < 0 else None

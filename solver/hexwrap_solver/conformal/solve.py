@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from hexwrap_solver.arrays import Floats, Progress, no_progress
@@ -10,8 +12,9 @@ from hexwrap_solver.conformal.corners import boundary_angles
 from hexwrap_solver.conformal.energy import Energy
 from hexwrap_solver.conformal.layout import lay_out
 from hexwrap_solver.conformal.newton import Minimum, minimise
-from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap, Targets
-from hexwrap_solver.errors import ConvergenceError
+from hexwrap_solver.conformal.orientation import positive
+from hexwrap_solver.conformal.robust import solve_with_flips, with_inserted
+from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap, Deck, Targets
 from hexwrap_solver.surface.types import Surface
 
 
@@ -37,6 +40,7 @@ def _isometric(surface: Surface, condition: BoundaryCondition, progress: Progres
     first = _map(surface, boundary.isometric(surface), None, progress)
     if condition.quantum is None:
         return first
+    surface = first.surface  # refined where that was needed
     rounded = boundary.nearest_multiple(first.deck.angle, condition.quantum)
     if condition.spread == "optimal":
         targets = boundary.constant_on_loops(surface, rounded)
@@ -46,35 +50,51 @@ def _isometric(surface: Surface, condition: BoundaryCondition, progress: Progres
             for sums, wanted in zip(first.boundary_angles, (rounded, -rounded), strict=True)
         ]
         targets = boundary.prescribed(surface, (angles[0], angles[1]))
-    return _map(surface, targets, first.log_scale, progress, keep_boundary=True)
+    second = _map(surface, targets, first.log_scale, progress, keep_boundary=True)
+    return second if not first.inserted else with_inserted(second, first.inserted)
 
 
 def _map(
     surface: Surface, targets: Targets, start: Floats | None, progress: Progress, keep_boundary: bool = False
 ) -> ConformalMap:
+    """On the triangles as they are where that works, otherwise with flips."""
     energy = Energy(surface, targets)
     minimum = minimise(energy, start, progress)
-    if not minimum.converged or minimum.broken:
-        raise ConvergenceError(
-            f"Newton's method ended after {minimum.iterations} steps with a residual of "
-            f"{minimum.residual:.1e} rad and {minimum.broken} broken triangles."
-        )
-    return _finish(surface, energy, minimum, keep_boundary)
+    found = None
+    if minimum.converged and not minimum.broken:
+        found = _finish(surface, energy, minimum)
+    if found is None or not positive(found.corners()).all():
+        found = solve_with_flips(surface, targets, progress, start)
+    if (targets.tie == 0).any():
+        return found
+    u = found.log_scale
+    mean = _mean_on_boundary(found.surface, u) if keep_boundary else _mean_on_area(found.surface, u)
+    return _scaled(found, -mean)
 
 
-def _finish(surface: Surface, energy: Energy, minimum: Minimum, keep_boundary: bool) -> ConformalMap:
-    """Gauge, layout and everything measured on the result."""
+def _scaled(found: ConformalMap, shift: float) -> ConformalMap:
+    """The same map with a domain e^shift times as large."""
+    factor = float(np.exp(shift))
+    return replace(
+        found,
+        log_scale=found.log_scale + shift,
+        uv=found.uv * factor,
+        deck=Deck(found.deck.angle, found.deck.translation * factor),
+        circumference=found.circumference * factor,
+    )
+
+
+def _finish(surface: Surface, energy: Energy, minimum: Minimum) -> ConformalMap:
+    """Layout and everything measured on the result."""
     sums = energy.angle_sums(minimum.corners)
     pinned = bool((energy.targets.tie == 0).any())
     u = minimum.u
-    if not pinned:
-        u = u - (_mean_on_boundary(surface, u) if keep_boundary else _mean_on_area(surface, u))
     known = sums if pinned else energy.targets.angle
     layout = lay_out(
         surface.faces,
         energy.scaled_lengths(u),
         minimum.corners.angle,
-        _cone_angle(energy.targets, known, surface),
+        boundary.cone_angle_of(energy.targets, known, surface),
         surface.loops,
         len(surface.vertices),
     )
@@ -90,15 +110,6 @@ def _finish(surface: Surface, energy: Energy, minimum: Minimum, keep_boundary: b
         residual=minimum.residual,
         closing_error=layout.closing_error,
     )
-
-
-def _cone_angle(targets: Targets, sums: Floats, surface: Surface) -> float:
-    """K, exactly as prescribed where it is: Σκ over loop 0, or −Σκ over a tied loop 1."""
-    if len(targets.tie_angle) > 1:
-        angle = float(targets.tie_angle[1]) - len(surface.loops[1]) * np.pi
-    else:
-        angle = boundary.cone_angle(sums[surface.loops[0]])
-    return boundary.snapped(angle)
 
 
 def _mean_on_area(surface: Surface, u: Floats) -> float:

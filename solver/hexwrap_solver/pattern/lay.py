@@ -8,8 +8,10 @@ from scipy.sparse.csgraph import connected_components
 
 from hexwrap_solver.arrays import Bools, Floats, Ints, Progress, Ragged, no_progress
 from hexwrap_solver.conformal.types import ConformalMap
-from hexwrap_solver.domain.carry import barycentric, carry, surface_weights
 from hexwrap_solver.domain.cover import cover_of
+from hexwrap_solver.domain.interpolate import surface_weights
+from hexwrap_solver.domain.lift import points_at
+from hexwrap_solver.domain.locate import barycentric
 from hexwrap_solver.errors import PatternError
 from hexwrap_solver.pattern.cells import Cells, largest_part, manifold_corners, whole_cells
 from hexwrap_solver.pattern.cone import place_on_cone
@@ -87,7 +89,7 @@ def _finish(
     weights = barycentric(layout.corners[triangle], place)
     uv = (weights * cmap.corners()[triangle]).sum(axis=1)
     on_surface = surface_weights(cmap, triangle, weights)
-    vertices, normals = carry(cmap, triangle, on_surface)
+    vertices, normals = points_at(cmap, triangle, on_surface)
     faces, neighbours = Ragged.from_table(corner), Ragged.from_table(cells.twin // layout.lattice.sides)
     sheet = cells.turns.ravel()
     first = _at_first_loop(cmap, faces, neighbours, sheet)

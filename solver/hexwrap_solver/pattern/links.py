@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexwrap_solver.arrays import Bools, Ints
-from hexwrap_solver.pattern.nodes import Layout, Nodes, edge_distances, expand
+from hexwrap_solver.domain.locate import runs
+from hexwrap_solver.pattern.nodes import Layout, Nodes, edge_distances
 from hexwrap_solver.pattern.walk import walk
 
 
@@ -66,7 +67,7 @@ def _departure(layout: Layout, nodes: Nodes, node: Ints, direction: Ints) -> tup
     """The sighting from which a walk starts into its triangle, the direction there, and whether none does."""
     lattice, motion, order = layout.lattice, layout.motion, layout.lattice.order
     count = np.diff(nodes.starts)[node]
-    walker, step = expand(count)
+    walker, step = runs(count)
     seen = nodes.sighting[nodes.starts[node[walker]] + step]
     way = (direction[walker] - motion.rotation(nodes.turns[seen])) % order
     corners = layout.corners[nodes.face[seen]]

@@ -10,6 +10,7 @@ from scipy.sparse.csgraph import connected_components
 
 from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints
 from hexwrap_solver.domain.cover import Cover
+from hexwrap_solver.domain.locate import runs
 from hexwrap_solver.pattern.lattice import Lattice, Motion
 
 
@@ -67,12 +68,6 @@ def _key(face: Ints, point: Ints, low: Ints, span: Ints) -> Ints:
     return np.asarray((face * span[0] + (point[..., 0] - low[0])) * span[1] + (point[..., 1] - low[1]))
 
 
-def expand(counts: Ints) -> tuple[Ints, Ints]:
-    """(owner, position inside the owner's run) of Σcounts entries."""
-    owner = np.repeat(np.arange(len(counts)), counts)
-    return owner, np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts)
-
-
 def lattice_points_in_triangles(triangles: Floats, reach: float) -> tuple[Ints, Ints]:
     """(triangle, point (·, 2)) of every integer point inside or within about reach of a triangle.
 
@@ -81,7 +76,7 @@ def lattice_points_in_triangles(triangles: Floats, reach: float) -> tuple[Ints, 
     a, b = triangles[..., 0], triangles[..., 1]
     first_row = np.ceil(b.min(axis=1) - reach).astype(np.int64)
     rows = np.maximum(np.floor(b.max(axis=1) + reach).astype(np.int64) - first_row + 1, 0)
-    owner, step = expand(rows)
+    owner, step = runs(rows)
     row = first_row[owner] + step
     low = np.full(len(owner), np.inf)
     high = np.full(len(owner), -np.inf)
@@ -100,7 +95,7 @@ def lattice_points_in_triangles(triangles: Floats, reach: float) -> tuple[Ints, 
     owner, row = owner[met], row[met]
     first = np.ceil(low[met] - reach).astype(np.int64)
     count = np.maximum(np.floor(high[met] + reach).astype(np.int64) - first + 1, 0)
-    span, step = expand(count)
+    span, step = runs(count)
     return owner[span], np.stack([first[span] + step, row[span]], axis=1)
 
 

@@ -1,0 +1,230 @@
+"""Flips to the Delaunay triangulation of the mirrored annulus, whole independent sets at a time.
+
+An edge is Delaunay where the cosines of the two angles opposite to it add up to at least zero. With lengths
+that break triangle inequalities the same expression still decides (Penner coordinates): once all edges pass,
+all triangle inequalities hold (Gu, Luo, Sun, Wu 2018; Springborn 2020).
+
+Lengths of flipped edges come in two kinds. ``euclidean``: those of the piecewise flat surface itself, which
+it keeps. ``ptolemy``: l_e' = (l_a l_c + l_b l_d) / l_e, those of the hyperbolic structure that all discretely
+conformal metrics share (Gillespie, Springborn, Crane 2021). The latter are sums of positive terms, taken in
+logarithms: no cancellation and no overflow, however strong the grading.
+
+Mirror symmetry leaves three kinds of flips, each one or several symmetric flips of the double: ``across`` two
+front triangles; ``down``: a triangle over its edge that bounds a cell, so that its apex gets a crossing edge;
+``up``: the reverse, a crossing edge goes and the two cells beside it become a triangle and a cell.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hexwrap_solver.arrays import Complexes, Floats, Ints
+from hexwrap_solver.conformal.robust.mirror import MirrorMesh
+from hexwrap_solver.errors import ConvergenceError
+
+#: An edge whose cosines add up to more than −TOLERANCE passes: rounding must not flip to and fro.
+TOLERANCE = 1e-11
+#: Rounds of independent flips before something must be wrong; meshes seen so far need some dozens.
+MAX_ROUNDS = 20_000
+
+
+def cosine_sums(mesh: MirrorMesh, edges: Ints, length: Floats) -> Floats:
+    """(k,) sum of the cosines of the two angles opposite to each edge, in log-lengths ``length`` (e,)."""
+    crossing = mesh.crossing[edges]
+    total = np.zeros(len(edges))
+    plain = edges[~crossing]
+    total[~crossing] = _opposite_cosine(mesh, 2 * plain, length) + _opposite_cosine(
+        mesh, 2 * plain + 1, length
+    )
+    right = mesh.next[2 * edges[crossing]]
+    left = mesh.prev[right]
+    middle = length[edges[crossing]]
+    total[crossing] = _cell_cosine(length[left >> 1], middle, mesh.cross_length(left, length)) + _cell_cosine(
+        length[right >> 1], middle, mesh.cross_length(mesh.next[right], length)
+    )
+    return total
+
+
+def _opposite_cosine(mesh: MirrorMesh, h: Ints, length: Floats) -> Floats:
+    """Cosine of the angle that half-edges are seen under, in their triangle or cell."""
+    result = np.zeros(len(h))
+    outer = mesh.outer[h]
+    inner = h[~outer]
+    e, a, b = length[inner >> 1], length[mesh.next[inner] >> 1], length[mesh.prev[inner] >> 1]
+    result[~outer] = np.cosh(a - b) - 0.5 * np.exp(2 * e - a - b)
+    cells = h[outer]
+    m, n = mesh.cross_length(cells, length), mesh.cross_length(mesh.next[cells], length)
+    diagonal = 0.5 * np.logaddexp(2 * length[cells >> 1], m + n)
+    result[outer] = 0.5 * (np.exp(m - diagonal) + np.exp(n - diagonal))
+    return result
+
+
+def _cell_cosine(side: Floats, middle: Floats, far: Floats) -> Floats:
+    """Cosine of the angle that a crossing edge is seen under from across a cell: ``side`` is the cell's front
+    edge, ``far`` its other crossing edge."""
+    diagonal = 0.5 * np.logaddexp(2 * side, middle + far)
+    return np.exp(side - diagonal) + 0.5 * (np.exp(middle + far) - np.exp(2 * middle)) * np.exp(
+        -side - diagonal
+    )
+
+
+def make_delaunay(mesh: MirrorMesh, u: Floats, *, euclidean: bool = False) -> int:
+    """Flips until every edge is Delaunay in the metric with logarithmic factors u. Returns the number of
+    flips.
+
+    euclidean: keep the piecewise flat metric of u = 0 (then u must vanish). Raises ConvergenceError if
+    rounding keeps it from ending.
+    """
+    length = mesh.scaled(u)
+    edges = np.arange(len(length))
+    total = 0
+    for _ in range(MAX_ROUNDS):
+        bad = edges[cosine_sums(mesh, edges, length) < -TOLERANCE]
+        if not len(bad):
+            return total
+        now, claims = _independent(mesh, bad)
+        _flip(mesh, now, length, euclidean)
+        total += len(now)
+        mesh.log_length[now] = length[now] - (u[mesh.origin[2 * now]] + u[mesh.origin[2 * now + 1]]) / 2
+        edges = _around(mesh, claims, bad)
+    raise ConvergenceError(
+        f"{total} edge flips did not reach a Delaunay triangulation: the surface has edges or angles that "
+        "double precision cannot tell apart; remesh it more evenly."
+    )
+
+
+def _claims(mesh: MirrorMesh, edges: Ints) -> Ints:
+    """(k, 6) the half-edges whose links or lengths a flip of each edge reads or changes."""
+    h, t = 2 * edges, 2 * edges + 1
+    flipped = ~mesh.outer[t]
+    h, t = np.where(flipped, h, t), np.where(flipped, t, h)  # an outer side becomes h
+    q = mesh.next[2 * edges]
+    crossing = mesh.crossing[edges]
+    h = np.where(crossing, q, h)
+    second = np.where(crossing, mesh.prev[q], t)
+    return np.stack(
+        [h, mesh.next[h], mesh.prev[h], second, mesh.next[second], mesh.prev[second]],
+        axis=1,
+    )
+
+
+def _independent(mesh: MirrorMesh, edges: Ints) -> tuple[Ints, Ints]:
+    """A set of edges no two of which touch the same triangle or cell, greedy by a scrambled order."""
+    claims = _claims(mesh, edges)
+    rank = (edges * 2654435761) % 4294967291  # neighbours in the numbering must not wait for each other
+    best = np.full(len(mesh.origin), np.iinfo(np.int64).max)
+    np.minimum.at(best, claims.ravel(), np.repeat(rank, 6))
+    chosen = (best[claims] == rank[:, None]).all(axis=1)
+    return edges[chosen], claims[chosen]
+
+
+def _around(mesh: MirrorMesh, claims: Ints, bad: Ints) -> Ints:
+    """The bad edges, of which some have been flipped, and all whose angles these flips may have changed."""
+    h = claims.ravel()
+    outer = h[mesh.outer[h]]
+    cross = np.concatenate([mesh.cross[outer], mesh.cross[mesh.next[outer]]])
+    return np.unique(np.concatenate([bad, h >> 1, cross[cross >= 0]]))
+
+
+def _flip(mesh: MirrorMesh, edges: Ints, length: Floats, euclidean: bool) -> None:
+    """Flips independent edges; ``length`` (e,) gets the new scaled log-lengths."""
+    crossing = mesh.crossing[edges]
+    cell = mesh.outer[2 * edges] | mesh.outer[2 * edges + 1]
+    _flip_up(mesh, edges[crossing], length, euclidean)
+    _flip_down(mesh, edges[~crossing & cell], length, euclidean)
+    _flip_across(mesh, edges[~crossing & ~cell], length, euclidean)
+
+
+def _link(mesh: MirrorMesh, *ring: Ints) -> None:
+    for one, two in zip(ring, (*ring[1:], ring[0]), strict=True):
+        mesh.next[one] = two
+        mesh.prev[two] = one
+
+
+def _set_cross(mesh: MirrorMesh, cells: Ints, cross: Ints) -> None:
+    """The crossing edges at the origins of cells; ``next`` leads back from a crossing edge to its cell."""
+    mesh.cross[cells] = cross
+    is_edge = cross >= 0
+    mesh.next[2 * cross[is_edge]] = cells[is_edge]
+
+
+def _flip_across(mesh: MirrorMesh, edges: Ints, length: Floats, euclidean: bool) -> None:
+    h, t = 2 * edges, 2 * edges + 1
+    h1, h2, t1, t2 = mesh.next[h], mesh.prev[h], mesh.next[t], mesh.prev[t]
+    e, jk, ki, il, lj = (length[x >> 1] for x in (h, h1, h2, t1, t2))
+    if euclidean:
+        one, two = _apex(e, ki, jk), _apex(e, il, lj)
+        length[edges] = e + np.log(np.abs(one - np.conj(two)))
+    else:
+        length[edges] = np.logaddexp(jk + il, ki + lj) - e
+    mesh.origin[h], mesh.origin[t] = mesh.origin[t2], mesh.origin[h2]
+    mesh.turn[h] = mesh.turn[t2] + mesh.turn[h1]
+    mesh.turn[t] = -mesh.turn[h]
+    _link(mesh, h, h2, t1)
+    _link(mesh, t, t2, h1)
+
+
+def _flip_down(mesh: MirrorMesh, edges: Ints, length: Floats, euclidean: bool) -> None:
+    below = np.where(mesh.outer[2 * edges], 2 * edges, 2 * edges + 1)
+    h = below ^ 1
+    h1, h2 = mesh.next[h], mesh.prev[h]  # i → j is h, the apex x stands at the origin of h2
+    before, after = mesh.prev[below], mesh.next[below]
+    m_j, m_i = mesh.cross_length(below, length), mesh.cross_length(after, length)
+    e, b, a = length[edges], length[h1 >> 1], length[h2 >> 1]
+    if euclidean:
+        slope = (np.exp(m_j - e) - np.exp(m_i - e)) / 2
+        along = np.sqrt((1 - slope) * (1 + slope))
+        apex = _apex(e, a, b)
+        length[edges] = e + np.log(np.exp(m_i - e) + 2 * (apex.real * slope + apex.imag * along))
+    else:
+        diagonal = 0.5 * np.logaddexp(2 * e, m_i + m_j)
+        length[edges] = (
+            np.logaddexp(np.logaddexp(2 * a + m_j, 2 * b + m_i), np.log(2.0) + a + b + diagonal) - 2 * e
+        )
+    _set_cross(mesh, h1, mesh.cross[below])
+    _set_cross(mesh, h2, edges)
+    mesh.outer[h1] = mesh.outer[h2] = True
+    mesh.outer[below] = False
+    mesh.crossing[edges] = True
+    mesh.origin[h] = mesh.origin[below] = mesh.origin[h2]
+    mesh.turn[h] = mesh.turn[below] = 0
+    mesh.next[before], mesh.prev[h1] = h1, before
+    mesh.next[h1], mesh.prev[h2] = h2, h1
+    mesh.next[h2], mesh.prev[after] = after, h2
+
+
+def _flip_up(mesh: MirrorMesh, edges: Ints, length: Floats, euclidean: bool) -> None:
+    h, below = 2 * edges, 2 * edges + 1
+    right = mesh.next[h]
+    left = mesh.prev[right]
+    before, after = mesh.prev[left], mesh.next[right]
+    m, m_i, m_j = length[edges], mesh.cross_length(left, length), mesh.cross_length(after, length)
+    a, b = length[left >> 1], length[right >> 1]
+    if euclidean:
+        fall, rise = (np.exp(m - a) - np.exp(m_i - a)) / 2, (np.exp(m_j - b) - np.exp(m - b)) / 2
+        along = np.sqrt((1 - fall) * (1 + fall)) + np.exp(b - a) * np.sqrt((1 - rise) * (1 + rise))
+        length[edges] = a + np.log(np.hypot(along, fall - np.exp(b - a) * rise))
+    else:
+        length[edges] = (
+            np.logaddexp(a + 0.5 * np.logaddexp(2 * b, m + m_j), b + 0.5 * np.logaddexp(2 * a, m + m_i)) - m
+        )
+    _set_cross(mesh, below, mesh.cross[left])
+    mesh.outer[left] = mesh.outer[right] = False
+    mesh.outer[below] = True
+    mesh.crossing[edges] = False
+    mesh.origin[h], mesh.origin[below] = mesh.origin[after], mesh.origin[left]
+    mesh.turn[below] = mesh.turn[left] + mesh.turn[right]
+    mesh.turn[h] = -mesh.turn[below]
+    _link(mesh, left, right, h)
+    mesh.next[before], mesh.prev[below] = below, before
+    mesh.next[below], mesh.prev[after] = after, below
+
+
+def _apex(base: Floats, left: Floats, right: Floats) -> Complexes:
+    """Apex of triangles over the unit segment 0–1 from log-lengths; ``left`` is the side at 0."""
+    a, b = np.exp(left - base), np.exp(right - base)
+    x = (1 + (a - b) * (a + b)) / 2
+    one = np.ones_like(a)
+    small, mid, big = np.sort(np.stack([one, a, b]), axis=0)  # Kahan: subtract close lengths first
+    square = (big + (mid + small)) * (small - (big - mid)) * (small + (big - mid)) * (big + (mid - small))
+    return np.asarray(x + 0.5j * np.sqrt(np.maximum(square, 0.0)))

@@ -1,0 +1,146 @@
+"""Newton's method on Penner's space: through as many Delaunay triangulations as it takes.
+
+The energy is convex and twice continuously differentiable across flips (Springborn 2020), and it has a
+minimum for every annulus and all positive targets that obey Gauss–Bonnet (Gu, Luo, Sun, Wu 2018). Unlike on a
+fixed triangulation there are no broken triangles: each trial point is made Delaunay first.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hexwrap_solver.arrays import Floats, Ints, Progress
+from hexwrap_solver.conformal.energy import Energy
+from hexwrap_solver.conformal.factor import Factorisation
+from hexwrap_solver.conformal.robust.delaunay import make_delaunay
+from hexwrap_solver.conformal.robust.metric import Metric, angle_sums, edge_weights, measure
+from hexwrap_solver.conformal.robust.mirror import MirrorMesh
+
+MAX_STEPS = 200
+#: No single step may change u by more than this: Newton leaps where the Hessian is nearly singular.
+MAX_CHANGE = 8.0
+#: Acceptable overshoot φ'(t) / |φ'(0)| of a step along its direction.
+OVERSHOOT = 0.1
+MAX_TRIALS = 40
+#: The largest entry of the gradient bottoms out at rounding, about this times √(number of unknowns).
+ROUNDING = 1e-14
+#: Added to the diagonal, relative to it and to 1, where rounding has made the Hessian indefinite.
+LIFT = 1e-9
+#: Above this the answer is not accepted: boundary angles must be right to 1e-9.
+ACCEPTED = 3e-10
+
+
+@dataclass(frozen=True)
+class Descent:
+    """u: (n,) where it ended, with its Delaunay metric. residual: max |angle sum − target|."""
+
+    u: Floats
+    metric: Metric
+    residual: float
+    iterations: int
+    flips: int
+
+
+class FlipEnergy:
+    """The energy of ``plain``'s problem on the mirrored mesh, which follows u by flips."""
+
+    def __init__(self, plain: Energy, mesh: MirrorMesh) -> None:
+        self.plain = plain
+        self.mesh = mesh
+        self.flips = 0
+        self._system: _System | None = None
+
+    def at(self, x: Floats) -> tuple[Metric, Floats]:
+        """The Delaunay metric at the unknowns x, and the gradient."""
+        u = self.plain.scale_of(x)
+        self.flips += make_delaunay(self.mesh, u)
+        metric = measure(self.mesh, u)
+        return metric, self.plain.target - self.plain.reduce(angle_sums(self.mesh, metric))
+
+    def newton_direction(self, metric: Metric, gradient: Floats) -> Floats:
+        """−H⁻¹∇E. The symbolic analysis lasts until the next flip."""
+        if self._system is None or self._system.flips != self.flips:
+            self._system = _System(self)
+        return self._system.solve(metric, -gradient)
+
+
+class _System:
+    """The Hessian on one triangulation: a graph Laplacian of the unknowns."""
+
+    def __init__(self, energy: FlipEnergy) -> None:
+        self.flips = energy.flips
+        self.mesh = energy.mesh
+        dof, n = energy.plain.dof, energy.plain.n_dof
+        edges = np.flatnonzero(~self.mesh.crossing)
+        tail, head = dof[self.mesh.origin[2 * edges]], dof[self.mesh.origin[2 * edges + 1]]
+        low, high = np.minimum(tail, head), np.maximum(tail, head)
+        apart = low != high  # an edge from a vertex to itself, or inside one tie, does not change
+        self.edges, self.low, self.high = edges[apart], low[apart], high[apart]
+        self.inside = self.low >= 0  # both ends free
+        pairs, self.pair = np.unique(self.low[self.inside] * n + self.high[self.inside], return_inverse=True)
+        self.n, self.n_pairs = n, len(pairs)
+        self.factorisation = Factorisation(energy.plain.points, pairs % n, pairs // n)
+
+    def solve(self, metric: Metric, right: Floats) -> Floats:
+        weight = edge_weights(metric, self.edges)
+        both = np.concatenate([self.low, self.high]) + 1
+        diagonal = _sums(both, np.tile(weight, 2), self.n + 1)[1:]
+        off_diagonal = -_sums(self.pair, weight[self.inside], self.n_pairs)
+        try:
+            self.factorisation.factorise(diagonal, off_diagonal)
+        except np.linalg.LinAlgError:  # semidefinite to rounding
+            self.factorisation.factorise(diagonal * (1 + LIFT) + LIFT, off_diagonal)
+        return self.factorisation.solve(right)
+
+
+def descend(energy: FlipEnergy, start: Floats, progress: Progress) -> Descent:
+    """Minimises from ``start`` (n,) until rounding stops it; see ``residual`` for how far it got."""
+    x = energy.plain.unknowns_of(start)
+    metric, gradient = energy.at(x)
+    tolerance = ROUNDING * np.sqrt(len(x))
+    iterations = 0
+    while iterations < MAX_STEPS and _largest(gradient) > tolerance:
+        residual = _largest(gradient)
+        progress(
+            min(0.9, iterations / 20), f"Newton step {iterations + 1} with flips, residual {residual:.1e}"
+        )
+        step = _line_search(energy, x, energy.newton_direction(metric, gradient), gradient)
+        if step is None:
+            break
+        iterations += 1
+        if _largest(step[2]) >= 0.5 * residual and residual <= ACCEPTED:
+            break  # nothing but rounding is left
+        x, metric, gradient = step
+    metric, gradient = energy.at(x)
+    return Descent(energy.plain.scale_of(x), metric, _largest(gradient), iterations, energy.flips)
+
+
+def _sums(index: Ints, weights: Floats, n: int) -> Floats:
+    return np.bincount(index, weights=weights, minlength=n).astype(np.float64)
+
+
+def _largest(gradient: Floats) -> float:
+    return float(np.abs(gradient).max(initial=0.0))
+
+
+def _line_search(
+    energy: FlipEnergy, x: Floats, direction: Floats, gradient: Floats
+) -> tuple[Floats, Metric, Floats] | None:
+    """The first point along the direction where φ' is at most a little above zero; φ is convex, so secants
+    on φ' bracket its minimum."""
+    slope = float(gradient @ direction)
+    if not slope < 0:
+        return None
+    low, low_slope = 0.0, slope
+    t = min(1.0, MAX_CHANGE / max(_largest(direction), 1e-300))
+    for _ in range(MAX_TRIALS):
+        trial = x + t * direction
+        metric, new = energy.at(trial)
+        new_slope = float(new @ direction)
+        if new_slope <= OVERSHOOT * abs(slope) or _largest(new) <= 0.5 * _largest(gradient):
+            return trial, metric, new
+        secant = low + (t - low) * low_slope / (low_slope - new_slope)
+        t = min(max(secant, low + 0.1 * (t - low)), low + 0.7 * (t - low))
+    return None

@@ -1,0 +1,68 @@
+"""Angles and Hessian of a Delaunay metric on the mirrored annulus."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hexwrap_solver.arrays import Floats, Ints
+from hexwrap_solver.conformal.energy import corner_angles
+from hexwrap_solver.conformal.robust.mirror import MirrorMesh
+
+
+@dataclass(frozen=True)
+class Metric:
+    """Everything is indexed by half-edge and zero for the sides of crossing edges.
+
+    start, end: (2e,) interior angle at the origin and at the end of the half-edge, in its triangle or cell.
+    cotangent: (2e,) of the angle that the half-edge is seen under.
+    length: (e,) scaled log-lengths.
+    """
+
+    start: Floats
+    end: Floats
+    cotangent: Floats
+    length: Floats
+
+
+def measure(mesh: MirrorMesh, u: Floats) -> Metric:
+    """The metric with logarithmic factors u, for which the mesh must be Delaunay."""
+    length = mesh.scaled(u)
+    start, end, cotangent = (np.zeros(len(mesh.origin)) for _ in range(3))
+
+    sides = mesh.triangles().T
+    side = length[sides >> 1]
+    corners = corner_angles(np.exp(side - side.max(axis=0)))  # row k is opposite to side k
+    start[sides] = corners.angle[[1, 2, 0]]
+    end[sides] = corners.angle[[2, 0, 1]]
+    cotangent[sides] = corners.cotangent()
+
+    cells = mesh.chain()
+    side = length[cells >> 1]
+    m = 0.5 * np.exp(mesh.cross_length(cells, length) - side)
+    n = 0.5 * np.exp(mesh.cross_length(mesh.next[cells], length) - side)
+    along = np.sqrt(np.maximum((1 - (n - m)) * (1 + (n - m)), 0.0))  # its share of the mirror line / side
+    start[cells] = np.arctan2(along, m - n)
+    end[cells] = np.arctan2(along, n - m)
+    with np.errstate(divide="ignore"):
+        cotangent[cells] = np.where(along > 0, (m + n) / along, 0.0)
+    return Metric(start, end, cotangent, length)
+
+
+def angle_sums(mesh: MirrorMesh, metric: Metric) -> Floats:
+    """(n,) angle sum at each vertex of the annulus (half of what the double has on the mirror line)."""
+    total: Floats = np.bincount(mesh.origin, weights=metric.start, minlength=mesh.n).astype(np.float64)
+    cells = mesh.chain()
+    following = mesh.next[cells]
+    total += np.bincount(mesh.origin[following], weights=metric.end[cells], minlength=mesh.n)
+    corner = cells[
+        mesh.cross[cells] < 0
+    ]  # both cells at a boundary vertex reckon to its right angle with the mirror
+    total[mesh.origin[corner]] -= np.pi
+    return total
+
+
+def edge_weights(metric: Metric, edges: Ints) -> Floats:
+    """(k,) of edges that do not cross the mirror line: the Hessian is their graph Laplacian."""
+    return np.asarray(0.5 * (metric.cotangent[2 * edges] + metric.cotangent[2 * edges + 1]))

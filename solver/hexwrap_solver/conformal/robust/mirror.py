@@ -1,0 +1,116 @@
+"""A triangulated annulus glued to its mirror image, of which only the front half is stored.
+
+The double of the annulus is a closed torus; its mirror line consists of the two boundary loops. A Delaunay
+triangulation of the double that respects the mirror has two kinds of edges: those that lie in the front (and,
+mirrored, in the back), and those that cross the mirror line at right angles and join a vertex w to its own
+image w'. Below an edge (i, j) of the front that faces the mirror there is hence always a *cell*: an isosceles
+trapezoid (i, j, j', i') with its mirror line through the middle. Where i lies on the boundary itself i' = i
+and the trapezoid is a triangle, and where both do it is flat: an edge of the boundary.
+
+    front triangles          w1 ------ w2          edges (v0,w1), (w1,w2), (w2,v1): one cell below each
+                           / :         : \\        dotted: crossing edges (w1,w1'), (w2,w2'), upper halves
+    mirror line      v0 --------------------- v1
+
+Half-edges 2e and 2e + 1 are the two sides of edge e. A half-edge is either the side of a triangle, or
+*outer*: the upper side of a cell. Outer half-edges form closed chains, one per boundary loop. When a triangle
+is flipped away over the mirror line its edge becomes the crossing edge of its apex, so that edges are as many
+as ever and every edge keeps one length.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hexwrap_solver.arrays import Bools, Floats, Ints
+from hexwrap_solver.surface.topology import next_half_edge, twins
+from hexwrap_solver.surface.types import Surface
+
+
+@dataclass
+class MirrorMesh:
+    """Changed in place by flips.
+
+    origin: (2e,) vertex where the half-edge starts (both sides of a crossing edge start at its vertex).
+    next, prev: (2e,) neighbours in the triangle, or in the chain of outer half-edges.
+    outer: (2e,) whether it is the upper side of a cell.
+    cross: (2e,) for outer half-edges the crossing edge that ends the cell at the origin, −1 on the boundary.
+    crossing: (e,) whether the edge crosses the mirror line.
+    turn: (2e,) how often the half-edge goes around the annulus, counted where it crosses a fixed cut:
+    sums to 0 over every triangle and to 1 over loop 0.
+    log_length: (e,) of the whole edge (from w to w' for a crossing one), before it is scaled by u.
+    """
+
+    n: int
+    origin: Ints
+    next: Ints
+    prev: Ints
+    outer: Bools
+    cross: Ints
+    crossing: Bools
+    turn: Ints
+    log_length: Floats
+
+    def scaled(self, u: Floats) -> Floats:
+        """(e,) log-lengths in the metric with logarithmic factors u."""
+        return self.log_length + (u[self.origin[::2]] + u[self.origin[1::2]]) / 2
+
+    def triangles(self) -> Ints:
+        """(t, 3) the half-edges of every front triangle."""
+        first = np.flatnonzero(~self.outer & ~np.repeat(self.crossing, 2))
+        second = self.next[first]
+        third = self.next[second]
+        once = (first < second) & (first < third)
+        return np.stack([first, second, third], axis=1)[once]
+
+    def chain(self) -> Ints:
+        """(k,) all outer half-edges."""
+        return np.flatnonzero(self.outer)
+
+    def cross_length(self, half_edges: Ints, log_length: Floats) -> Floats:
+        """Log-length of the crossing edge at the origin of outer half-edges, −inf on the boundary."""
+        cross = self.cross[half_edges]
+        return np.where(cross < 0, -np.inf, log_length[cross])
+
+
+def mirror_mesh(surface: Surface, log_length: Floats, turn: Ints) -> MirrorMesh:
+    """The double of a surface. log_length, turn: (3m,) per half-edge of the faces (see ``topology``)."""
+    faces, n = surface.faces, len(surface.vertices)
+    twin = twins(faces, n)
+    inner = np.arange(faces.size)
+    lead = (twin < 0) | (inner < twin)
+    edge = np.zeros(faces.size, dtype=np.int64)
+    edge[lead] = np.arange(int(lead.sum()))
+    follow = ~lead
+    edge[follow] = edge[twin[follow]]
+    name = 2 * edge + follow  # of every half-edge of the faces
+    size = 2 * int(lead.sum())
+    boundary = np.flatnonzero(twin < 0)
+    outside = name[boundary] + 1
+
+    origin, following, previous, turns = (np.zeros(size, dtype=np.int64) for _ in range(4))
+    origin[name] = faces.ravel()
+    origin[outside] = np.roll(faces, -1, axis=1).ravel()[boundary]
+    following[name] = name[next_half_edge(inner)]
+    at_origin = np.zeros(n, dtype=np.int64)
+    at_origin[origin[outside]] = outside
+    following[outside] = at_origin[faces.ravel()[boundary]]
+    previous[following] = np.arange(size)
+    outer = np.zeros(size, dtype=bool)
+    outer[outside] = True
+    turns[name] = turn
+    turns[outside] = -turn[boundary]
+    lengths = np.zeros(size // 2)
+    lengths[edge] = log_length
+    return MirrorMesh(
+        n,
+        origin,
+        following,
+        previous,
+        outer,
+        np.full(size, -1, dtype=np.int64),
+        np.zeros(size // 2, dtype=bool),
+        turns,
+        lengths,
+    )

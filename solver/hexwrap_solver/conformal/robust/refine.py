@@ -1,0 +1,188 @@
+"""Splitting edges of an annulus where straight triangles cannot follow the map.
+
+New vertices lie on edges of the old mesh, so the surface stays the same point set.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hexwrap_solver.arrays import Bools, Floats, Ints
+from hexwrap_solver.conformal.types import Targets
+from hexwrap_solver.surface.topology import half_edges, twins
+from hexwrap_solver.surface.types import Surface
+
+#: A boundary vertex with target angle Θ gets at least Θ / FULLEST triangles.
+FULLEST = 0.95 * np.pi
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A surface with targets for its vertices. u: (n,) logarithmic factors to start from."""
+
+    surface: Surface
+    targets: Targets
+    u: Floats
+
+
+def split_edges(problem: Problem, marked: Ints, place: Floats) -> Problem:
+    """Splits edges at given places; whatever belongs to vertices is interpolated.
+
+    marked: (k,) half-edges, any number per face; of two sides of one edge the first counts. place: (k,) in
+    (0, 1) from the start of the half-edge to its end. On the boundary new vertices get target angle π, and
+    belong to the tie that both ends belong to.
+    """
+    surface, targets = problem.surface, problem.targets
+    faces, n = surface.faces, len(surface.vertices)
+    twin = twins(faces, n)
+    tail, head = half_edges(faces)
+    name = np.where(twin[marked] >= 0, np.minimum(marked, twin[marked]), marked)
+    _, first = np.unique(name, return_index=True)
+    h, s = marked[first], place[first]
+    i, j = tail[h], head[h]
+    new = n + np.arange(len(h))
+    point = np.full(faces.size, -1, dtype=np.int64)
+    point[h] = new
+    inner = twin[h] >= 0
+    point[twin[h][inner]] = new[inner]
+
+    def blend(values: Floats) -> Floats:
+        w = s.reshape(-1, *[1] * (values.ndim - 1))
+        return np.concatenate([values, (1 - w) * values[i] + w * values[j]])
+
+    normals = blend(surface.normals)
+    normals[n:] /= np.maximum(np.linalg.norm(normals[n:], axis=1, keepdims=True), 1e-300)
+    refined = replace(
+        surface,
+        vertices=blend(surface.vertices),
+        faces=_subdivide(faces, point.reshape(-1, 3), blend(surface.vertices)),
+        loops=(
+            _extend(surface.loops[0], h, new, tail, inner),
+            _extend(surface.loops[1], h, new, tail, inner),
+        ),
+        input_vertex=np.concatenate([surface.input_vertex, np.full(len(h), -1, dtype=np.int64)]),
+        normals=normals,
+        parameters=_blend_parameters(surface, i, j, s),
+    )
+    tie = np.where(inner | (targets.tie[i] != targets.tie[j]), -1, targets.tie[i])
+    counts = np.bincount(tie[tie >= 0], minlength=len(targets.tie_angle))
+    grown = Targets(
+        np.concatenate([targets.angle, np.where(inner, 2 * np.pi, np.pi)]),
+        np.concatenate([targets.tie, tie]),
+        targets.tie_angle + np.pi * counts,
+    )
+    return Problem(refined, grown, blend(problem.u))
+
+
+def _subdivide(faces: Ints, point: Ints, vertices: Floats) -> Ints:
+    """Faces with 0 to 3 split edges become 1 to 4 faces. point: (m, 3) new vertex on the edge from corner
+    c."""
+    count = (point >= 0).sum(axis=1)
+    lead = np.where(
+        count == 1, (point >= 0).argmax(axis=1), np.where(count == 2, ((point < 0).argmax(axis=1) + 1) % 3, 0)
+    )
+    turned = (lead[:, None] + np.arange(3)) % 3
+    (a, b, c), (p, q, r) = np.take_along_axis(faces, turned, 1).T, np.take_along_axis(point, turned, 1).T
+    parts = [faces[count == 0]]
+
+    def add(which: Bools, *triangles: tuple[Ints, Ints, Ints]) -> None:
+        parts.extend(np.stack([x[which] for x in triangle], axis=1) for triangle in triangles)
+
+    add(count == 1, (a, p, c), (p, b, c))
+    two = count == 2  # p on ab, q on bc: the quad a p q c by its shorter diagonal
+    reach = np.zeros(len(faces), dtype=bool)
+    reach[two] = np.linalg.norm(vertices[a[two]] - vertices[q[two]], axis=1) <= np.linalg.norm(
+        vertices[p[two]] - vertices[c[two]], axis=1
+    )
+    add(two, (p, b, q))
+    add(two & reach, (a, p, q), (a, q, c))
+    add(two & ~reach, (a, p, c), (p, q, c))
+    add(count == 3, (a, p, r), (p, b, q), (q, c, r), (p, q, r))
+    return np.concatenate(parts)
+
+
+def _extend(loop: Ints, h: Ints, new: Ints, tail: Ints, inner: Bools) -> Ints:
+    """A loop with its new vertices, each after the start of the boundary edge that it splits."""
+    place = np.full(max(int(loop.max()), int(tail.max())) + 1, -1, dtype=np.int64)
+    place[loop] = np.arange(len(loop))
+    here = ~inner & (place[tail[h]] >= 0)
+    return np.insert(loop, place[tail[h[here]]] + 1, new[here])
+
+
+def _blend_parameters(surface: Surface, i: Ints, j: Ints, s: Floats) -> Floats | None:
+    """Parameters on the NURBS surface; in a closed direction the shorter way around."""
+    if surface.parameters is None or surface.nurbs is None:
+        return surface.parameters
+    one, two = surface.parameters[i], surface.parameters[j]
+    blended = np.zeros_like(one)
+    for k in range(2):
+        degree, knots = surface.nurbs.degree[k], surface.nurbs.knots[k]
+        low, high = knots[degree], knots[len(knots) - degree - 1]
+        step = two[:, k] - one[:, k]
+        if surface.nurbs.closed[k]:
+            period = high - low
+            step -= period * np.round(step / period)
+            blended[:, k] = low + (one[:, k] + s * step - low) % period
+        else:
+            blended[:, k] = one[:, k] + s * step
+    return np.concatenate([surface.parameters, blended])
+
+
+def collapsing(surface: Surface, targets: Targets, turn: Ints) -> Ints:
+    """(k,) half-edges that must be split before any map can exist on these triangles.
+
+    An interior edge between two vertices of one straight side would fall onto the boundary, and so would all
+    that it cuts off; and around a boundary vertex with few triangles their angles, below π each, cannot add
+    up to a large target. turn: (3m,) as in ``MirrorMesh``.
+    """
+    return np.union1d(_chords(surface, targets, turn), _crowded(surface, targets))
+
+
+def _chords(surface: Surface, targets: Targets, turn: Ints) -> Ints:
+    faces, n = surface.faces, len(surface.vertices)
+    twin = twins(faces, n)
+    tail, head = half_edges(faces)
+    found = []
+    for loop in surface.loops:
+        place = np.full(n, -1, dtype=np.int64)
+        place[loop] = np.arange(len(loop))
+        at = np.full(n, -1, dtype=np.int64)
+        boundary = np.flatnonzero((twin < 0) & (place[tail] >= 0))
+        at[tail[boundary]] = boundary
+        # turns and convex corners up to each vertex, twice around so that no way along the loop wraps
+        around = np.concatenate([[0], np.cumsum(np.tile(turn[at[loop]], 2))])
+        convex = (targets.angle[loop] < np.pi - 1e-9) & (targets.tie[loop] < 0)
+        corners = np.concatenate([[0], np.cumsum(np.tile(convex, 2))])
+        h = np.flatnonzero((twin >= 0) & (place[tail] >= 0) & (place[head] >= 0))
+        start, end = place[tail[h]], place[head[h]]
+        end = np.where(end < start, end + len(loop), end)
+        along = around[end] - around[start] == turn[h]  # the way along the loop that the edge cuts off
+        found.append(h[along & (corners[end] == corners[start + 1])])
+    return np.concatenate(found)
+
+
+def _crowded(surface: Surface, targets: Targets) -> Ints:
+    """The edges opposite to boundary vertices whose targets their triangles cannot reach."""
+    faces = surface.faces
+    count = np.bincount(faces.ravel(), minlength=len(surface.vertices))
+    crowded = np.zeros(len(count), dtype=bool)
+    boundary = np.concatenate(surface.loops)
+    crowded[boundary] = (targets.tie[boundary] < 0) & (targets.angle[boundary] > count[boundary] * FULLEST)
+    corner = np.flatnonzero(crowded[faces.ravel()])
+    return 3 * (corner // 3) + (corner % 3 + 1) % 3
+
+
+def split_places(surface: Surface, wrong: Ints) -> tuple[Ints, Floats]:
+    """(half-edges, places) that split the longest edge of each of the faces ``wrong``: at the foot of the
+    altitude."""
+    corner = surface.vertices[surface.faces[wrong]]
+    along = np.roll(corner, -1, axis=1) - corner
+    length = np.linalg.norm(along, axis=2)
+    longest = length.argmax(axis=1)
+    rows = np.arange(len(wrong))
+    edge = along[rows, longest]
+    apex = corner[rows, (longest + 2) % 3] - corner[rows, longest]
+    foot = np.einsum("kd,kd->k", apex, edge) / length[rows, longest] ** 2
+    return 3 * wrong + longest, np.clip(foot, 0.02, 0.98)

@@ -1,0 +1,147 @@
+"""A conformal map for every annulus: flips where the triangulation needs them, new vertices where a straight
+triangle cannot follow the map."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from hexwrap_solver.arrays import Floats, Ints, Progress, no_progress
+from hexwrap_solver.conformal.boundary import cone_angle_of
+from hexwrap_solver.conformal.cut import cut_open
+from hexwrap_solver.conformal.energy import Energy, opposite_lengths
+from hexwrap_solver.conformal.layout import normalise
+from hexwrap_solver.conformal.orientation import positive
+from hexwrap_solver.conformal.robust.delaunay import make_delaunay
+from hexwrap_solver.conformal.robust.descent import ACCEPTED, FlipEnergy, descend
+from hexwrap_solver.conformal.robust.develop import develop
+from hexwrap_solver.conformal.robust.metric import angle_sums
+from hexwrap_solver.conformal.robust.mirror import mirror_mesh
+from hexwrap_solver.conformal.robust.refine import Problem, collapsing, split_edges, split_places
+from hexwrap_solver.conformal.robust.straight import straighten
+from hexwrap_solver.conformal.types import ConformalMap, Deck, Targets
+from hexwrap_solver.errors import ConvergenceError
+from hexwrap_solver.surface.types import Surface
+
+#: Rounds of refinement; meshes seen so far need up to a handful.
+MAX_ROUNDS = 40
+REFINED = "The mesh was refined:"
+
+
+def solve_with_flips(
+    surface: Surface, targets: Targets, progress: Progress = no_progress, start: Floats | None = None
+) -> ConformalMap:
+    """The discretely conformal map that every annulus has if its triangulation may change.
+
+    Newton's method runs on the intrinsic Delaunay triangulation of the annulus glued to its mirror image (see
+    ``mirror``, ``delaunay``, ``descent``). The vertices keep the places it gives them, and the original
+    triangles are drawn straight between these. Where one would turn over, its longest edge is split and the
+    map computed again; ``surface`` of the result is then the refined mesh. start: (n,) u to start from.
+    Sources: Gu, Luo, Sun, Wu 2018 (existence); Springborn 2020; Gillespie, Springborn, Crane 2021 (flips).
+    Raises ConvergenceError where double precision does not suffice.
+    """
+    problem = Problem(surface, targets, np.zeros(len(surface.vertices)) if start is None else start)
+    iterations = 0
+    for _ in range(MAX_ROUNDS):
+        problem = _uncollapse(problem)
+        found = _attempt(problem, progress)
+        iterations += found.iterations
+        wrong = np.flatnonzero(~positive(found.corners()))
+        if not len(wrong):
+            return _told(found, surface, iterations)
+        problem = replace(problem, u=found.log_scale)
+        problem = split_edges(problem, *split_places(problem.surface, wrong))
+    inserted = len(problem.surface.vertices) - len(surface.vertices)
+    raise ConvergenceError(
+        f"After {MAX_ROUNDS} rounds of refinement with {inserted} new vertices {len(wrong)} triangles still "
+        "turn over in the domain: the surface is finer in places than double precision can hold; remesh it "
+        "more evenly.",
+        vertices=_sent(problem.surface, wrong),
+    )
+
+
+def _turns(surface: Surface) -> Ints:
+    """(m, 3) how often the side from each corner to the next goes around the annulus (see
+    ``MirrorMesh.turn``)."""
+    sheet = cut_open(surface.faces, surface.loops, len(surface.vertices)).sheet
+    return np.asarray(np.roll(sheet, -1, axis=1) - sheet)
+
+
+def _uncollapse(problem: Problem) -> Problem:
+    """Splits what has no room in the domain, until there is nothing of the kind."""
+    while True:
+        marked = collapsing(problem.surface, problem.targets, _turns(problem.surface).ravel())
+        if not len(marked):
+            return problem
+        problem = split_edges(problem, marked, np.full(len(marked), 0.5))
+
+
+def _attempt(problem: Problem, progress: Progress) -> ConformalMap:
+    """The map of the vertices, with the triangles as they are, whether they turn over or not."""
+    surface, targets = problem.surface, problem.targets
+    turn = _turns(surface)
+    lengths = opposite_lengths(surface.vertices, surface.faces)
+    mesh = mirror_mesh(surface, np.log(lengths)[[2, 0, 1]].T.ravel(), turn.ravel())
+    flips = make_delaunay(mesh, np.zeros(mesh.n), euclidean=True)
+    descent = descend(FlipEnergy(Energy(surface, targets), mesh), problem.u, progress)
+    if not descent.residual <= ACCEPTED:
+        raise ConvergenceError(
+            f"Newton's method with flips ended after {descent.iterations} steps with angle sums still "
+            f"{descent.residual:.1e} rad off: double precision cannot hold the map of this surface; "
+            "remesh it more evenly."
+        )
+    sums = angle_sums(mesh, descent.metric)
+    known = sums if (targets.tie == 0).any() else targets.angle
+    angle = cone_angle_of(targets, known, surface)
+    foot = int(surface.loops[0][0])
+    laid = develop(mesh, descent.metric, angle, foot)
+    uv, deck, circumference = normalise(laid.uv, Deck(angle, laid.translation), foot, surface.loops)
+    lift = laid.lift[surface.faces]
+    sheet = lift[:, :1] - lift
+    sheet[:, 1] += turn[:, 0]
+    sheet[:, 2] -= turn[:, 2]
+    return ConformalMap(
+        surface=surface,
+        log_scale=descent.u,
+        uv=straighten(surface, targets, uv, sheet, deck),
+        sheet=sheet,
+        deck=deck,
+        boundary_angles=(sums[surface.loops[0]], sums[surface.loops[1]]),
+        circumference=circumference,
+        iterations=descent.iterations,
+        residual=descent.residual,
+        flips=flips + descent.flips,
+        closing_error=laid.gap / circumference,
+    )
+
+
+def _told(found: ConformalMap, surface: Surface, iterations: int) -> ConformalMap:
+    """The result with what was done to the triangulation."""
+    notes = []
+    if found.flips:
+        notes.append(
+            f"{found.flips} edge flips: the map is discretely conformal on an intrinsic Delaunay "
+            "triangulation of the surface instead of the mesh's own."
+        )
+    told = replace(found, iterations=iterations, notes=tuple(notes))
+    return with_inserted(told, len(found.surface.vertices) - len(surface.vertices))
+
+
+def with_inserted(found: ConformalMap, count: int) -> ConformalMap:
+    """The same map, told that ``count`` vertices were inserted (besides those that it tells of already)."""
+    if not count:
+        return found
+    total = found.inserted + count
+    notes = tuple(note for note in found.notes if not note.startswith(REFINED))
+    sentence = (
+        f"{REFINED} {total} vertices were inserted on its edges, where triangles would have turned over or "
+        "collapsed in the domain."
+    )
+    return replace(found, inserted=total, notes=(*notes, sentence))
+
+
+def _sent(surface: Surface, faces: Ints) -> list[int]:
+    """The sent vertices of some faces."""
+    sent = surface.input_vertex[np.unique(surface.faces[faces])]
+    return [int(v) for v in sent if v >= 0]

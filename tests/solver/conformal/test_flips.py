@@ -1,0 +1,108 @@
+"""The route by flips: its theorems, and the meshes it is for."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from tests.solver.conformal.annuli import bump, catenoid
+from tests.solver.conformal.checks import faults
+from tests.solver.conformal.shared import MESHES, load
+
+from hexwrap_solver.arrays import Floats
+from hexwrap_solver.conformal import boundary, conformal_map
+from hexwrap_solver.conformal.cut import cut_open
+from hexwrap_solver.conformal.energy import Energy, opposite_lengths
+from hexwrap_solver.conformal.robust import solve_with_flips
+from hexwrap_solver.conformal.robust.delaunay import cosine_sums, make_delaunay
+from hexwrap_solver.conformal.robust.descent import FlipEnergy
+from hexwrap_solver.conformal.robust.metric import angle_sums, measure
+from hexwrap_solver.conformal.robust.mirror import MirrorMesh, mirror_mesh
+from hexwrap_solver.conformal.types import BoundaryCondition
+from hexwrap_solver.surface.types import Surface
+
+
+def _mirrored(surface: Surface) -> MirrorMesh:
+    sheet = cut_open(surface.faces, surface.loops, len(surface.vertices)).sheet
+    turn = (np.roll(sheet, -1, axis=1) - sheet).ravel()
+    lengths = opposite_lengths(surface.vertices, surface.faces)
+    return mirror_mesh(surface, np.log(lengths)[[2, 0, 1]].T.ravel(), turn)
+
+
+def _random_u(n: int, size: float, seed: int = 3) -> Floats:
+    return np.random.default_rng(seed).normal(scale=size, size=n)
+
+
+def test_where_no_edge_needs_a_flip_both_routes_agree() -> None:
+    surface = catenoid(24, 8)
+    targets = boundary.straight(surface)
+    found = solve_with_flips(surface, targets)
+    plain = conformal_map(surface, BoundaryCondition())
+    assert found.inserted == 0
+    ratio = np.ptp(found.uv.imag) / found.circumference
+    assert abs(ratio - np.ptp(plain.uv.imag) / plain.circumference) < 1e-12
+    assert faults(found, (targets.angle[surface.loops[0]], targets.angle[surface.loops[1]])) == []
+
+
+def test_after_flips_every_edge_is_delaunay_and_triangle_inequalities_hold() -> None:
+    surface = bump(24, 10)
+    mesh = _mirrored(surface)
+    u = _random_u(mesh.n, 1.5)
+    assert make_delaunay(mesh, u) > 0
+    assert mesh.crossing.any()
+    assert cosine_sums(mesh, np.arange(len(mesh.crossing)), mesh.scaled(u)).min() > -1e-10
+    sides = mesh.scaled(u)[mesh.triangles() >> 1]
+    lengths = np.sort(np.exp(sides - sides.max(axis=1, keepdims=True)), axis=1)
+    assert (lengths[:, 2] <= lengths[:, 0] + lengths[:, 1]).all()
+
+
+def test_flips_there_and_back_restore_every_length() -> None:
+    surface = bump(24, 10)
+    mesh = _mirrored(surface)
+    make_delaunay(mesh, np.zeros(mesh.n))
+    before = np.sort(mesh.log_length)
+    make_delaunay(mesh, _random_u(mesh.n, 1.5))
+    assert np.abs(np.sort(mesh.log_length) - before).max() > 1e-3
+    make_delaunay(mesh, np.zeros(mesh.n))
+    assert np.abs(np.sort(mesh.log_length) - before).max() < 1e-11
+
+
+def test_gauss_bonnet_holds_in_every_delaunay_metric() -> None:
+    surface = bump(24, 10)
+    mesh = _mirrored(surface)
+    for seed in range(5):
+        u = _random_u(mesh.n, 2.0, seed)
+        make_delaunay(mesh, u)
+        total = angle_sums(mesh, measure(mesh, u)).sum()
+        assert total == pytest.approx(np.pi * len(surface.faces), rel=1e-12)
+
+
+def test_gradient_does_not_jump_across_flips_and_newton_direction_is_its_derivative() -> None:
+    surface = bump(16, 6)
+    energy = FlipEnergy(Energy(surface, boundary.straight(surface)), _mirrored(surface))
+    x = energy.plain.unknowns_of(_random_u(len(surface.vertices), 1.0))
+    metric, gradient = energy.at(x)
+    direction = energy.newton_direction(metric, gradient)
+    step = 1e-6 / np.abs(direction).max()
+    ahead, behind = energy.at(x + step * direction)[1], energy.at(x - step * direction)[1]
+    assert np.abs((ahead - behind) / (2 * step) + gradient).max() < 1e-6 * np.abs(gradient).max()
+    # along a line full of flips the gradient stays continuous, and φ' grows
+    far = _random_u(len(x), 2.0, 8)
+    gradients = np.array([energy.at(x + t * far)[1] for t in np.linspace(0, 1, 400)])
+    assert energy.flips > 20
+    assert (np.diff(gradients @ far) > 0).all()
+
+
+@pytest.mark.parametrize("name", sorted(MESHES))
+@pytest.mark.parametrize("mode", ["straight", "isometric", "optimal"])
+def test_public_meshes_have_a_map(name: str, mode: str) -> None:
+    surface = load(MESHES[name])
+    if mode == "straight":
+        condition = BoundaryCondition()
+    else:
+        condition = BoundaryCondition(
+            "isometric", quantum=np.pi / 3, spread="even" if mode == "isometric" else "optimal"
+        )
+    found = conformal_map(surface, condition)
+    assert faults(found) == []
+    if mode == "straight":
+        assert all(np.abs(angles - np.pi).max() < 1e-9 for angles in found.boundary_angles)

@@ -1,0 +1,82 @@
+"""lift and flatten are inverse to each other, on every sheet, and say what lies outside."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from tests.solver.pattern import annuli
+
+from hexwrap_solver.domain import flatten, lift
+from hexwrap_solver.domain.flatten import nearest_on_mesh
+
+CATENOID = annuli.revolution(np.cosh, np.linspace(-1, 1.5, 25), 40, cut=9, turn=1.7 * np.exp(0.4j))
+CONES = {k: annuli.flat_cone(k * np.pi / 3, 1.0, 2.0, 60, 12, cut=11) for k in (1, 3, -2, 5)}
+
+
+def places_in(cmap, rng, count):
+    """Random places inside random triangles, in the layout's own sheet."""
+    face = rng.integers(len(cmap.surface.faces), size=count)
+    weights = rng.dirichlet([1, 1, 1], size=count)
+    return (weights * cmap.corners()[face]).sum(axis=1)
+
+
+@pytest.mark.parametrize("cmap", [CATENOID, *CONES.values()])
+@given(seed=st.integers(0, 2**31), sheet=st.integers(-3, 3))
+@settings(max_examples=10, deadline=None)
+def test_round_trip_from_any_sheet(cmap, seed, sheet):
+    z = places_in(cmap, np.random.default_rng(seed), 50)
+    up = lift(cmap, cmap.deck.apply(z, sheet))
+    assert up.inside.all()
+    back = flatten(cmap, up.points)
+    assert back.distance.max() < 1e-9
+    again = lift(cmap, back.uv)
+    np.testing.assert_allclose(again.points, up.points, atol=1e-9)
+    turns = [abs(cmap.deck.apply(back.uv, s) - z) for s in range(-8, 9)]
+    assert np.min(turns, axis=0).max() < 1e-9
+
+
+def test_lifted_points_do_not_depend_on_the_sheet():
+    z = places_in(CATENOID, np.random.default_rng(5), 200)
+    first = lift(CATENOID, z)
+    for sheet in (-40, -1, 1, 2, 17):
+        np.testing.assert_allclose(
+            lift(CATENOID, CATENOID.deck.apply(z, sheet)).points, first.points, atol=1e-9
+        )
+
+
+def test_vertices_lift_to_themselves_with_their_normals():
+    up = lift(CATENOID, CATENOID.uv)
+    np.testing.assert_allclose(up.points, CATENOID.surface.vertices, atol=1e-9)
+    np.testing.assert_allclose(up.normals, CATENOID.surface.normals, atol=1e-7)
+
+
+def test_places_outside_are_told():
+    beyond = CATENOID.uv[CATENOID.surface.loops[0]] - 0.5j * CATENOID.deck.translation
+    mixed = np.concatenate([beyond, CATENOID.uv[:3], [complex(np.nan, 0)]])
+    up = lift(CATENOID, mixed)
+    assert up.inside.tolist() == [False] * len(beyond) + [True] * 3 + [False]
+    assert np.isnan(up.points[~up.inside]).all()
+    assert np.isfinite(up.points[up.inside]).all()
+
+
+def test_nearest_point_agrees_with_brute_force_on_an_uneven_mesh():
+    rng = np.random.default_rng(1)
+    cmap = annuli.revolution(lambda z: 0.05 + z**4, np.array([0, 0.01, 0.03, 0.3, 1, 1.01, 1.4]), 9)
+    vertices, faces = cmap.surface.vertices, cmap.surface.faces
+    points = rng.uniform(-3, 3, (300, 3))
+    face, weights, distance = nearest_on_mesh(vertices, faces, points)
+    np.testing.assert_allclose(weights.sum(axis=1), 1)
+    assert (weights >= -1e-12).all()
+    grid = np.array([(a, b, 20 - a - b) for a in range(21) for b in range(21 - a)]) / 20
+    samples = np.einsum("gc,fcd->gfd", grid, vertices[faces]).reshape(-1, 3)
+    brute = np.linalg.norm(points[:, None] - samples[None], axis=2).min(axis=1)
+    assert (distance <= brute + 1e-12).all()
+    assert (brute - distance).max() < 0.2
+    found = np.einsum("kc,kcd->kd", weights, vertices[faces[face]])
+    np.testing.assert_allclose(np.linalg.norm(found - points, axis=1), distance, atol=1e-12)
+    # Offsets along the normal from the middle of a face come back to where they started.
+    middle = vertices[faces].mean(axis=1)
+    _, _, near = nearest_on_mesh(vertices, faces, middle)
+    assert near.max() < 1e-12
