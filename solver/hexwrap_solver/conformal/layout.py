@@ -61,32 +61,43 @@ def _develop(twin: Ints, lengths: Floats, angles: Floats, faces: Ints) -> Comple
     every face knows the way 2^k steps up the tree, so rounds and rounding errors grow with log(depth).
     """
     m = len(faces)
-    local = _local_frames(lengths, angles)
-    inside = np.flatnonzero(twin.ravel() >= 0)
-    graph = sparse.csr_matrix(
-        (np.ones(len(inside), dtype=np.int8), (inside // 3, twin.ravel()[inside])), shape=(m, m)
-    )
-    order, parent = breadth_first_order(graph, 0)
-    child = order[1:].astype(np.int64)
-    above = parent[child].astype(np.int64)
-    edge = (twin[child] == above[:, None]).argmax(axis=1)
+    order, up = _face_tree(twin)
+    faces, local = faces[order], _local_frames(lengths[:, order], angles[:, order])
+    # faces in breadth-first order: parents then lie side by side in memory, too
+    child = np.arange(1, m)
+    parent = up[1:]
+    edge = (twin[order[1:]] == order[parent][:, None]).argmax(axis=1)
     tail = faces[child, (edge + 1) % 3]
-    start = (faces[above] == tail[:, None]).argmax(axis=1)  # the same edge runs backwards in the parent
-    from_child = local[child, (edge + 1) % 3], local[child, (edge + 2) % 3]
-    in_parent = local[above, start], local[above, (start + 2) % 3]
+    start = (faces[parent] == tail[:, None]).argmax(axis=1)  # the same edge runs backwards in the parent
+    mine = local[child, (edge + 1) % 3], local[child, (edge + 2) % 3]
+    theirs = local[parent, start], local[parent, (start + 2) % 3]
     turn = np.ones(m, dtype=complex)
     shift = np.zeros(m, dtype=complex)
-    ratio = (in_parent[1] - in_parent[0]) / (from_child[1] - from_child[0])
-    turn[child] = ratio / np.abs(ratio)
-    shift[child] = (in_parent[0] + in_parent[1]) / 2 - turn[child] * (from_child[0] + from_child[1]) / 2
-    up = np.zeros(m, dtype=np.int64)
-    up[child] = above
+    ratio = (theirs[1] - theirs[0]) / (mine[1] - mine[0])
+    turn[1:] = ratio / np.abs(ratio)
+    shift[1:] = (theirs[0] + theirs[1] - turn[1:] * (mine[0] + mine[1])) / 2
     while up.any():
         shift = turn[up] * shift + shift[up]
         turn = turn[up] * turn
         up = up[up]
     turn /= np.abs(turn)
-    return np.asarray(turn[:, None] * local + shift[:, None])
+    corners = np.empty((m, 3), dtype=complex)
+    corners[order] = turn[:, None] * local + shift[:, None]
+    return corners
+
+
+def _face_tree(twin: Ints) -> tuple[Ints, Ints]:
+    """The faces in breadth-first order, and the place of each one's parent in that order (0 for the root)."""
+    m = len(twin)
+    neighbour = np.where(twin >= 0, twin, np.arange(m)[:, None])  # itself, where there is none
+    starts = np.arange(0, 3 * m + 1, 3)
+    graph = sparse.csr_matrix((np.ones(3 * m, dtype=np.int8), neighbour.ravel(), starts), shape=(m, m))
+    order, parent = breadth_first_order(graph, 0)
+    place = np.zeros(m, dtype=np.int64)
+    place[order] = np.arange(m)
+    up = np.zeros(m, dtype=np.int64)
+    up[1:] = place[parent[order[1:]]]
+    return order.astype(np.int64), up
 
 
 def _close(

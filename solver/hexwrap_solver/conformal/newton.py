@@ -21,25 +21,53 @@ MAX_STEPS = 60
 MAX_CHANGE = 8.0
 #: The largest entry of the gradient bottoms out at rounding, about this times √(number of unknowns).
 ROUNDING = 4e-15
+#: A residual up to this is accepted (the boundary angles are promised to 1e-9); from there on, a step that
+#: leaves more than STAGNATION of it is the last one: slivers stop at a higher level of rounding.
+ACCEPTED, STAGNATION = 3e-10, 0.5
+#: Multiples of its largest diagonal entry that make a singular Hessian definite.
+SHIFTS = (0.0, 1e-12, 1e-9, 1e-6)
 #: Acceptable overshoot φ'(t) / |φ'(0)| of a step.
 OVERSHOOT = 0.1
 MAX_TRIALS = 30
+#: After a step that changes no unknown by more than this, the factorised Hessian is used once more: its error
+#: is of that order, so the residual falls by about this factor for the price of a solve.
+CHORD = 1e-2
 
 
 @dataclass(frozen=True)
 class Minimum:
     """u: (n,) log scale factors. residual: max |angle sum − target| over the unknowns. broken: number of
-    triangles that violate the triangle inequality (then the original triangulation has no solution here)."""
+    triangles that violate the triangle inequality (then the original triangulation has no solution here).
+    iterations: steps taken, of which ``factorisations`` had a Hessian of their own."""
 
     u: Floats
     corners: Corners
     residual: float
     iterations: int
+    factorisations: int
     converged: bool
 
     @property
     def broken(self) -> int:
         return int(self.corners.broken.sum())
+
+
+@dataclass
+class _Point:
+    """The unknowns, and what the energy says there."""
+
+    x: Floats
+    corners: Corners
+    gradient: Floats
+
+    @classmethod
+    def at(cls, energy: Energy, x: Floats) -> _Point:
+        corners = energy.corners(energy.scale_of(x))
+        return cls(x, corners, energy.gradient(corners))
+
+    @property
+    def residual(self) -> float:
+        return _largest(self.gradient)
 
 
 def minimise(energy: Energy, start: Floats | None = None, progress: Progress = no_progress) -> Minimum:
@@ -49,67 +77,83 @@ def minimise(energy: Energy, start: Floats | None = None, progress: Progress = n
     when a full Newton step near the minimum no longer lowers it.
     """
     factorisation = Factorisation(energy.points, energy.rows, energy.columns)
-    x = np.zeros(energy.n_dof) if start is None else energy.unknowns_of(start)
-    corners = energy.corners(energy.scale_of(x))
-    gradient = energy.gradient(corners)
+    point = _Point.at(energy, np.zeros(energy.n_dof) if start is None else energy.unknowns_of(start))
     tolerance = ROUNDING * np.sqrt(energy.n_dof)
-    iterations, converged = 0, False
-    while iterations < MAX_STEPS:
-        residual = _largest(gradient)
-        if residual <= tolerance:
-            converged = True
-            break
-        progress(min(0.9, iterations / 10), f"Newton step {iterations + 1}, residual {residual:.1e} rad")
-        direction = _newton_direction(energy, factorisation, corners, gradient)
-        accepted = None if direction is None else _line_search(energy, x, direction, gradient)
-        if accepted is None:
-            converged = residual <= 1e3 * tolerance
+    iterations, factorisations, small = 0, 0, False
+    while point.residual > tolerance and iterations < MAX_STEPS:
+        progress(
+            min(0.9, iterations / 10), f"Newton step {iterations + 1}, residual {point.residual:.1e} rad"
+        )
+        following = _chord(energy, factorisation, point) if small else None
+        if following is None:
+            factorisations += 1
+            following, small = _newton_step(energy, factorisation, point)
+        if following is None:
             break
         iterations += 1
-        if _largest(accepted[2]) >= 0.5 * residual and residual <= 1e3 * tolerance:
-            converged = True  # stagnation at rounding; keep the better of the two
-            if _largest(accepted[2]) < residual:
-                x, corners, gradient = accepted
+        stagnant = following.residual > STAGNATION * point.residual
+        near = point.residual <= ACCEPTED
+        if following.residual < point.residual or not near:
+            point = following
+        if stagnant and near:
             break
-        x, corners, gradient = accepted
-    return Minimum(energy.scale_of(x), corners, _largest(gradient), iterations, converged)
+    return Minimum(
+        energy.scale_of(point.x),
+        point.corners,
+        point.residual,
+        iterations,
+        factorisations,
+        converged=point.residual <= ACCEPTED,
+    )
 
 
 def _largest(gradient: Floats) -> float:
     return float(np.abs(gradient).max(initial=0.0))
 
 
-def _newton_direction(
-    energy: Energy, factorisation: Factorisation, corners: Corners, gradient: Floats
-) -> Floats | None:
-    """H⁻¹(−∇E); a vertex all of whose triangles are broken gets a small diagonal, else H would be singular.
-    None where the system cannot be solved."""
-    diagonal, off_diagonal = energy.hessian(corners)
-    if corners.broken.any():
-        diagonal = diagonal + 1e-10 * max(float(np.abs(diagonal).max()), 1.0)
-    try:
-        factorisation.factorise(diagonal, off_diagonal)
-    except np.linalg.LinAlgError:
-        return None
-    direction = -factorisation.solve(gradient)
-    return direction if np.isfinite(direction).all() and gradient @ direction < 0 else None
+def _chord(energy: Energy, factorisation: Factorisation, point: _Point) -> _Point | None:
+    """A step with the Hessian of an earlier one; None where that is not good enough."""
+    following = _Point.at(energy, point.x - factorisation.solve(point.gradient))
+    return following if following.residual <= 10 * CHORD * point.residual else None
 
 
-def _line_search(
-    energy: Energy, x: Floats, direction: Floats, gradient: Floats
-) -> tuple[Floats, Corners, Floats] | None:
-    """The first acceptable step: φ'(t) at most a little above zero. Overshoots are cut by bisection
-    guarded secants on φ'. None where no step is left."""
-    slope = float(gradient @ direction)
-    low, low_slope = 0.0, slope
+def _newton_step(energy: Energy, factorisation: Factorisation, point: _Point) -> tuple[_Point | None, bool]:
+    """The next point, None where there is none, and whether the step was a full one below CHORD."""
+    direction = _newton_direction(energy, factorisation, point)
+    if direction is None:
+        return None, False
+    following, length = _line_search(energy, point, direction)
+    return following, length == 1.0 and _largest(direction) <= CHORD
+
+
+def _newton_direction(energy: Energy, factorisation: Factorisation, point: _Point) -> Floats | None:
+    """H⁻¹(−∇E). None where the system cannot be solved.
+
+    Broken triangles add nothing to H; where a vertex has no other ones H is singular, so a small multiple of
+    the diagonal is added, more where that does not suffice (Levenberg 1944).
+    """
+    diagonal, off_diagonal = energy.hessian(point.corners)
+    scale = max(float(np.abs(diagonal).max()), 1.0)
+    for shift in SHIFTS[int(point.corners.broken.any()) :]:
+        try:
+            factorisation.factorise(diagonal + shift * scale, off_diagonal)
+        except np.linalg.LinAlgError:
+            continue
+        direction = -factorisation.solve(point.gradient)
+        if np.isfinite(direction).all() and point.gradient @ direction < 0:
+            return direction
+    return None
+
+
+def _line_search(energy: Energy, point: _Point, direction: Floats) -> tuple[_Point | None, float]:
+    """The first acceptable step and its length: φ'(t) at most a little above zero. Overshoots are cut by
+    bisection guarded secants on φ'. None where no step is left."""
+    slope = float(point.gradient @ direction)
     t = min(1.0, MAX_CHANGE / max(_largest(direction), 1e-300))
     for _ in range(MAX_TRIALS):
-        trial = x + t * direction
-        corners = energy.corners(energy.scale_of(trial))
-        new = energy.gradient(corners)
-        new_slope = float(new @ direction)
-        if new_slope <= OVERSHOOT * abs(slope) or _largest(new) <= 0.5 * _largest(gradient):
-            return trial, corners, new
-        secant = low + (t - low) * low_slope / (low_slope - new_slope)
-        t = min(max(secant, low + 0.1 * (t - low)), low + 0.7 * (t - low))
-    return None
+        trial = _Point.at(energy, point.x + t * direction)
+        new_slope = float(trial.gradient @ direction)
+        if new_slope <= OVERSHOOT * abs(slope) or trial.residual <= 0.5 * point.residual:
+            return trial, t
+        t *= min(max(slope / (slope - new_slope), 0.1), 0.7)
+    return None, 0.0
