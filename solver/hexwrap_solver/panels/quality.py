@@ -8,7 +8,6 @@ import numpy as np
 
 from hexwrap_solver.arrays import Floats, Progress, Ragged, no_progress
 from hexwrap_solver.conformal.types import ConformalMap
-from hexwrap_solver.panels.distance import distance_to_surface
 from hexwrap_solver.panels.gaps import gaps
 from hexwrap_solver.panels.halfedges import HalfEdges, half_edges
 from hexwrap_solver.panels.overlap import overlapping_pairs
@@ -22,6 +21,7 @@ from hexwrap_solver.panels.polygons import (
 )
 from hexwrap_solver.panels.types import Panels, Quality
 from hexwrap_solver.pattern.types import Pattern
+from hexwrap_solver.surface.closest import TriangleTree
 
 
 def measure(
@@ -45,7 +45,8 @@ def measure(
     row, count, mean = polygons.row, polygons.lengths, mean_edges(polygons)
     ideal = (np.pi * (count - 2) / count)[row]
     progress(0.5, "distances to the surface")
-    away = distance_to_surface(np.asarray(polygons.values, dtype=np.float64), cmap.surface)
+    tree = TriangleTree.build(cmap.surface.vertices, cmap.surface.faces)
+    away = tree.nearest(np.asarray(polygons.values, dtype=np.float64)).distance
     progress(0.9, "looking for overlaps")
     return replace(
         quality,

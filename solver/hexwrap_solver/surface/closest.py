@@ -1,0 +1,156 @@
+"""The nearest point of a triangle mesh, exactly, for many points at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from hexwrap_solver.arrays import Floats, Ints
+
+#: Points searched together; bounds the memory of the search, not its result.
+CHUNK = 65536
+
+#: Points that descend the tree together.
+GROUP = 8
+
+#: Bits per coordinate of the Morton code that sorts the triangles.
+MORTON_BITS = 20
+
+
+@dataclass(frozen=True)
+class Nearest:
+    """face: (k,) a nearest triangle. barycentric: (k, 3) of the nearest point in it. distance: (k,)."""
+
+    face: Ints
+    barycentric: Floats
+    distance: Floats
+
+
+@dataclass(frozen=True)
+class TriangleTree:
+    """Boxes around triangles sorted along a Morton curve, pairwise merged up to a single root.
+
+    corners: (m, 3, 3). centroids: search tree over the triangles' centroids. order: (m,) triangles along
+    the curve. low, high: per level from the root downwards, (2^level, 3); boxes beyond the last triangle are empty (low = ∞).
+    """
+
+    corners: Floats
+    centroids: KDTree
+    order: Ints
+    low: list[Floats]
+    high: list[Floats]
+
+    @classmethod
+    def build(cls, vertices: Floats, faces: Ints) -> TriangleTree:
+        """vertices: (n, 3), faces: (m, 3) with m ≥ 1."""
+        corners = vertices[faces]
+        centroid = corners.mean(axis=1)
+        order = np.argsort(_morton(centroid), kind="stable")
+        leaves = 1 << max(len(faces) - 1, 0).bit_length()
+        low, high = np.full((leaves, 3), np.inf), np.full((leaves, 3), -np.inf)
+        low[: len(faces)] = corners[order].min(axis=1)
+        high[: len(faces)] = corners[order].max(axis=1)
+        lows, highs = [low], [high]
+        while len(lows[-1]) > 1:
+            lows.append(np.minimum(lows[-1][::2], lows[-1][1::2]))
+            highs.append(np.maximum(highs[-1][::2], highs[-1][1::2]))
+        return cls(corners, KDTree(centroid), order, lows[::-1], highs[::-1])
+
+    def nearest(self, points: Floats) -> Nearest:
+        """points: (k, 3)."""
+        face = np.zeros(len(points), dtype=np.int64)
+        barycentric = np.zeros((len(points), 3))
+        distance = np.zeros(len(points))
+        along_curve = np.argsort(_morton(points), kind="stable") if len(points) else face
+        for i in range(0, len(points), CHUNK):
+            part = along_curve[i : i + CHUNK]
+            face[part], barycentric[part], distance[part] = self._nearest(points[part])
+        return Nearest(face, barycentric, distance)
+
+    def _nearest(self, points: Floats) -> tuple[Ints, Floats, Floats]:
+        """The triangle with the nearest centroid bounds the search of the others."""
+        first = np.asarray(self.centroids.query(points)[1])
+        bound = nearest_in_triangles(points, self.corners[first])[1]
+        # Rounding of the box distances must not prune the guess itself.
+        reach = bound * (1 + 1e-9) + np.finfo(float).tiny
+        point, leaf = self._within(points, reach)
+        face = self.order[leaf]
+        barycentric, distance = nearest_in_triangles(points[point], self.corners[face])
+        best = np.lexsort((face, distance, point))
+        best = best[np.diff(point[best], prepend=-1) > 0]
+        return face[best], barycentric[best], distance[best]
+
+    def _within(self, points: Floats, reach: Floats) -> tuple[Ints, Ints]:
+        """All pairs (point, leaf) whose box comes within reach of the point.
+
+        Points that are neighbours along the curve descend the tree together, in one box.
+        """
+        start = np.arange(0, len(points), GROUP)
+        low = np.minimum.reduceat(points - reach[:, None], start)
+        high = np.maximum.reduceat(points + reach[:, None], start)
+        group, node = np.arange(len(start)), np.zeros(len(start), dtype=np.int64)
+        for level in range(1, len(self.low)):
+            group = np.repeat(group, 2)
+            node = np.repeat(2 * node, 2)
+            node[1::2] += 1
+            meets = (self.low[level][node] <= high[group]) & (self.high[level][node] >= low[group])
+            keep = meets[:, 0] & meets[:, 1] & meets[:, 2]
+            group, node = group[keep], node[keep]
+        size = np.minimum(GROUP, len(points) - start)[group]
+        point = np.repeat(start[group] - np.cumsum(size) + size, size) + np.arange(size.sum())
+        leaf = np.repeat(node, size)
+        outside = np.maximum(self.low[-1][leaf] - points[point], points[point] - self.high[-1][leaf])
+        keep = np.linalg.norm(np.maximum(outside, 0.0), axis=1) <= reach[point]
+        return point[keep], leaf[keep]
+
+
+def nearest_in_triangles(points: Floats, corners: Floats) -> tuple[Floats, Floats]:
+    """Barycentric coordinates (k, 3) of the point of triangle k nearest to point k, and the distance (k,)."""
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    ab, ac, ap = b - a, c - a, points - a
+    g11, g12, g22 = _dot(ab, ab), _dot(ab, ac), _dot(ac, ac)
+    r1, r2 = _dot(ab, ap), _dot(ac, ap)
+    det = g11 * g22 - g12**2
+    flat = det <= 0
+    det = np.where(flat, 1.0, det)
+    v, w = (g22 * r1 - g12 * r2) / det, (g11 * r2 - g12 * r1) / det
+    inside = ~flat & (v >= 0) & (w >= 0) & (v + w <= 1)
+    barycentric = np.stack([1 - v - w, v, w], axis=1)
+    outer = np.flatnonzero(~inside)
+    barycentric[outer] = _nearest_on_sides(points[outer], corners[outer])
+    offset = np.einsum("kc,kcd->kd", barycentric, corners - points[:, None])
+    return barycentric, np.linalg.norm(offset, axis=1)
+
+
+def _nearest_on_sides(points: Floats, corners: Floats) -> Floats:
+    best = np.full(len(points), np.inf)
+    barycentric = np.zeros((len(points), 3))
+    for k in range(3):
+        start, along = corners[:, k], corners[:, (k + 1) % 3] - corners[:, k]
+        squared = _dot(along, along)
+        t = np.clip(_dot(points - start, along) / np.where(squared > 0, squared, 1.0), 0.0, 1.0)
+        distance = np.linalg.norm(start + t[:, None] * along - points, axis=1)
+        nearer = distance < best
+        best = np.where(nearer, distance, best)
+        side = np.zeros((len(points), 3))
+        side[:, k], side[:, (k + 1) % 3] = 1 - t, t
+        barycentric[nearer] = side[nearer]
+    return barycentric
+
+
+def _morton(points: Floats) -> Ints:
+    """Interleaved bits of the coordinates: a curve that keeps near points near."""
+    low = points.min(axis=0)
+    span = max(float((points.max(axis=0) - low).max()), np.finfo(float).tiny)
+    cell = ((points - low) / span * ((1 << MORTON_BITS) - 1)).astype(np.int64)
+    code = np.zeros(len(points), dtype=np.int64)
+    for bit in range(MORTON_BITS):
+        for axis in range(3):
+            code |= ((cell[:, axis] >> bit) & 1) << (3 * bit + axis)
+    return code
+
+
+def _dot(a: Floats, b: Floats) -> Floats:
+    return np.asarray(np.einsum("kd,kd->k", a, b))

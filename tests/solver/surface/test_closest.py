@@ -1,0 +1,51 @@
+"""The nearest point of a mesh is the nearest over all triangles."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hexwrap_solver.surface.closest import TriangleTree, nearest_in_triangles
+
+
+def brute_force(points, vertices, faces):
+    corners = np.broadcast_to(vertices[faces], (len(points), len(faces), 3, 3)).reshape(-1, 3, 3)
+    repeated = np.repeat(points, len(faces), axis=0)
+    return nearest_in_triangles(repeated, corners)[1].reshape(len(points), -1).min(axis=1)
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 10**6), st.integers(1, 60), st.sampled_from([1.0, 1e-6, 0.0]))
+def test_tree_search_is_exact(seed, faces, flatness):
+    """Any soup of triangles: slivers, crossing ones, all in one plane."""
+    rng = np.random.default_rng(seed)
+    vertices = rng.normal(size=(30, 3)) * [1, 1, flatness]
+    soup = rng.integers(0, 30, (faces, 3))
+    points = rng.normal(size=(50, 3)) * rng.choice([0.1, 1, 10])
+    found = TriangleTree.build(vertices, soup).nearest(points)
+    assert np.allclose(found.distance, brute_force(points, vertices, soup), rtol=1e-9, atol=1e-12)
+    place = np.einsum("kc,kcd->kd", found.barycentric, vertices[soup[found.face]])
+    assert np.allclose(np.linalg.norm(place - points, axis=1), found.distance, atol=1e-12)
+    assert (found.barycentric >= 0).all()
+    assert np.allclose(found.barycentric.sum(axis=1), 1)
+
+
+def test_nearest_in_a_triangle_is_no_farther_than_any_sample():
+    rng = np.random.default_rng(0)
+    corners, points = rng.normal(size=(200, 3, 3)), rng.normal(size=(200, 3))
+    _, distance = nearest_in_triangles(points, corners)
+    samples = rng.dirichlet([0.5, 0.5, 0.5], 4000)
+    cloud = np.einsum("sc,kcd->ksd", samples, corners)
+    nearest = np.linalg.norm(cloud - points[:, None], axis=2).min(axis=1)
+    assert (distance <= nearest + 1e-12).all()
+    assert (nearest - distance).max() < 0.2
+
+
+def test_points_of_the_mesh_have_distance_zero_whatever_the_scale():
+    rng = np.random.default_rng(1)
+    vertices = 1e5 + 1e3 * rng.normal(size=(50, 3))
+    faces = rng.integers(0, 50, (80, 3))
+    found = TriangleTree.build(vertices, faces).nearest(vertices[faces[:, 1]])
+    assert found.distance == pytest.approx(0.0, abs=1e-9)
