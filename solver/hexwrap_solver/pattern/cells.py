@@ -1,4 +1,4 @@
-"""Whole cells: closed walks along the edges of the pattern that always turn left."""
+"""Cells: closed walks along the edges of the pattern that always turn left."""
 
 from __future__ import annotations
 
@@ -8,48 +8,58 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from hexwrap_solver.arrays import Bools, Ints
+from hexwrap_solver.arrays import Bools, Ints, Ragged
 from hexwrap_solver.pattern.lattice import Lattice, Motion
 from hexwrap_solver.pattern.links import Links
 
 
 @dataclass(frozen=True)
 class Cells:
-    """Side k of a cell runs from its corner k to corner k + 1, counter-clockwise.
+    """Sides are numbered through all cells; side k runs from the corner k to the next one of its cell.
 
-    corner: (c, p) nodes. turns: (c, p) sheets of the corners' own coordinates, seen from the first one's.
-    twin: (c, p) the same side in the neighbouring cell as p·cell + side, −1 where there is none.
+    corner: points per cell, counter-clockwise. turns: (sides,) sheets of the corners' own coordinates, seen
+    from the cell's first one. twin: (sides,) the same side of the neighbouring cell, −1 where there is none.
     """
 
-    corner: Ints
+    corner: Ragged
     turns: Ints
     twin: Ints
 
+    @property
+    def n(self) -> int:
+        return self.corner.n_rows
+
+    def neighbours(self) -> Ragged:
+        """The cell across each side, −1 where there is none."""
+        across = np.where(self.twin >= 0, self.corner.row[self.twin], -1)
+        return Ragged(across, self.corner.offsets)
+
     def part(self, keep: Bools) -> Cells:
         """Some of the cells."""
-        sides = self.corner.shape[1]
-        renumber = np.where(keep, np.cumsum(keep) - 1, -1)
-        twin = self.twin[keep]
-        cell = renumber[twin // sides]
+        side = np.repeat(keep, self.corner.lengths)
+        renumber = np.where(side, np.cumsum(side) - 1, -1)
+        twin = self.twin[side]
+        offsets = np.concatenate([[0], np.cumsum(self.corner.lengths[keep])])
         return Cells(
-            self.corner[keep],
-            self.turns[keep],
-            np.where((twin >= 0) & (cell >= 0), sides * cell + twin % sides, -1),
+            Ragged(self.corner.values[side], offsets),
+            self.turns[side],
+            np.where(twin >= 0, renumber[twin], -1),
         )
 
 
-def whole_cells(lattice: Lattice, motion: Motion, links: Links) -> Cells:
-    """Cells whose edges all run inside the domain and close up without going around it.
+def whole_cells(lattice: Lattice, motion: Motion, links: Links) -> tuple[Ints, Ints, Ints]:
+    """(c, p) corners, sheets and directions of the cells whose edges all run inside the domain.
 
-    Such a closed line bounds a disk of the universal cover, so that no boundary can hide inside a cell.
+    Each closes up without going around the surface. Such a closed line bounds a disk of the universal
+    cover, so that no boundary can hide inside a cell.
     """
-    order, sides = lattice.order, lattice.sides
+    order = lattice.order
     start = np.flatnonzero(links.head.ravel() >= 0)
     lowest = start
     node, way, turns = start // order, start % order, np.zeros(len(start), dtype=np.int64)
     alive = np.ones(len(start), dtype=bool)
     corner_of, way_of, turns_of = [], [], []
-    for _ in range(sides):
+    for _ in range(lattice.sides):
         corner_of.append(node)
         way_of.append(way)
         turns_of.append(turns)
@@ -59,45 +69,56 @@ def whole_cells(lattice: Lattice, motion: Motion, links: Links) -> Cells:
         way = (way - motion.rotation(across) + lattice.turn) % order
         turns = turns + across
         alive &= node >= 0
-    closed = alive & (node * order + way == start) & (turns == 0)
-    chosen = closed & (lowest == start)
-    corner = np.stack(corner_of, axis=1)[chosen]
-    direction = np.stack(way_of, axis=1)[chosen]
-    twin = _twins(lattice, motion, links, corner, direction)
-    return Cells(corner, np.stack(turns_of, axis=1)[chosen], twin)
+    chosen = alive & (node * order + way == start) & (turns == 0) & (lowest == start)
+    return (
+        np.stack(corner_of, axis=1)[chosen],
+        np.stack(turns_of, axis=1)[chosen],
+        np.stack(way_of, axis=1)[chosen],
+    )
 
 
-def _twins(lattice: Lattice, motion: Motion, links: Links, corner: Ints, direction: Ints) -> Ints:
+def link_twins(lattice: Lattice, motion: Motion, links: Links, corner: Ints, direction: Ints) -> Ints:
+    """(c·p,) the side that runs the other way along the same link."""
     order = lattice.order
     side_of = np.full(links.head.size, -1, dtype=np.int64)
     side_of[corner * order + direction] = np.arange(corner.size).reshape(corner.shape)
-    back = (direction - motion.rotation(links.turns[corner, direction]) + order // 2) % order
-    return np.asarray(side_of[links.head[corner, direction] * order + back])
+    return np.asarray(side_of[reverse_links(lattice, motion, links, corner, direction)].ravel())
 
 
-def largest_part(cells: Cells) -> tuple[Cells, int]:
-    """The largest edge-connected part, and how many cells were left out."""
-    c, sides = cells.corner.shape
-    a, k = np.nonzero(cells.twin >= 0)
-    graph = coo_array((np.ones(len(a)), (a, cells.twin[a, k] // sides)), shape=(c, c))
+def reverse_links(lattice: Lattice, motion: Motion, links: Links, tail: Ints, direction: Ints) -> Ints:
+    """Number order·node + direction of the link back."""
+    order = lattice.order
+    back = (direction - motion.rotation(links.turns[tail, direction]) + order // 2) % order
+    return np.asarray(links.head[tail, direction] * order + back)
+
+
+def only_whole_cells(lattice: Lattice, motion: Motion, links: Links) -> Cells:
+    corner, turns, direction = whole_cells(lattice, motion, links)
+    twin = link_twins(lattice, motion, links, corner, direction)
+    return Cells(Ragged.from_table(corner), turns.ravel(), twin)
+
+
+def largest_part(cells: Cells) -> Bools:
+    """(c,) the largest edge-connected part."""
+    row = cells.corner.row
+    side = np.flatnonzero(cells.twin >= 0)
+    graph = coo_array((np.ones(len(side)), (row[side], row[cells.twin[side]])), shape=(cells.n, cells.n))
     parts, part = connected_components(graph, directed=False)
     if parts <= 1:
-        return cells, 0
-    keep = part == np.argmax(np.bincount(part))
-    return cells.part(keep), int(c - keep.sum())
+        return np.ones(cells.n, dtype=bool)
+    return np.asarray(part == np.argmax(np.bincount(part)))
 
 
 def manifold_corners(cells: Cells) -> tuple[Ints, Ints]:
-    """(c, p) vertex of every corner, and (v,) its node.
+    """(sides,) vertex of every corner, and (v,) the point at which it stands.
 
-    Cells that touch at a node, but at no edge there, get a vertex each, so that boundaries are simple loops.
+    Cells that touch at a point, but at no edge there, get a vertex each, so that boundaries are simple loops.
     """
-    c, sides = cells.corner.shape
-    side = np.flatnonzero(cells.twin.ravel() >= 0)
-    twin = cells.twin.ravel()[side]
-    after = twin - twin % sides + (twin + 1) % sides
-    graph = coo_array((np.ones(len(side)), (side, after)), shape=(c * sides, c * sides))
+    size = len(cells.twin)
+    side = np.flatnonzero(cells.twin >= 0)
+    after = cells.corner.next()[cells.twin[side]]
+    graph = coo_array((np.ones(len(side)), (side, after)), shape=(size, size))
     n, vertex = connected_components(graph, directed=False)
-    node = np.zeros(n, dtype=np.int64)
-    node[vertex] = cells.corner.ravel()
-    return vertex.astype(np.int64).reshape(c, sides), node
+    point = np.zeros(n, dtype=np.int64)
+    point[vertex] = cells.corner.values
+    return vertex.astype(np.int64), point

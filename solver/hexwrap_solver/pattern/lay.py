@@ -13,14 +13,15 @@ from hexwrap_solver.domain.interpolate import surface_weights
 from hexwrap_solver.domain.lift import points_at
 from hexwrap_solver.domain.locate import barycentric
 from hexwrap_solver.errors import PatternError
-from hexwrap_solver.pattern.cells import Cells, largest_part, manifold_corners, whole_cells
+from hexwrap_solver.pattern.cells import largest_part, manifold_corners, only_whole_cells
 from hexwrap_solver.pattern.cone import place_on_cone
 from hexwrap_solver.pattern.cylinder import place_on_cylinder
 from hexwrap_solver.pattern.lattice import LATTICES, Lattice
 from hexwrap_solver.pattern.links import link_nodes
-from hexwrap_solver.pattern.nodes import Layout, Nodes, find_nodes
+from hexwrap_solver.pattern.nodes import Layout, find_nodes
 from hexwrap_solver.pattern.placement import Placement, anchor_vertex, quantum_turns
 from hexwrap_solver.pattern.rings import places, rows_from, turns_around, winding
+from hexwrap_solver.pattern.trim import Points, Trimmed, trim
 from hexwrap_solver.pattern.types import Pattern, PatternSettings
 
 #: Rounding of the layout, relative to its extent; points this near to an edge count as on it.
@@ -46,12 +47,14 @@ def lay_pattern(cmap: ConformalMap, settings: PatternSettings, progress: Progres
     progress(0.3, f"{nodes.n} nodes")
     links = link_nodes(layout, nodes)
     progress(0.6, "edges")
-    cells, lost = largest_part(whole_cells(lattice, layout.motion, links))
-    if not len(cells.corner):
-        raise PatternError(
-            f"No whole cell fits on the surface at {placement.around} around: ask for smaller cells."
-        )
-    return _finish(cmap, settings, placement, layout, nodes, cells, lost)
+    if settings.boundary == "trim":
+        trimmed = trim(cmap, layout, nodes, links)
+    else:
+        cells = only_whole_cells(lattice, layout.motion, links)
+        points = Points(nodes.face[nodes.own], lattice.position(nodes.point[nodes.own]))
+        trimmed = Trimmed(cells, np.ones(cells.n, dtype=bool), points)
+    progress(0.8, f"{trimmed.cells.n} cells")
+    return _finish(cmap, settings, placement, layout, trimmed)
 
 
 def layout_of(cmap: ConformalMap, lattice: Lattice, placement: Placement) -> Layout:
@@ -75,52 +78,62 @@ def _check_count(layout: Layout, settings: PatternSettings) -> None:
 
 
 def _finish(
-    cmap: ConformalMap,
-    settings: PatternSettings,
-    placement: Placement,
-    layout: Layout,
-    nodes: Nodes,
-    cells: Cells,
-    lost: int,
+    cmap: ConformalMap, settings: PatternSettings, placement: Placement, layout: Layout, cut: Trimmed
 ) -> Pattern:
-    corner, node = manifold_corners(cells)
-    own = nodes.own[node]
-    triangle, place = nodes.face[own], layout.lattice.position(nodes.point[own])
+    keep = largest_part(cut.cells) if cut.cells.n else np.zeros(0, dtype=bool)
+    if not keep.any():
+        raise PatternError(
+            f"No whole cell fits on the surface at {placement.around} cells around: ask for smaller cells."
+        )
+    cells = cut.cells.part(keep)
+    corner, point = manifold_corners(cells)
+    triangle, place = cut.points.face[point], cut.points.place[point]
     weights = barycentric(layout.corners[triangle], place)
     uv = (weights * cmap.corners()[triangle]).sum(axis=1)
     on_surface = surface_weights(cmap, triangle, weights)
     vertices, normals = points_at(cmap, triangle, on_surface)
-    faces, neighbours = Ragged.from_table(corner), Ragged.from_table(cells.twin // layout.lattice.sides)
-    sheet = cells.turns.ravel()
-    first = _at_first_loop(cmap, faces, neighbours, sheet)
+    faces, neighbours = Ragged(corner, cells.corner.offsets), cells.neighbours()
+    first = _at_first_loop(cmap, faces, neighbours, cells.turns)
     ring = rows_from(neighbours, first)
     if settings.kind == "triangle":
         ring = ring // 2  # a row of triangles: those that stand and those that hang
-    turn = (weights * (turns_around(cmap)[cmap.surface.faces] + cmap.sheet)[triangle]).sum(axis=1)
-    turn = (turn - turns_around(cmap)[anchor_vertex(cmap)])[corner] + cells.turns
-    notes = list(placement.notes)
-    if lost:
-        notes.append(f"{lost} cells hung on the pattern by no edge and were left out.")
+    vertex_turn = turns_around(cmap)
+    turn = (weights * (vertex_turn[cmap.surface.faces] + cmap.sheet)[triangle]).sum(axis=1)
+    turn = turn[corner] - vertex_turn[anchor_vertex(cmap)] + cells.turns
+    turn_of_cell = np.add.reduceat(turn, faces.offsets[:-1]) / faces.lengths
     return Pattern(
         kind=settings.kind,
         vertices=vertices,
         normals=normals,
         uv=uv,
         faces=faces,
-        sheet=sheet,
+        sheet=cells.turns,
         neighbours=neighbours,
         triangle=triangle,
         barycentric=on_surface,
-        whole=np.ones(faces.n_rows, dtype=bool),
+        whole=cut.whole[keep],
         ring=ring,
-        place=places(ring, turn.mean(axis=1)),
+        place=places(ring, turn_of_cell),
         rings=int(ring.max()) + 1,
         around=placement.around,
         rotation=placement.rotation,
         edge_length=mean_edge(vertices, faces),
         distortion=placement.distortion,
-        notes=tuple(notes),
+        notes=(*placement.notes, *_told(cut, int(np.count_nonzero(~keep)))),
     )
+
+
+def _told(cut: Trimmed, apart: int) -> list[str]:
+    notes = []
+    if cut.joined:
+        notes.append(f"{cut.joined} slivers at the boundary were joined to the cut cell beside them.")
+    if cut.lost:
+        notes.append(
+            f"{cut.lost} slivers at the boundary were left out, {cut.dropped:.2f} cells in area altogether."
+        )
+    if apart:
+        notes.append(f"{apart} cells hung on the pattern by no edge and were left out.")
+    return notes
 
 
 def mean_edge(vertices: Floats, faces: Ragged) -> float:

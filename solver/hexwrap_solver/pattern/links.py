@@ -18,7 +18,7 @@ class Links:
 
     head: (n, order) the node at the other end, −1 where there is none. turns: (n, order) the sheet of the
     head's own coordinates, seen from the tail's. exits: (n, order) 3·face + edge of the boundary edge at
-    which the edge leaves the domain, −1 elsewhere.
+    which the edge leaves the domain, −1 elsewhere; turns is the sheet of that face then.
     """
 
     head: Ints
@@ -52,6 +52,7 @@ def _follow(layout: Layout, nodes: Nodes, links: Links, node: Ints, direction: I
     arrival = nodes.find(found.face, found.target)
     arrived = (found.exit < 0) & ~blocked & (arrival >= 0)
     out = np.flatnonzero(~arrived)
+    links.turns[node[out], direction[out]] = nodes.turns[seen[out]] + found.sheet[out]
     links.exits[node[out], direction[out]] = 3 * found.face[out] + np.maximum(found.exit[out], 0)
     node, direction, seen, arrival = node[arrived], direction[arrived], seen[arrived], arrival[arrived]
     turns = nodes.turns[seen] + found.sheet[arrived] - nodes.turns[arrival]

@@ -54,6 +54,11 @@ class Nodes:
     def n(self) -> int:
         return len(self.own)
 
+    def near_edges(self, layout: Layout, reach: float) -> Bools:
+        """(k, 3) which edges of its triangle each sighting lies on."""
+        place = layout.lattice.position(self.point)
+        return np.asarray(abs(edge_distances(layout.corners[self.face], place)) <= reach)
+
     def find(self, face: Ints, point: Ints) -> Ints:
         """Position of a sighting, −1 where there is none."""
         key = _key(face, point, self._low, self._span)
@@ -133,9 +138,7 @@ def find_nodes(layout: Layout) -> Nodes:
 
 def _same_place(layout: Layout, seen: Nodes, cover: Cover) -> tuple[Ints, Ints, Ints]:
     """Pairs of sightings of one node across an edge it lies on, with the shift of that edge."""
-    place = layout.lattice.position(seen.point)
-    near = abs(edge_distances(layout.corners[seen.face], place)) <= 4 * layout.reach
-    at, c = np.nonzero(near & (cover.across[seen.face] >= 0))
+    at, c = np.nonzero(seen.near_edges(layout, 4 * layout.reach) & (cover.across[seen.face] >= 0))
     across, shift = cover.across[seen.face[at], c], cover.shift[seen.face[at], c]
     other = seen.find(across, layout.motion.apply(seen.point[at], -shift))
     found = other >= 0
@@ -153,11 +156,3 @@ def _turns(own: Ints, first: Ints, second: Ints, shift: Ints, size: int) -> Ints
         turns[second[new]] = turns[first[new]] + shift[new]
         known[second[new]] = True
     return turns
-
-
-def on_boundary(layout: Layout, nodes: Nodes) -> Bools:
-    """(n,) whether a node lies on the boundary of the domain, within reach."""
-    place = layout.lattice.position(nodes.point)
-    near = abs(edge_distances(layout.corners[nodes.face], place)) <= layout.reach
-    touches = (near & (layout.cover.across[nodes.face] < 0)).any(axis=1)
-    return np.bincount(nodes.node, weights=touches, minlength=nodes.n) > 0
