@@ -1,0 +1,82 @@
+"""Builds ``dist/`` from ``src/``: user objects, the example network, the package for Rhino's package manager.
+
+Run ``python grasshopper/build.py``. The same sources give the same files, whenever and wherever it runs.
+"""
+
+from __future__ import annotations
+
+import io
+import sys
+import zipfile
+from pathlib import Path
+
+if __package__ in (None, ""):  # started as a script: its own folder is on the path, the repository is not
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from grasshopper import components, icons, network
+from grasshopper.archive import to_xml
+
+DIST = Path(__file__).resolve().parent / "dist"
+#: The earliest time a ZIP can hold; a real one would make every build differ.
+LONG_AGO = (1980, 1, 1, 0, 0, 0)
+MANIFEST = """---
+name: hexwrap
+version: {version}
+authors:
+- the hexwrap authors
+description: >-
+  Seamless hexagonal, quad and triangle panels on tube-like surfaces by periodic discrete conformal maps.
+  Needs the hexwrap server on the same computer ('pipx install hexwrap').
+keywords:
+- panelization
+- facade
+- hexagon
+- conformal
+- grasshopper
+"""
+
+
+def version() -> str:
+    """The project's version, from pyproject.toml."""
+    import tomllib
+
+    with (DIST.parents[1] / "pyproject.toml").open("rb") as file:
+        return str(tomllib.load(file)["project"]["version"])
+
+
+def draw_icons() -> dict[Path, bytes]:
+    """The icons, by path."""
+    return {folder / "icon.png": icons.icon(folder.name) for folder in components.folders()}
+
+
+def built() -> dict[str, bytes]:
+    """Every file of ``dist/``, by name."""
+    all_components = [components.load(folder) for folder in components.folders()]
+    files = {f"hexwrap-{c.folder}.ghuser": components.user_object(c) for c in all_components}
+    files["hexwrap-example.ghx"] = to_xml(network.example(all_components)).encode("utf-8")
+    files["hexwrap.yak"] = package(files)
+    return files
+
+
+def package(files: dict[str, bytes]) -> bytes:
+    """The ``.yak`` file: a ZIP with the manifest on top."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        for name, data in [("manifest.yml", MANIFEST.format(version=version()).encode()), *files.items()]:
+            entry = zipfile.ZipInfo(name, LONG_AGO)
+            entry.create_system = 3  # else the builder's own system is written here
+            archive.writestr(entry, data, zipfile.ZIP_DEFLATED, 9)
+    return buffer.getvalue()
+
+
+def main() -> None:
+    for path, data in draw_icons().items():
+        path.write_bytes(data)
+    DIST.mkdir(exist_ok=True)
+    for name, data in built().items():
+        (DIST / name).write_bytes(data)
+        print(f"{name}: {len(data)} bytes")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,54 @@
+"""Settings of the pattern: its kind, its size, and how it sits on the surface."""
+
+# include: wire canvas choices
+
+KINDS = ["hex", "triangle", "quad"]
+ALIGN = ["none", "first", "both"]
+EDGES = ["whole", "trim"]
+TURNS = ["edge", "vertex", "u", "v"]
+
+
+def rotation(value):
+    """A word, or a number of degrees."""
+    if value is None or not TEXT(value).strip():
+        return None
+    word = TEXT(value).strip().strip('"').lower()
+    return word if word in TURNS else number(word, "Rotation (edge, vertex, u, v, or degrees)")
+
+
+def size():
+    """(around, edge length), at most one of them. Raises Refusal."""
+    around = int(Around) if Around else None
+    length = float(EdgeLength) if EdgeLength else None
+    if around and length:
+        raise Refusal("Give either Around or EdgeLength: each of them sets the size of the cells.")
+    if (around or 1) < 1 or (length or 1.0) <= 0.0:
+        raise Refusal("Around and EdgeLength must be positive.")
+    return around, length
+
+
+def pattern_settings():
+    around, length = size()
+    return settings(
+        {
+            "kind": choice(Kind, KINDS, "Kind"),
+            "around": around,
+            "edge_length": length,
+            "rotation": rotation(Rotation),
+            "align": choice(Align, ALIGN, "Align"),
+            "boundary": choice(Boundary, EDGES, "Boundary"),
+            "phase": [float(PhaseX or 0.0), float(PhaseY or 0.0)] if PhaseX or PhaseY else None,
+        }
+    )
+
+
+component = ghenv.Component
+offer(component, {"Kind": KINDS, "Align": ALIGN, "Boundary": EDGES, "Rotation": TURNS[:2]})
+Pattern = None
+try:
+    chosen = pattern_settings()
+    Pattern = json.dumps({"pattern": chosen}, sort_keys=True)
+    component.Message = chosen.get("kind", "hex")
+except Refusal as refused:
+    component.Message = "failed"
+    fail(component, refused.message)

@@ -1,0 +1,40 @@
+"""The support structure below the panels: node axes, and beams between them that do not twist."""
+
+# include: wire canvas meshes
+import math
+
+
+def support(token, url):
+    """Work of the background thread."""
+    found = finished(url, token, ["support"]).get("support")
+    if not found:
+        raise Refusal("This job has no support structure: give the component Panels a BeamDepth and send again.")
+    return {
+        "nodes": [point(p) for p in found["nodes"]],
+        "axes": [vector(a) for a in found["axes"]],
+        "beams": [closed_polyline(strip) for strip in found["strips"]],
+        "lines": [
+            Rhino.Geometry.Line(point(found["nodes"][a]), point(found["nodes"][b])) for a, b in found["edges"]
+        ],
+        "torsion": [math.degrees(t) for t in found["torsion"]],
+        "tilt": [math.degrees(t) for t in found["tilt"]],
+    }
+
+
+component = ghenv.Component
+slot = slot_of(component)
+
+if not Job:
+    stop(slot)
+    component.Message = "no job yet"
+else:
+    in_background(component, slot, TEXT(Job), lambda token, url=TEXT(Job): support(token, url))
+    state_message(component, slot, "collected")
+
+found = slot["result"] or {}
+Nodes = found.get("nodes")
+Axes = found.get("axes")
+Beams = found.get("beams")
+Lines = found.get("lines")
+Torsion = found.get("torsion")
+Tilt = found.get("tilt")

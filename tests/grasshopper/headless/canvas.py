@@ -1,0 +1,166 @@
+"""A canvas without a screen: solves components as Grasshopper does, on one thread, and counts.
+
+Runs under CPython 3 and Jython 2.7.
+"""
+
+from __future__ import print_function
+
+import io
+import json
+import os
+import time
+import uuid
+
+import Grasshopper
+import Rhino
+
+try:
+    from Queue import Empty
+except ImportError:
+    from queue import Empty
+
+BUILT = os.environ["HEXWRAP_BUILT"]  # folder with Name.py and Name.json, unpacked from the built files
+
+
+def execute(code, scope):  # Python 2 allows exec only in functions without inner ones
+    exec(code, scope)
+
+
+class Parameter(object):
+    def __init__(self, name):
+        self.Name = name
+        self.Sources = []
+
+
+class Parameters(object):
+    def __init__(self, names):
+        self.Input = [Parameter(name) for name in names]
+
+
+class ValueList(object):
+    """A Value List as it looks when it has just been placed."""
+
+    def __init__(self):
+        self.ListItems = _Items(Grasshopper.GH_ValueListItem(w, str(k + 1)) for k, w in enumerate("1234"))
+        self.expired = 0
+
+    def ExpireSolution(self, recompute):
+        assert recompute is False
+        self.expired += 1
+
+
+class _Items(list):
+    def Clear(self):
+        del self[:]
+
+    Add = list.append
+
+
+class Component(object):
+    def __init__(self, name):
+        with io.open(os.path.join(BUILT, name + ".py"), encoding="ascii") as file:
+            self.code = compile(file.read(), name, "exec")
+        with io.open(os.path.join(BUILT, name + ".json"), encoding="utf-8") as file:
+            described = json.load(file)
+        self.inputs, self.outputs = described["inputs"], described["outputs"]
+        self.InstanceGuid = uuid.uuid4()
+        self.RunCount = 1
+        self.Params = Parameters(self.inputs)
+        self.document = Grasshopper.GH_Document()
+        self.scope = {"ghenv": self, "__name__": "__main__"}
+        self.wired = {}
+        self.values = {}
+        self.messages = []
+        self.solved = 0
+        self.expired = False
+        self.longest = 0.0
+        self._message = ""
+
+    @property
+    def Component(self):  # ghenv.Component
+        return self
+
+    @property
+    def Message(self):
+        return self._message
+
+    @Message.setter
+    def Message(self, text):
+        assert Rhino.on_ui_thread(), "Message set from another thread"
+        self._message = text
+
+    def AddRuntimeMessage(self, level, text):
+        assert Rhino.on_ui_thread()
+        self.messages.append((level, text))
+
+    def OnPingDocument(self):
+        assert Rhino.on_ui_thread()
+        return self.document
+
+    def OnDisplayExpired(self, redraw):
+        assert Rhino.on_ui_thread() and redraw is True
+
+    def ExpireSolution(self, recompute):
+        assert Rhino.on_ui_thread() and recompute is False
+        self.expired = True
+
+    def set(self, **values):
+        for name in values:
+            assert name in self.inputs, name
+        self.wired.update(values)
+        return self.solve()
+
+    def solve(self):
+        """One solution; an unwired input is None, as in GhPython."""
+        for name in self.inputs:
+            self.scope[name] = self.wired.get(name)
+        for name in self.outputs:
+            self.scope.pop(name, None)
+        self.messages = []
+        self.solved += 1
+        self.expired = False
+        start = time.time()
+        execute(self.code, self.scope)
+        self.longest = max(self.longest, time.time() - start)
+        self.values = dict((name, self.scope[name]) for name in self.outputs)
+        for name in self.inputs:
+            self.scope.pop(name, None)
+        return self
+
+    def __getattr__(self, name):
+        if name in self.__dict__.get("values", {}):
+            return self.values[name]
+        raise AttributeError(name)
+
+    def said(self, level):
+        return [text for kind, text in self.messages if kind == level]
+
+
+def pump(components, until, seconds=30.0):
+    """Runs the user interface's thread until a condition holds."""
+    end = time.time() + seconds
+    while not until():
+        assert time.time() < end, "waited %g s in vain; messages %r" % (
+            seconds,
+            [(c.Message, c.messages) for c in components],
+        )
+        try:
+            start = time.time()
+            Rhino.RhinoApp.waiting.get(timeout=0.05)()
+            assert time.time() - start < 0.5, "the canvas froze"
+        except Empty:
+            pass
+        for component in components:
+            if component.document is None:
+                continue
+            scheduled, component.document.scheduled = component.document.scheduled, []
+            for callback in scheduled:
+                callback(component.document)
+            if component.expired:
+                component.solve()
+
+
+def settle(component, solved, seconds=30.0):
+    """Until the component was solved again by itself."""
+    pump([component], lambda: component.solved >= solved, seconds)
+    return component

@@ -1,0 +1,12 @@
+"""Every component, run for real: under CPython and Jython 2.7, from the built files, on a headless canvas.
+
+The scenarios themselves stand in ``headless/scenarios_*.py``, which both interpreters can read.
+"""
+
+from collections.abc import Callable
+
+Runner = Callable[[str, dict[str, str]], None]
+
+
+def test_settings(run_scenarios: Runner) -> None:
+    run_scenarios("scenarios_settings", {})
