@@ -43,7 +43,7 @@ def check_arrays(sent: SentMesh) -> None:
     _check_faces(sent)
 
 
-def check_finite(points: Floats, what: str) -> None:
+def check_finite(points: Floats, what: str, field: tuple[str | int, ...] = ("surface", "vertices")) -> None:
     """Raises NonFiniteError for NaN, infinities and magnitudes whose areas a double cannot hold."""
     fine = np.abs(points) < LARGEST
     if not fine.all():
@@ -52,6 +52,7 @@ def check_finite(points: Floats, what: str) -> None:
             f"{what} {bad[0]} is at {points[bad[0]].tolist()} ({len(bad)} such in all): coordinates must be "
             f"finite numbers below {LARGEST:g}.",
             vertices=bad[:LISTED],
+            field=field,
         )
 
 

@@ -10,7 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from hexwrap_solver.arrays import Bools, Floats, Ints
-from hexwrap_solver.surface.topology import edge_groups, edge_lengths, next_half_edge, twins_of
+from hexwrap_solver.surface.flips import flip, independent, joins_new
+from hexwrap_solver.surface.topology import edge_lengths, next_half_edge, twins
 
 #: A triangle with a + b − c below this part of c has no angles in double precision: about 2e-6 degrees at
 #: the ends of its longest edge c.
@@ -43,21 +44,19 @@ def repair_flat(vertices: Floats, faces: Ints) -> tuple[Ints, Bools, Bools]:
 
 def _pass(vertices: Floats, faces: Ints, keep: Bools, bad: Bools) -> bool:
     """Repairs in place what can be repaired independently; False where nothing could."""
-    n, alive = len(vertices), np.flatnonzero(keep)
-    order, first = edge_groups(faces[alive], n)
-    local = twins_of(order, first)
+    alive = np.flatnonzero(keep)
+    local = twins(faces[alive], len(vertices))
     twin = np.full(3 * len(faces), -1, dtype=np.int64)
-    own = _half_edges_of(alive)
+    own = (3 * alive[:, None] + np.arange(3)).ravel()
     twin[own] = np.where(local >= 0, own[local], -1)
     face = np.flatnonzero(bad)
     h = 3 * face + np.argmax(edge_lengths(vertices, faces[face]), axis=1)
     rim = h[twin[h] < 0]
     droppable = rim[_leaves_no_pinch(faces, twin, keep, rim)]
-    inner = h[twin[h] >= 0]
-    flips = _independent(inner, twin, len(faces))
-    flips = flips[_new_edge(faces, alive, flips, twin, n)]
+    flips = independent(h[twin[h] >= 0], twin, len(faces))
+    flips = flips[joins_new(faces, flips, twin, len(vertices))]
     keep[droppable // 3] = False
-    _flip(faces, flips, twin[flips])
+    flip(faces, flips, twin)
     return bool(len(droppable) + len(flips))
 
 
@@ -73,40 +72,3 @@ def _leaves_no_pinch(faces: Ints, twin: Ints, keep: Bools, rim: Ints) -> Bools:
     once = np.zeros(len(rim), dtype=bool)
     once[np.unique(opposite, return_index=True)[1]] = True
     return np.asarray((~on_rim[opposite] | ear) & once)
-
-
-def _independent(h: Ints, twin: Ints, m: int) -> Ints:
-    """Half-edges no two of which touch the same face."""
-    owner = np.full(m, len(h), dtype=np.int64)
-    for side in (h // 3, twin[h] // 3):
-        np.minimum.at(owner, side, np.arange(len(h)))
-    mine = np.arange(len(h))
-    return np.asarray(h[(owner[h // 3] == mine) & (owner[twin[h] // 3] == mine)])
-
-
-def _new_edge(faces: Ints, alive: Ints, h: Ints, twin: Ints, n: int) -> Bools:
-    """Whether the flipped edge would join vertices that no edge joins yet, nor another flip."""
-    corner = faces.ravel()
-    a = corner[next_half_edge(next_half_edge(h))]
-    b = corner[next_half_edge(next_half_edge(twin[h]))]
-    key = np.minimum(a, b) * n + np.maximum(a, b)
-    start, end = corner[_half_edges_of(alive)], corner[next_half_edge(_half_edges_of(alive))]
-    taken = np.isin(key, np.minimum(start, end) * n + np.maximum(start, end))
-    once = np.zeros(len(h), dtype=bool)
-    once[np.unique(key, return_index=True)[1]] = True
-    return np.asarray(~taken & once & (a != b))
-
-
-def _half_edges_of(faces: Ints) -> Ints:
-    """The half-edges of some faces."""
-    return (3 * faces[:, None] + np.arange(3)).ravel()
-
-
-def _flip(faces: Ints, h: Ints, twin: Ints) -> None:
-    """Turns the edges h of oriented faces a→b (apex c) | b→a (apex d) into c–d, in place."""
-    corner = faces.ravel().copy()
-    a, b = corner[h], corner[next_half_edge(h)]
-    c = corner[next_half_edge(next_half_edge(h))]
-    d = corner[next_half_edge(next_half_edge(twin))]
-    faces[h // 3] = np.stack([a, d, c], axis=1)
-    faces[twin // 3] = np.stack([d, b, c], axis=1)

@@ -95,19 +95,28 @@ def _differentiate(knots: Floats, span: Ints, d: int, lower: Floats) -> Floats:
 
 def evaluate(nurbs: NurbsSurface, parameters: Floats) -> Jet:
     """The surface at (k, 2) parameters, which are wrapped into the domain first."""
+    net, bu, bv = _local(nurbs, parameters)
+    along = np.einsum("okp,kpqc->okqc", bu, net)
+    orders = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]
+    return _project({(a, b): np.einsum("kq,kqc->kc", bv[b], along[a]) for a, b in orders})
+
+
+def evaluate_points(nurbs: NurbsSurface, parameters: Floats) -> Floats:
+    """(k, 3) the points alone, several times as fast."""
+    net, bu, bv = _local(nurbs, parameters)
+    homogeneous = np.einsum("kq,kqc->kc", bv[0], np.einsum("kp,kpqc->kqc", bu[0], net))
+    return np.asarray(homogeneous[:, :3] / homogeneous[:, 3:])
+
+
+def _local(nurbs: NurbsSurface, parameters: Floats) -> tuple[Floats, Floats, Floats]:
+    """The control points (k, p + 1, q + 1, 4), premultiplied, and basis functions that live at parameters."""
     uv = wrap(nurbs, parameters)
     homogeneous = nurbs.control_points.copy()
     homogeneous[..., :3] *= homogeneous[..., 3:]
     (i, bu), (j, bv) = (basis(nurbs.knots[d], nurbs.degree[d], uv[:, d]) for d in (0, 1))
     rows = i[:, None] + np.arange(bu.shape[2])
     columns = j[:, None] + np.arange(bv.shape[2])
-    net = homogeneous[rows[:, :, None], columns[:, None, :]]
-    along = np.einsum("okp,kpqc->okqc", bu, net)
-    w = {(a, b): np.einsum("kq,kqc->kc", bv[b], along[a]) for a, b in _ORDERS}
-    return _project(w)
-
-
-_ORDERS = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]
+    return homogeneous[rows[:, :, None], columns[:, None, :]], bu, bv
 
 
 def _project(w: dict[tuple[int, int], Floats]) -> Jet:

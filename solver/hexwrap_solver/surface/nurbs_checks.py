@@ -1,0 +1,135 @@
+"""What must hold of a NURBS surface so that it is a tube: sound data, closed in exactly one direction."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from hexwrap_solver.arrays import Floats
+from hexwrap_solver.surface.checks import check_extent, check_finite
+from hexwrap_solver.surface.errors import NotAnnulusError, NotClosedError, NurbsDataError, PoleError
+from hexwrap_solver.surface.nurbs import domain, evaluate
+from hexwrap_solver.surface.types import NurbsSurface
+
+NAMES = "uv"
+HIGHEST_DEGREE = 32
+#: Two ends within this part of the surface's size are one seam, and a ring below it is a point.
+TOLERANCE = 1e-6
+#: Points per knot span at which ends are compared.
+PER_SPAN = 5
+
+
+def checked(nurbs: NurbsSurface) -> tuple[NurbsSurface, list[str]]:
+    """The surface with its closed direction verified, or found where none was named; and what was repaired.
+
+    Raises NurbsDataError, NonFiniteError, FlatSurfaceError, NotClosedError, NotAnnulusError, PoleError.
+    """
+    check_data(nurbs)
+    size = float(np.linalg.norm([np.ptp(x) for x in nurbs.control_points[..., :3].reshape(-1, 3).T]))
+    check_extent(size)
+    gap = [_gap(nurbs, direction) for direction in (0, 1)]
+    collapsed = [_collapsed(nurbs, direction, TOLERANCE * size) for direction in (0, 1)]
+    for direction in (0, 1):
+        if nurbs.closed[direction] and gap[direction] > TOLERANCE * size:
+            raise NotClosedError(
+                f"The NURBS surface is said to be closed in {NAMES[direction]}, but its ends are up to "
+                f"{gap[direction]:.4g} apart: join them to within {TOLERANCE * size:.2g}.",
+                field=("surface", "nurbs", "closed", direction),
+            )
+    closed = [gap[d] <= TOLERANCE * size for d in (0, 1)]
+    if any(collapsed):
+        at = NAMES[collapsed.index(True)]
+        raise PoleError(
+            f"The NURBS surface shrinks to a point at an end of {at}: a tube is open there, so trim the tip "
+            "off along a parameter line."
+        )
+    if all(closed):
+        raise NotAnnulusError(
+            "The NURBS surface is closed in u and in v, like a torus: a tube is open in one of them, so "
+            "split it along a parameter line.",
+            data={"reason": "closed", "loops": 0, "euler_characteristic": 0, "genus": 1},
+        )
+    if not any(closed):
+        raise NotClosedError(
+            f"The NURBS surface is closed in no direction: its ends are up to {gap[0]:.4g} apart in u and "
+            f"{gap[1]:.4g} in v. A tube must close up in one of them to within {TOLERANCE * size:.2g}."
+        )
+    told = [] if any(nurbs.closed) else [f"The surface was found to close up in {NAMES[closed.index(True)]}."]
+    return replace(nurbs, closed=(closed[0], closed[1])), told
+
+
+def check_data(nurbs: NurbsSurface) -> None:
+    """Raises NurbsDataError, NonFiniteError."""
+    net = nurbs.control_points
+    if net.ndim != 3 or net.shape[2] != 4:
+        raise NurbsDataError(
+            f"The control points have the shape {net.shape}: a grid of (x, y, z, w) is needed.",
+            field=("surface", "nurbs", "control_points"),
+        )
+    check_finite(net.reshape(-1, 4), "Control point", ("surface", "nurbs", "control_points"))
+    if not (net[..., 3] > 0).all():
+        i, j = np.argwhere(~(net[..., 3] > 0))[0]
+        raise NurbsDataError(
+            f"Control point [{i}][{j}] has the weight {net[i, j, 3]:g}: weights must be positive.",
+            field=("surface", "nurbs", "control_points", int(i), int(j), 3),
+        )
+    for direction in (0, 1):
+        _check_knots(nurbs, direction)
+
+
+def _check_knots(nurbs: NurbsSurface, direction: int) -> None:
+    name, p, knots = NAMES[direction], nurbs.degree[direction], nurbs.knots[direction]
+    n = nurbs.control_points.shape[direction]
+
+    def wrong(text: str, part: str = "knots") -> NurbsDataError:
+        return NurbsDataError(text, field=("surface", "nurbs", part, direction))
+
+    if not 1 <= p <= HIGHEST_DEGREE:
+        raise wrong(f"The degree in {name} is {p}: it must lie between 1 and {HIGHEST_DEGREE}.", "degree")
+    if n <= p:
+        raise wrong(f"Degree {p} in {name} needs at least {p + 1} control points; there are {n}.", "degree")
+    if knots.shape != (n + p + 1,):
+        raise wrong(
+            f"There are {knots.size} knots in {name}; {n} control points of degree {p} need the full knot "
+            f"vector of {n + p + 1} (Rhino leaves out the first and the last: repeat them)."
+        )
+    if not np.isfinite(knots).all() or (np.diff(knots) < 0).any():
+        raise wrong(f"The knots in {name} must be finite numbers that never decrease.")
+    if not knots[n] > knots[p]:
+        raise wrong(f"The domain in {name}, from knot {p} to knot {n}, is empty.")
+    inner = knots[(knots > knots[p]) & (knots < knots[n])]
+    torn = [x for x, count in zip(*np.unique(inner, return_counts=True), strict=True) if count > p]
+    if torn:
+        raise wrong(
+            f"The knot {torn[0]:g} in {name} stands there more than {p} times, which tears the surface."
+        )
+
+
+def spans(nurbs: NurbsSurface, direction: int, per_span: int) -> Floats:
+    """Parameters from end to end of the domain, so many steps in every knot span."""
+    low, high = domain(nurbs, direction)
+    knots = nurbs.knots[direction]
+    marks = np.unique(knots[(knots >= low) & (knots <= high)])
+    steps = marks[:-1, None] + np.diff(marks)[:, None] * np.arange(per_span) / per_span
+    return np.append(steps.ravel(), high)
+
+
+def _line(nurbs: NurbsSurface, direction: int, at: float) -> Floats:
+    """Points along the parameter line on which the parameter of direction is constant."""
+    along = spans(nurbs, 1 - direction, PER_SPAN)
+    fixed = np.full_like(along, at)
+    pair = (fixed, along) if direction == 0 else (along, fixed)
+    open_surface = replace(nurbs, closed=(False, False))  # both ends of a period are wanted
+    return evaluate(open_surface, np.stack(pair, axis=1)).point
+
+
+def _gap(nurbs: NurbsSurface, direction: int) -> float:
+    low, high = (_line(nurbs, direction, x) for x in domain(nurbs, direction))
+    return float(np.linalg.norm(low - high, axis=1).max())
+
+
+def _collapsed(nurbs: NurbsSurface, direction: int, tolerance: float) -> bool:
+    """Whether a parameter line at an end of direction is a point."""
+    lines = [_line(nurbs, direction, x) for x in domain(nurbs, direction)]
+    return any(float(np.ptp(line, axis=0).max()) <= tolerance for line in lines)

@@ -1,0 +1,130 @@
+"""Closest points on a NURBS surface, by Newton's method for all points at once."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hexwrap_solver.arrays import Bools, Floats, Ints
+from hexwrap_solver.surface.nurbs import Jet, domain, evaluate, evaluate_points, wrap
+from hexwrap_solver.surface.topology import edges
+from hexwrap_solver.surface.types import NurbsSurface, Surface
+
+STEPS = 30
+#: From the middle of the parameters one step is enough for the component along the normal.
+CHORD_STEPS = 1
+#: Newton steps below this part of the domain end the iteration.
+CONVERGED = 1e-13
+#: A step that does not bring the point nearer is halved so many times at most.
+HALVINGS = 12
+
+
+def project(
+    nurbs: NurbsSurface, points: Floats, start: Floats, steps: int = STEPS
+) -> tuple[Floats, Floats, Floats]:
+    """The points of the surface nearest to given ones, as far as Newton's method leads from the start.
+
+    points: (k, 3). start: (k, 2) parameters. Returns points (k, 3), parameters (k, 2) in the base period, and
+    unit normals (k, 3). The distance vector is parallel to the normal, except at the surface's open ends.
+    """
+    uv = wrap(nurbs, start)
+    jet = evaluate(nurbs, uv)
+    active = np.arange(len(uv))
+    for _ in range(steps):
+        step = _newton_step(nurbs, _take(jet, active), points[active], uv[active])
+        uv[active], moved = _search(nurbs, points[active], uv[active], jet.point[active], step)
+        fresh = evaluate(nurbs, uv[active])
+        for whole, part in zip(jet, fresh, strict=True):
+            whole[active] = part
+        active = active[moved]
+        if len(active) == 0:
+            break
+    return jet.point, uv, jet.normal
+
+
+def start_parameters(surface: Surface, triangle: Ints, barycentric: Floats) -> Floats:
+    """(k, 2) parameters interpolated in triangles of a mesh that was made from its NURBS surface.
+
+    triangle: (k,) faces. barycentric: (k, 3). Corners beyond the seam are taken a period further.
+    """
+    if surface.nurbs is None or surface.parameters is None:
+        raise ValueError("the surface was not made from a NURBS surface")
+    corners = surface.parameters[surface.faces[triangle]]
+    corners = corners[:, :1] + _shortest(surface.nurbs, corners - corners[:, :1])
+    return wrap(surface.nurbs, np.einsum("kc,kcd->kd", barycentric, corners))
+
+
+def chord_heights(nurbs: NurbsSurface, parameters: Floats, points: Floats, faces: Ints) -> Floats:
+    """(e,) distances of the middles of all edges from the surface."""
+    ends, _ = edges(faces, len(points))
+    a, b = parameters[ends[:, 0]], parameters[ends[:, 1]]
+    middle = points[ends].mean(axis=1)
+    foot, _, normal = project(nurbs, middle, a + _shortest(nurbs, b - a) / 2, CHORD_STEPS)
+    return np.abs(_dot(middle - foot, normal))
+
+
+def _shortest(nurbs: NurbsSurface, difference: Floats) -> Floats:
+    """Differences (…, 2) of parameters, modulo the period where the surface is closed."""
+    out = difference.copy()
+    for direction in (0, 1):
+        if nurbs.closed[direction]:
+            low, high = domain(nurbs, direction)
+            out[..., direction] -= (high - low) * np.round(out[..., direction] / (high - low))
+    return out
+
+
+def _take(jet: Jet, rows: Ints) -> Jet:
+    return Jet(*(part[rows] for part in jet))
+
+
+def _newton_step(nurbs: NurbsSurface, jet: Jet, points: Floats, uv: Floats) -> Floats:
+    """(k, 2): Newton's step for half the squared distance; Gauss–Newton's where the Hessian is not positive.
+
+    A parameter at an open end that would leave the domain is kept there.
+    """
+    r = jet.point - points
+    gu, gv = _dot(r, jet.du), _dot(r, jet.dv)
+    e, f, g = _dot(jet.du, jet.du), _dot(jet.du, jet.dv), _dot(jet.dv, jet.dv)
+    a, b, c = e + _dot(r, jet.duu), f + _dot(r, jet.duv), g + _dot(r, jet.dvv)
+    convex = (a > 0) & (a * c - b * b > 1e-9 * e * g)
+    a, b, c = np.where(convex, a, e), np.where(convex, b, f), np.where(convex, c, g)
+    a, c = a + 1e-12 * e.max(initial=0), c + 1e-12 * g.max(initial=0)  # singular points stay where they are
+    stuck_u, stuck_v = _stuck(nurbs, uv, gu, 0), _stuck(nurbs, uv, gv, 1)
+    determinant = a * c - b * b
+    with np.errstate(divide="ignore", invalid="ignore"):
+        du = np.where(stuck_v, -gu / a, (b * gv - c * gu) / determinant)
+        dv = np.where(stuck_u, -gv / c, (b * gu - a * gv) / determinant)
+    step = np.stack([np.where(stuck_u, 0.0, du), np.where(stuck_v, 0.0, dv)], axis=1)
+    return np.where(np.isfinite(step), step, 0.0)
+
+
+def _stuck(nurbs: NurbsSurface, uv: Floats, gradient: Floats, direction: int) -> Bools:
+    if nurbs.closed[direction]:
+        return np.zeros(len(uv), dtype=bool)
+    low, high = domain(nurbs, direction)
+    x = uv[:, direction]
+    return np.asarray(((x <= low) & (gradient > 0)) | ((x >= high) & (gradient < 0)))
+
+
+def _search(
+    nurbs: NurbsSurface, points: Floats, uv: Floats, at: Floats, step: Floats
+) -> tuple[Floats, Bools]:
+    """Parameters after the step, halved until the distance does not grow, and which ones really moved."""
+    width = np.array([high - low for low, high in (domain(nurbs, d) for d in (0, 1))])
+    step = step / np.maximum(1.0, np.abs(step / width).max(axis=1, keepdims=True) * 4)
+    before = np.linalg.norm(at - points, axis=1)
+    out, waiting = uv.copy(), np.arange(len(uv))
+    for _ in range(HALVINGS):
+        trial = wrap(nurbs, uv[waiting] + step[waiting])
+        after = np.linalg.norm(evaluate_points(nurbs, trial) - points[waiting], axis=1)
+        good = after <= before[waiting]
+        out[waiting[good]] = trial[good]
+        waiting = waiting[~good]
+        if len(waiting) == 0:
+            break
+        step[waiting] /= 2
+    moved = np.abs(_shortest(nurbs, out - uv) / width).max(axis=1) > CONVERGED
+    return out, moved
+
+
+def _dot(a: Floats, b: Floats) -> Floats:
+    return np.asarray(np.einsum("ij,ij->i", a, b))
