@@ -16,6 +16,8 @@ from hexwrap_solver.pattern.cells import Cells, reverse_links, whole_cells
 from hexwrap_solver.pattern.links import Links
 from hexwrap_solver.pattern.nodes import Layout, Nodes
 from hexwrap_solver.pattern.rim import (
+    Chords,
+    Crossings,
     Rim,
     RimPoints,
     chords,
@@ -198,68 +200,75 @@ def _arrangement(
     cmap: ConformalMap, layout: Layout, nodes: Nodes, links: Links, used: Bools
 ) -> tuple[Points, _HalfEdges]:
     """Points and half-edges near the boundary: everything that does not bound a whole cell."""
-    lattice, motion, order = layout.lattice, layout.motion, layout.lattice.order
+    lattice, order = layout.lattice, layout.lattice.order
     rim = rim_of(cmap, layout)
     cross, chord = crossings(layout, nodes, links, rim), chords(layout, rim)
-    n, x, c = nodes.n, len(cross.node), len(chord.edge)
     at_node = nodes_on_rim(layout, nodes, rim)
-    taken = np.zeros(len(rim.face), dtype=bool)
-    for edge, t in (
-        (at_node.edge, at_node.t),
-        (cross.edge, cross.t),
-        (chord.edge, chord.t),
-        (chord.end_edge, chord.end_t),
-    ):
-        taken[edge[t == 0]] = True
-    bends = np.flatnonzero(corners_of_rim(layout, rim) & ~taken)
-    new_edge = np.concatenate([new_edge, bends])
-    new_t = np.concatenate([new_t, np.zeros(len(bends))])
-    on_rim = RimPoints(
-        np.concatenate([at_node.point, n + np.arange(len(new_edge))]),
-        np.concatenate([at_node.edge, new_edge]),
-        np.concatenate([at_node.t, new_t]),
-        np.concatenate([at_node.sheet, np.zeros(len(new_edge), dtype=np.int64)]),
-    )
-    places = on_rim.places(rim)[len(at_node.point) :]
+    on_rim, new = _points_on_rim(layout, rim, nodes.n, at_node, cross, chord)
     points = Points(
-        np.concatenate([nodes.face[nodes.own], rim.face[new_edge]]),
-        np.concatenate([lattice.position(nodes.point[nodes.own]), places]),
+        np.concatenate([nodes.face[nodes.own], rim.face[new.edge]]),
+        np.concatenate([lattice.position(nodes.point[nodes.own]), new.places(rim)]),
     )
-    # Links between nodes that are not between two whole cells' sides, and all others at the same nodes.
-    free = (links.head.ravel() >= 0) & ~used
-    near = np.zeros(n, dtype=bool)
-    near[np.flatnonzero(free) // order] = True
+    key = _keys(layout, rim, at_node, nodes.n)
+    near = np.zeros(nodes.n, dtype=bool)
+    near[np.flatnonzero((links.head.ravel() >= 0) & ~used) // order] = True
     near[cross.node] = True
     near[at_node.point] = True
+    crossing = nodes.n + np.arange(len(cross.node))
+    name = cross.node * order + cross.direction
+    out_key, no_key = key[cross.node, cross.direction], np.zeros(len(crossing))
+    start = nodes.n + len(crossing) + np.arange(len(chord.edge))
+    middle = np.zeros(len(start))
+    return points, _join(
+        [
+            _among_nodes(layout, links, near, key),
+            _pairs(cross.node, crossing, cross.sheet, out_key, no_key, name),
+            _pairs(start, start + len(start), chord.sheet, middle, middle, np.full(len(start), -1)),
+            _along_rim(rim, on_rim),
+        ]
+    )
+
+
+def _points_on_rim(
+    layout: Layout, rim: Rim, n: int, at_node: RimPoints, cross: Crossings, chord: Chords
+) -> tuple[RimPoints, RimPoints]:
+    """All points on the boundary, and those of them that are no nodes, numbered from n on."""
+    edge = np.concatenate([cross.edge, chord.edge, chord.end_edge])
+    t = np.concatenate([cross.t, chord.t, chord.end_t])
+    taken = np.zeros(len(rim.face), dtype=bool)
+    taken[np.concatenate([at_node.edge[at_node.t == 0], edge[t == 0]])] = True
+    bends = np.flatnonzero(corners_of_rim(layout, rim) & ~taken)
+    edge, t = np.concatenate([edge, bends]), np.concatenate([t, np.zeros(len(bends))])
+    new = RimPoints(n + np.arange(len(edge)), edge, t, np.zeros(len(edge), dtype=np.int64))
+    return RimPoints(
+        np.concatenate([at_node.point, new.point]),
+        np.concatenate([at_node.edge, new.edge]),
+        np.concatenate([at_node.t, new.t]),
+        np.concatenate([at_node.sheet, new.sheet]),
+    ), new
+
+
+def _among_nodes(layout: Layout, links: Links, near: Bools, key: Floats) -> _HalfEdges:
+    """Links between nodes near the boundary. Links to other nodes have whole cells on both sides."""
+    order = layout.lattice.order
     slot = np.flatnonzero((links.head >= 0).ravel() & np.repeat(near, order))
-    reverse = reverse_links(lattice, motion, links, slot // order, slot % order)
-    slot = slot[near[reverse // order]]
-    reverse = reverse_links(lattice, motion, links, slot // order, slot % order)
+    tail, way = slot // order, slot % order
+    kept = near[links.head[tail, way]]
+    slot, tail, way = slot[kept], tail[kept], way[kept]
     position = np.full(links.head.size, -1, dtype=np.int64)
     position[slot] = np.arange(len(slot))
-    heading = lattice.position(lattice.steps)
-    key = _keys(layout, rim, at_node, n, heading)
-    tail, way = slot // order, slot % order
+    twin = position[reverse_links(layout.lattice, layout.motion, links, tail, way)]
     outer = np.zeros(len(slot), dtype=bool)
-    head, sheet = links.head[tail, way], links.turns[tail, way]
-    parts = [_HalfEdges(tail, head, sheet, key[tail, way], position[reverse], outer, slot)]
-    crossing = n + np.arange(x)
-    name = cross.node * order + cross.direction
-    parts.append(
-        _pairs(cross.node, crossing, cross.sheet, key[cross.node, cross.direction], np.zeros(x), name)
-    )
-    first = n + x + np.arange(c)
-    parts.append(_pairs(first, first + c, chord.sheet, np.zeros(c), np.zeros(c), np.full(c, -1)))
-    parts.append(_along_rim(rim, on_rim))
-    return points, _join(parts)
+    return _HalfEdges(tail, links.head[tail, way], links.turns[tail, way], key[tail, way], twin, outer, slot)
 
 
-def _keys(layout: Layout, rim: Rim, at_node: RimPoints, n: int, heading: Complexes) -> Floats:
+def _keys(layout: Layout, rim: Rim, at_node: RimPoints, n: int) -> Floats:
     """(n, order) order of directions around each node; on the boundary counted from the boundary's own."""
     order = layout.lattice.order
     key = np.tile(np.arange(order, dtype=float), (n, 1))
     along = (rim.head - rim.tail)[at_node.edge]
     along = along * np.exp(1j * layout.lattice.quantum * layout.motion.rotation(at_node.sheet))
+    heading = layout.lattice.position(layout.lattice.steps)
     angle = np.mod(np.angle(heading[None] / along[:, None]), 2 * np.pi)
     key[at_node.point] = np.where(angle > 2 * np.pi - 1e-6, 0.0, angle)
     return key
@@ -287,10 +296,8 @@ def _along_rim(rim: Rim, on_rim: RimPoints) -> _HalfEdges:
     loop = rim.loop[edge]
     k = len(order)
     following = np.arange(1, k + 1)
-    first = (
-        np.flatnonzero(np.concatenate([[True], loop[1:] != loop[:-1]])) if k else np.zeros(0, dtype=np.int64)
-    )
-    last = np.concatenate([first[1:], [k]])[: len(first)] - 1
+    first = np.unique(loop, return_index=True)[1]
+    last = np.append(first[1:], k)[: len(first)] - 1
     following[last] = first
     reached = np.concatenate([[0], np.cumsum(rim.sheet)])
     total = np.array([rim.sheet[rim.loop == which].sum() for which in (0, 1)])
