@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from scipy.spatial import Delaunay
 
 from hexwrap_solver.arrays import Floats, Ints
 from hexwrap_solver.surface.types import Surface
@@ -58,14 +59,15 @@ def catenoid(around: int, rows: int, low: float = -0.5, high: float = 1.0) -> Su
     return grid(around, rows, revolution(lambda s: np.cosh(z(s)), z))
 
 
+def uneven(phi: Floats, s: Floats) -> Floats:
+    """place() of a tower of no symmetry, girth changing by more than 2:1."""
+    r = 1.0 + 0.6 * s**2 + 0.15 * np.cos(3 * phi + 2 * s) + 0.2 * np.sin(4 * s) * np.cos(phi)
+    return np.stack([r * np.cos(phi) + 0.3 * s, r * np.sin(phi), 2.5 * s + 0.1 * np.sin(2 * phi)], axis=1)
+
+
 def bump(around: int, rows: int) -> Surface:
-    """A tower of no symmetry, girth changing by more than 2:1."""
-
-    def place(phi: Floats, s: Floats) -> Floats:
-        r = 1.0 + 0.6 * s**2 + 0.15 * np.cos(3 * phi + 2 * s) + 0.2 * np.sin(4 * s) * np.cos(phi)
-        return np.stack([r * np.cos(phi) + 0.3 * s, r * np.sin(phi), 2.5 * s + 0.1 * np.sin(2 * phi)], axis=1)
-
-    return grid(around, rows, place)
+    """The uneven tower on a grid."""
+    return grid(around, rows, uneven)
 
 
 def flat_cone(around: int, rows: int, inner: float, outer: float, angle: float) -> Surface:
@@ -73,3 +75,50 @@ def flat_cone(around: int, rows: int, inner: float, outer: float, angle: float) 
     slope = angle / (2 * np.pi)
     rho = lambda s: outer + (inner - outer) * s  # noqa: E731
     return grid(around, rows, revolution(lambda s: slope * rho(s), lambda s: -np.sqrt(1 - slope**2) * rho(s)))
+
+
+def irregular(around: int, rows: int, place: Callable[[Floats, Floats], Floats], seed: int = 0) -> Surface:
+    """The surface of ``grid`` on scattered points: jittered by a third of a cell and joined at random.
+
+    Points are triangulated by Delaunay's criterion in a sheared parameter plane, so that triangles differ
+    from those of the grid; three copies side by side make it periodic.
+    """
+    random = np.random.default_rng(seed)
+    i, j = (x.ravel() for x in np.meshgrid(np.arange(around), np.arange(rows + 1)))
+    inside = (j > 0) & (j < rows)
+    n = len(i)
+    x = (i + random.uniform(-0.33, 0.33, n)) / around
+    y = (j + inside * random.uniform(-0.33, 0.33, n)) / rows
+    plane = np.stack([around * x + 0.3 * rows * y, rows * y], axis=1)
+    copies = np.concatenate([plane + np.array([k * around, 0.0]) for k in (-1, 0, 1)])
+    triangles = Delaunay(copies).simplices
+    a, b, c = copies[triangles].transpose(1, 0, 2)
+    area = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+    triangles[area < 0] = triangles[area < 0][:, ::-1]
+    lowest = np.sort(triangles, axis=1)[:, 0]  # one of the three copies of each triangle starts in the middle
+    mine = triangles[(lowest >= n) & (lowest < 2 * n) & (np.abs(area) > 1e-9)]
+    wrapped = mine % n
+    _, once = np.unique(np.sort(wrapped, axis=1), axis=0, return_index=True)
+    last = np.arange(around)[::-1] + rows * around
+    return annulus(place(2 * np.pi * x, y), wrapped[once], (np.arange(around), last))
+
+
+def ring(outer: float = 1.0, inner: float = 0.3, apart: float = 0.5) -> Callable[[Floats, Floats], Floats]:
+    """place() of the plane ring between two circles whose centres are ``apart``; loop 0 is the outer one."""
+
+    def place(phi: Floats, s: Floats) -> Floats:
+        radius, centre = outer + (inner - outer) * s, apart * s
+        return np.stack([centre + radius * np.cos(phi), radius * np.sin(phi), 0 * phi], axis=1)
+
+    return place
+
+
+def prism(around: int, height: float) -> Callable[[Floats, Floats], Floats]:
+    """place() of a right prism over a regular polygon of circumference 2π: a flat cylinder, if vertices
+    stand on its upright edges or triangles do not reach across these."""
+
+    def place(phi: Floats, s: Floats) -> Floats:
+        radius = np.pi / around / np.sin(np.pi / around)
+        return np.stack([radius * np.cos(phi), radius * np.sin(phi), height * s], axis=1)
+
+    return place
