@@ -8,15 +8,18 @@ from typing import Any
 import numpy as np
 
 from hexwrap_solver.arrays import Floats, Ints, Ragged
+from hexwrap_solver.errors import HexwrapError
+from hexwrap_solver.surface.errors import IndexRangeError, NonFiniteError, PolygonSizeError
 
 
 class Fault(ValueError):
-    """What is wrong, and where (JSON pointer)."""
+    """What is wrong, and where (JSON pointer). kind: the solver's error for the same fault, if it has one."""
 
-    def __init__(self, pointer: str, detail: str) -> None:
+    def __init__(self, pointer: str, detail: str, kind: type[HexwrapError] | None = None) -> None:
         super().__init__(detail)
         self.pointer = pointer
         self.detail = detail
+        self.kind = kind
 
 
 def table(rows: object, pointer: str, width: int, most: int) -> Floats:
@@ -37,13 +40,15 @@ def numbers(row: object, pointer: str, most: int) -> Floats:
         raise Fault(f"{parent}/{last}/{i}", f"must be a number, not {_kind(row[i])}")
     values = np.array(row, dtype=float)
     if not np.isfinite(values).all():
-        raise Fault(f"{pointer}/{np.flatnonzero(~np.isfinite(values))[0]}", "must be a finite number")
+        raise Fault(
+            f"{pointer}/{np.flatnonzero(~np.isfinite(values))[0]}", "must be a finite number", NonFiniteError
+        )
     return values
 
 
 def faces(rows: object, pointer: str, n_vertices: int, most: int) -> Ragged:
     """Rows of three or four indices in 0 … n_vertices − 1. Raises Fault."""
-    listed = _rows(rows, pointer, (3, 4), most)
+    listed = _rows(rows, pointer, (3, 4), most, PolygonSizeError)
     lengths = np.fromiter(map(len, listed), dtype=np.int64, count=len(listed))
     offsets = np.concatenate([[0], np.cumsum(lengths)])
     if not set(map(type, chain.from_iterable(listed))) <= {int}:
@@ -59,11 +64,14 @@ def faces(rows: object, pointer: str, n_vertices: int, most: int) -> Ragged:
         raise Fault(
             f"{pointer}/{face}/{corner}",
             f"vertex {listed[face][corner]} of a mesh of {n_vertices} vertices (0 to {n_vertices - 1})",
+            IndexRangeError,
         )
     return Ragged(values, offsets)
 
 
-def _rows(rows: object, pointer: str, widths: tuple[int, ...], most: int) -> list[list[Any]]:
+def _rows(
+    rows: object, pointer: str, widths: tuple[int, ...], most: int, kind: type[HexwrapError] | None = None
+) -> list[list[Any]]:
     if not isinstance(rows, list):
         raise Fault(pointer, f"must be a list, not {_kind(rows)}")
     if len(rows) > most:
@@ -74,19 +82,21 @@ def _rows(rows: object, pointer: str, widths: tuple[int, ...], most: int) -> lis
         raise Fault(f"{pointer}/{i}", f"must be a list of {wanted} numbers, not {_kind(rows[i])}")
     if not set(map(len, rows)) <= set(widths):
         i = next(i for i, row in enumerate(rows) if len(row) not in widths)
-        raise Fault(f"{pointer}/{i}", f"must be a list of {wanted} numbers, not of {len(rows[i])}")
+        raise Fault(f"{pointer}/{i}", f"must be a list of {wanted} numbers, not of {len(rows[i])}", kind)
     return rows
 
 
 def _finite(rows: list[list[Any]], pointer: str, width: int) -> Floats:
     if not set(map(type, chain.from_iterable(rows))) <= {int, float}:
-        at = next(i for i, x in enumerate(chain.from_iterable(rows)) if type(x) not in (int, float))
-        found = next(islice(chain.from_iterable(rows), at, None))
-        raise Fault(f"{pointer}/{at // width}/{at % width}", f"must be a number, not {_kind(found)}")
+        i = next(i for i, x in enumerate(chain.from_iterable(rows)) if type(x) not in (int, float))
+        found = next(islice(chain.from_iterable(rows), i, None))
+        raise Fault(f"{pointer}/{i // width}/{i % width}", f"must be a number, not {_kind(found)}")
     values = np.fromiter(chain.from_iterable(rows), dtype=float, count=width * len(rows))
     wrong = np.flatnonzero(~np.isfinite(values))
     if len(wrong):
-        raise Fault(f"{pointer}/{wrong[0] // width}/{wrong[0] % width}", "must be a finite number")
+        raise Fault(
+            f"{pointer}/{wrong[0] // width}/{wrong[0] % width}", "must be a finite number", NonFiniteError
+        )
     return values
 
 

@@ -39,8 +39,12 @@ class FormError(HexwrapError):
         self.faults = list(faults[:MOST_LISTED])
 
     @classmethod
-    def at(cls, pointer: str, detail: str) -> FormError:
-        return cls([(pointer, detail)])
+    def at(cls, pointer: str, detail: str, kind: type[HexwrapError] | None = None) -> FormError:
+        """One fault. kind: the solver's error for the same fault; a client need not tell the two apart."""
+        error = cls([(pointer, detail)])
+        if kind is not None:
+            error.__dict__.update(slug=kind.slug, title=kind.title)
+        return error
 
 
 class HttpError(HexwrapError):

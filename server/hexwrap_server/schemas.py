@@ -211,7 +211,7 @@ def parse_surface(
     try:
         return SentSurface(mesh=_mesh(surface, max_vertices, root))
     except Fault as fault:
-        raise FormError.at(root + fault.pointer, fault.detail) from None
+        raise FormError.at(root + fault.pointer, fault.detail, fault.kind) from None
 
 
 def parse_points(body: object, dimension: int, most: int) -> np.ndarray[Any, np.dtype[np.float64]]:
@@ -224,7 +224,7 @@ def parse_points(body: object, dimension: int, most: int) -> np.ndarray[Any, np.
     try:
         return table(body["points"], "/points", dimension, most)
     except Fault as fault:
-        raise FormError.at(fault.pointer, fault.detail) from None
+        raise FormError.at(fault.pointer, fault.detail, fault.kind) from None
 
 
 def _mesh(surface: dict[str, object], max_vertices: int, root: str) -> SentMesh:
@@ -256,7 +256,7 @@ def _nurbs(nurbs: object, root: str) -> NurbsSurface:
         u, v = (numbers(row, f"/knots/{i}", 10_000) for i, row in enumerate(knots))
         points = _net(net)
     except Fault as fault:
-        raise FormError.at(root + fault.pointer, fault.detail) from None
+        raise FormError.at(root + fault.pointer, fault.detail, fault.kind) from None
     degree = (form.degree[0], form.degree[1])
     return NurbsSurface(degree, (u, v), points, (form.closed[0], form.closed[1]))
 

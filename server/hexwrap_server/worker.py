@@ -219,7 +219,15 @@ def main() -> None:
     _write_frame(outlet, ("ready",))
     while True:
         function, arguments = calls.get()
-        _write_frame(outlet, _answer(function, arguments, _reporter(outlet)))
+        _say(outlet, _answer(function, arguments, _reporter(outlet)))
+
+
+def _say(outlet: IO[bytes], answer: tuple[Any, ...]) -> None:
+    try:
+        _write_frame(outlet, answer)
+    except (TypeError, AttributeError, pickle.PicklingError) as error:
+        fault = InternalError(f"The answer cannot be sent because of a fault in hexwrap: {error}.")
+        _write_frame(outlet, ("error", fault))
 
 
 def _listen(inlet: IO[bytes], calls: queue.SimpleQueue[tuple[str, tuple[Any, ...]]]) -> None:

@@ -170,3 +170,18 @@ def test_numbers_too_large_for_a_float_are_refused() -> None:
 def test_too_many_points_are_refused() -> None:
     with pytest.raises(FormError, match="at most 1"):
         parse_points({"points": [[0, 1], [1, 2]]}, 2, 1)
+
+
+@pytest.mark.parametrize(
+    ("surface", "slug"),
+    [
+        ({"vertices": VERTICES, "faces": [[0, 1, 9]]}, "index-out-of-range"),
+        ({"vertices": VERTICES, "faces": [[0, 1]]}, "polygon-size"),
+        ({"vertices": [[0, 0, float("inf")]], "faces": FACES}, "not-finite"),
+        ({"vertices": 1, "faces": FACES}, "invalid-request"),
+    ],
+)
+def test_faults_that_the_solver_knows_have_its_slug(surface: Any, slug: str) -> None:
+    with pytest.raises(FormError) as caught:
+        parse_request({"surface": surface}, 1000, 1000)
+    assert caught.value.slug == slug

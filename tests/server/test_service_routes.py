@@ -172,3 +172,27 @@ def test_files_are_written(client: Live, done: str, name: str) -> None:
 def test_result_file_is_the_result(client: Live, done: str) -> None:
     file = client.get(f"/v1/jobs/{done}/files/result.json")
     assert file.json() == client.get(f"/v1/jobs/{done}/result").json()
+
+
+def test_drawings_are_carried_to_the_surface_and_back(client: Live, done: str) -> None:
+    result = client.get(f"/v1/jobs/{done}/result", params={"include": "map,mesh"}).json()
+    uv = np.array(result["map"]["uv"])
+    turn = np.array(result["map"]["deck"]["translation"])
+    inner = np.setdiff1d(np.arange(len(uv)), np.concatenate(result["mesh"]["loops"]))
+    lifted = client.post(f"/v1/jobs/{done}/lift", json={"points": (uv[inner] + 3 * turn).tolist()}).json()
+    assert all(lifted["inside"])
+    assert np.allclose(lifted["points"], np.array(result["mesh"]["vertices"])[inner], atol=1e-9)
+    assert np.allclose(np.linalg.norm(lifted["normals"], axis=1), 1)
+    back = client.post(f"/v1/jobs/{done}/flatten", json={"points": lifted["points"]}).json()
+    assert np.allclose(back["distance"], 0, atol=1e-9)
+    turns = (np.array(back["uv"]) - uv[inner]) @ turn / (turn @ turn)
+    assert np.allclose(turns, np.round(turns), atol=1e-9)
+
+
+def test_points_outside_are_told(client: Live, done: str) -> None:
+    answer = client.post(f"/v1/jobs/{done}/lift", json={"points": [[0.0, 1e6]]}).json()
+    assert answer == {"points": [[None] * 3], "normals": [[None] * 3], "inside": [False]}
+    for route in ("lift", "flatten"):
+        assert client.post(f"/v1/jobs/{done}/{route}", json={"points": []}).status_code == 200
+    wrong = client.post(f"/v1/jobs/{done}/lift", json={"points": [[0, 1, 2]]})
+    assert (wrong.status_code, wrong.json()["errors"][0]["pointer"]) == (422, "/points/0")

@@ -40,6 +40,8 @@ def nearest_on_mesh(vertices: Floats, faces: Ints, points: Floats) -> tuple[Ints
     The nearest vertex bounds the distance; triangles are sought by their centres in classes of about equal
     radius, so that no triangle within the bound is missed on uneven meshes.
     """
+    if not len(points):
+        return np.zeros(0, dtype=np.int64), np.zeros((0, 3)), np.zeros(0)
     bound, _ = cKDTree(vertices).query(points)
     corners = vertices[faces]
     centre = corners.mean(axis=1)

@@ -1,0 +1,64 @@
+"""Functions for worker processes to call in tests: well behaved, slow, hungry, deadly."""
+
+from __future__ import annotations
+
+import os
+import time
+from pathlib import Path
+from typing import Any
+
+from hexwrap_server.worker import Report
+from hexwrap_solver.errors import RequestError
+
+
+def echo(report: Report, value: Any) -> Any:
+    return value
+
+
+def pid(report: Report) -> int:
+    return os.getpid()
+
+
+def environment(report: Report, name: str) -> str | None:
+    return os.environ.get(name)
+
+
+def talk(report: Report) -> str:
+    print("this must not end up between the frames")
+    report("first", 0.25, "a quarter")
+    report("second", 0.75, "three quarters")
+    return "talked"
+
+
+def refuse(report: Report) -> None:
+    raise RequestError("It cannot be.", vertices=[3], data={"missing": 0.5})
+
+
+def stumble(report: Report) -> None:
+    raise KeyError("a bug")
+
+
+def die(report: Report) -> None:
+    os._exit(7)
+
+
+def sleep(report: Report, seconds: float, mark: str = "") -> str:
+    """Busy for seconds; mark: a file made at the start."""
+    if mark:
+        Path(mark).touch()
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        time.sleep(0.01)
+    return "slept"
+
+
+def hoard(report: Report, mib: int) -> int:
+    """Hold memory for a while."""
+    kept = bytearray(mib * 2**20)
+    kept[::4096] = b"x" * len(kept[::4096])
+    time.sleep(5)
+    return len(kept)
+
+
+def unpicklable(report: Report) -> Any:
+    return lambda: None

@@ -1,0 +1,189 @@
+"""The engine's promises: limits, cancelling, and death of workers harm one call only."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import AsyncIterator, Coroutine
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any, TypeVar
+
+import psutil
+import pytest
+
+from hexwrap_server.engine import ProcessEngine, nobody
+from hexwrap_server.worker import InternalError, MemoryLimitError, TimeLimitError, WorkerDiedError
+from hexwrap_solver.errors import RequestError
+
+T = TypeVar("T")
+CALLS = "tests.server.calls:"
+
+
+@asynccontextmanager
+async def engine(workers: int = 1) -> AsyncIterator[ProcessEngine]:
+    made = ProcessEngine(workers, preload="tests.server.calls")
+    await made.start()
+    try:
+        yield made
+    finally:
+        pids = made.pids
+        await made.stop()
+        assert not any(psutil.pid_exists(pid) for pid in pids)
+
+
+async def call(e: ProcessEngine, name: str, *arguments: Any, seconds: float = 30, mib: float = 4096) -> Any:
+    return await e.run(CALLS + name, *arguments, report=nobody, seconds=seconds, mib=mib)
+
+
+def run(story: Coroutine[Any, Any, T]) -> T:
+    return asyncio.run(story)
+
+
+def test_values_go_there_and_back() -> None:
+    async def story() -> None:
+        async with engine() as e:
+            assert await call(e, "echo", {"a": [1, 2.5, b"x" * 2_000_000]}) == {
+                "a": [1, 2.5, b"x" * 2_000_000]
+            }
+            assert await call(e, "environment", "OPENBLAS_NUM_THREADS") == "1"
+
+    run(story())
+
+
+def test_progress_arrives_in_order_and_printing_does_no_harm() -> None:
+    heard: list[tuple[str, float, str]] = []
+
+    async def story() -> None:
+        async with engine() as e:
+            said = await e.run(CALLS + "talk", report=lambda *a: heard.append(a), seconds=9, mib=4096)
+            assert said == "talked"
+
+    run(story())
+    assert heard == [("first", 0.25, "a quarter"), ("second", 0.75, "three quarters")]
+
+
+def test_refusals_keep_their_data_and_the_worker() -> None:
+    async def story() -> None:
+        async with engine() as e:
+            before = await call(e, "pid")
+            with pytest.raises(RequestError) as caught:
+                await call(e, "refuse")
+            assert (caught.value.vertices, caught.value.data) == ([3], {"missing": 0.5})
+            with pytest.raises(InternalError, match="KeyError"):
+                await call(e, "stumble")
+            with pytest.raises(InternalError, match="answer"):
+                await call(e, "unpicklable")
+            assert await call(e, "pid") == before
+
+    run(story())
+
+
+def test_limits_end_one_call_and_the_next_one_runs() -> None:
+    async def story() -> None:
+        async with engine() as e:
+            start = time.monotonic()
+            with pytest.raises(TimeLimitError, match=r"after 0\.3 s"):
+                await call(e, "sleep", 60, seconds=0.3)
+            with pytest.raises(MemoryLimitError, match="300 MiB"):
+                await call(e, "hoard", 500, mib=300)
+            assert await call(e, "echo", 1) == 1
+            assert time.monotonic() - start < 15
+
+    run(story())
+
+
+def test_death_of_a_worker_harms_its_own_call_only() -> None:
+    async def story() -> None:
+        async with engine(2) as e:
+            neighbour = asyncio.create_task(call(e, "sleep", 1.0))
+            with pytest.raises(WorkerDiedError) as caught:
+                await call(e, "die")
+            assert caught.value.data == {"exit_status": 7}
+            assert await neighbour == "slept"
+            assert await asyncio.gather(*(call(e, "echo", i) for i in range(5))) == list(range(5))
+
+    run(story())
+
+
+def test_cancelling_kills_within_moments(tmp_path: Path) -> None:
+    async def story() -> None:
+        async with engine() as e:
+            pid = await call(e, "pid")
+            task = asyncio.create_task(call(e, "sleep", 60, str(tmp_path / "started")))
+            while not (tmp_path / "started").exists():
+                await asyncio.sleep(0.01)
+            start = time.monotonic()
+            task.cancel()
+            with pytest.raises(asyncio.CancelledError):
+                await task
+            assert time.monotonic() - start < 2
+            assert not psutil.pid_exists(pid)
+            assert await call(e, "echo", "next") == "next"
+
+    run(story())
+
+
+def test_calls_that_wait_for_a_worker_can_be_cancelled() -> None:
+    async def story() -> None:
+        async with engine() as e:
+            running = asyncio.create_task(call(e, "sleep", 0.5))
+            await asyncio.sleep(0.1)
+            waiting = asyncio.create_task(call(e, "sleep", 60))
+            await asyncio.sleep(0.1)
+            waiting.cancel()
+            assert await running == "slept"
+            assert await call(e, "echo", 1) == 1
+
+    run(story())
+
+
+def test_stop_leaves_no_process_though_all_are_busy() -> None:
+    async def story() -> None:
+        async with engine(2) as e:
+            busy = [asyncio.create_task(call(e, "sleep", 60)) for _ in range(3)]
+            await asyncio.sleep(1.5)
+            for task in busy:
+                task.cancel()
+            await asyncio.gather(*busy, return_exceptions=True)
+
+    run(story())
+
+
+PARENT = """
+import asyncio, sys
+from hexwrap_server.engine import ProcessEngine, nobody
+async def main():
+    e = ProcessEngine(2, preload="tests.server.calls")
+    await e.start()
+    busy = [e.run("tests.server.calls:sleep", 60, report=nobody, seconds=99, mib=4096) for _ in range(2)]
+    tasks = [asyncio.create_task(b) for b in busy]
+    while len(e.pids) < 2 or not e.is_ready:
+        await asyncio.sleep(0.05)
+    print(*e.pids, flush=True)
+    await asyncio.gather(*tasks)
+asyncio.run(main())
+"""
+
+
+def test_workers_notice_that_their_parent_was_killed() -> None:
+    paths = os.pathsep.join(p or "." for p in sys.path)
+    with subprocess.Popen(
+        [sys.executable, "-c", PARENT],
+        stdout=subprocess.PIPE,
+        env=os.environ | {"PYTHONPATH": paths},
+        text=True,
+    ) as parent:
+        assert parent.stdout is not None
+        pids = [int(word) for word in parent.stdout.readline().split()]
+        assert len(pids) == 2
+        parent.send_signal(getattr(signal, "SIGKILL", signal.SIGTERM))
+        parent.wait()
+        deadline = time.monotonic() + 5
+        while any(psutil.pid_exists(pid) for pid in pids):
+            assert time.monotonic() < deadline, "workers outlived their parent"
+            time.sleep(0.05)
