@@ -1,10 +1,10 @@
-"""Every field of a request as an option of the command line. The options are data; the schemas check the values."""
+"""Every field of a request as an option of the command line. Options are data; the schemas check values."""
 
 from __future__ import annotations
 
 import argparse
 import types
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, Literal, Union, get_args, get_origin
 
@@ -35,7 +35,9 @@ OPTIONS = (
     Option("--spread", ("boundary", "spread"), "how an isometric boundary takes up the rounding"),
     Option("--pattern", ("pattern", "kind"), "kind of cells; 'none' stops after the map"),
     Option("--around", ("pattern", "around"), "cells around the surface"),
-    Option("--edge-length", ("pattern", "edge_length"), "mean edge length of the cells on the surface", "LENGTH"),
+    Option(
+        "--edge-length", ("pattern", "edge_length"), "mean edge length of the cells on the surface", "LENGTH"
+    ),
     Option(
         "--rotation",
         ("pattern", "rotation"),
@@ -45,7 +47,11 @@ OPTIONS = (
     Option("--align", ("pattern", "align"), "on which loops a line of the pattern lies exactly"),
     Option("--cells", ("pattern", "boundary"), "keep whole cells only, or trim cells at the boundary"),
     Option("--phase", ("pattern", "phase"), "shift of the pattern in cells, where it is free", ("A", "B"), 2),
-    Option("--panels", ("panels", "mode"), "individual panels or one watertight mesh; 'none' stops after the pattern"),
+    Option(
+        "--panels",
+        ("panels", "mode"),
+        "individual panels or one watertight mesh; 'none' stops after the pattern",
+    ),
     Option("--sizes", ("panels", "sizes"), "number of edge lengths; 'none': one per panel"),
     Option("--size-cost", ("panels", "size_cost"), "what the sizes are best for"),
     Option("--edge-range", ("panels", "edge_range"), "allowed edge lengths", ("MIN", "MAX"), 2),
@@ -53,13 +59,19 @@ OPTIONS = (
     Option("--orientation", ("panels", "orientation"), "planes of best fit, or tangent to the surface"),
     Option("--joint", ("panels", "joint"), "least width left open between panels", "LENGTH"),
     Option("--method", ("panels", "method"), "closed forms, or minimised energies"),
-    Option("--weight-planarity", ("panels", "weights", "planarity"), "weight of planarity in the energy", "W"),
+    Option(
+        "--weight-planarity", ("panels", "weights", "planarity"), "weight of planarity in the energy", "W"
+    ),
     Option("--weight-angle", ("panels", "weights", "angle"), "weight of equal angles", "W"),
     Option("--weight-edge", ("panels", "weights", "edge"), "weight of equal edges", "W"),
     Option("--weight-surface", ("panels", "weights", "surface"), "weight of closeness to the surface", "W"),
-    Option("--increment", ("panels", "increment"), "edge lengths are rounded down to its multiples", "LENGTH"),
+    Option(
+        "--increment", ("panels", "increment"), "edge lengths are rounded down to its multiples", "LENGTH"
+    ),
     Option("--inset", ("panels", "components", "inset"), "components: outline moved inwards", "LENGTH"),
-    Option("--thickness", ("panels", "components", "thickness"), "components: thickness of the solids", "LENGTH"),
+    Option(
+        "--thickness", ("panels", "components", "thickness"), "components: thickness of the solids", "LENGTH"
+    ),
     Option("--depth", ("panels", "components", "depth"), "depth of the support's beams", "LENGTH"),
 )
 MESHING = (
@@ -86,18 +98,21 @@ def add_request_options(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=argparse.SUPPRESS,
         metavar="PLACE=ANGLE",
-        help="target angle at a boundary vertex, for --boundary angles; PLACE is an index of the sent mesh or "
-        "X,Y,Z (may be given several times)",
+        help="target angle at a boundary vertex, for --boundary angles; PLACE is an index of the sent mesh "
+        "or X,Y,Z (may be given several times)",
     )
     group.add_argument(
-        "--support", action="store_true", default=argparse.SUPPRESS, help="add the torsion-free support structure"
+        "--support",
+        action="store_true",
+        default=argparse.SUPPRESS,
+        help="add the torsion-free support structure",
     )
     for option in MESHING:
         _add(group, option, Meshing)
 
 
 def asked_body(arguments: argparse.Namespace, body: dict[str, Any]) -> dict[str, Any]:
-    """The request body with what was asked on the command line. Raises FormError for an --angle of another form."""
+    """The request body with what was asked on the command line. Raises FormError for a malformed --angle."""
     asked = dict(body)
     for option in OPTIONS:
         if hasattr(arguments, _name(option)):
@@ -114,6 +129,18 @@ def asked_meshing(arguments: argparse.Namespace) -> dict[str, Any]:
     """The fields of ``surface.mesh`` that were asked for."""
     given = {option.path[0]: getattr(arguments, _name(option), None) for option in MESHING}
     return {name: value for name, value in given.items() if value is not None}
+
+
+def is_option_at_fault(arguments: argparse.Namespace, pointers: Iterable[str]) -> bool:
+    """Whether a fault that was found in the request came from an option."""
+    given = ["/" + "/".join(o.path) for o in OPTIONS if hasattr(arguments, _name(o))]
+    given += ["/surface/mesh/" + o.path[0] for o in MESHING if hasattr(arguments, _name(o))]
+    given += ["/boundary/angles"] if hasattr(arguments, "angles") else []
+    return any(_within(at, place) or (at and _within(place, at)) for at in pointers for place in given)
+
+
+def _within(pointer: str, section: str) -> bool:
+    return pointer == section or pointer.startswith(f"{section}/")
 
 
 def field_paths(model: type[BaseModel] = Body, root: Path = ()) -> Iterator[Path]:
@@ -152,7 +179,7 @@ def _shown(default: Any) -> str:
 
 
 def _value(text: str) -> object:
-    """A number where it reads as one, null for 'none', else the word; the schema says what it thinks of it."""
+    """A number where it reads as one, null for 'none', else the word; judging it is the schema's part."""
     if text.lower() in ("none", "null"):
         return None
     for kind in (int, float):

@@ -30,9 +30,7 @@ def solve(report: Report, surface: bytes, wanted: Wanted, caching: CacheSettings
     """The whole way, stage by stage, each looked up first."""
     sent: SentSurface = codec.decode(surface)
     runner = CachingRunner(_stages(caching), report)
-    solution = pipeline.solve(
-        lambda: take_in(sent), wanted.boundary, wanted.pattern, wanted.panels, runner, source=sent
-    )
+    solution = run_stages(sent, wanted, runner)
     parts = wire.parts_json(solution, runner.timings)
     text = join_parts(parts)
     return Outcome(
@@ -42,6 +40,13 @@ def solve(report: Report, surface: bytes, wanted: Wanted, caching: CacheSettings
         solution=codec.encode(solution),
         timings=runner.timings,
         found=runner.found,
+    )
+
+
+def run_stages(sent: SentSurface, wanted: Wanted, runner: CachingRunner) -> pipeline.Solution:
+    """A sent surface and what is wanted of it → the solution. Raises HexwrapError."""
+    return pipeline.solve(
+        lambda: take_in(sent), wanted.boundary, wanted.pattern, wanted.panels, runner, source=sent
     )
 
 

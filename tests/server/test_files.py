@@ -55,7 +55,7 @@ def read_dxf(data: bytes) -> ezdxf.document.Drawing:
 
 
 def test_names_are_the_contracts() -> None:
-    assert set(WRITERS) == {*NEEDS_PANELS, "domain.svg", "result.npz"}
+    assert set(WRITERS) == {*NEEDS_PANELS, "domain.svg", "result.json", "result.npz"}
 
 
 @pytest.mark.usefixtures("small_pictures")
@@ -81,7 +81,7 @@ def test_a_pattern_without_a_panel_is_told(solution: Solution, name: str) -> Non
         write(name, none, ODD)
 
 
-@pytest.mark.parametrize("name", ["domain.svg", "result.npz"])
+@pytest.mark.parametrize("name", ["domain.svg", "result.npz", "result.json"])
 def test_other_files_need_only_the_map(solution: Solution, name: str) -> None:
     for less in (replace(solution, pattern=None, panels=None), replace(solution, panels=None)):
         assert len(write(name, less, ODD)) > 500

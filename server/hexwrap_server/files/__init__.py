@@ -11,6 +11,7 @@ from hexwrap_server.files.flat import flat_dxf
 from hexwrap_server.files.meta import Meta, NotMadeError, SheetError
 from hexwrap_server.files.obj import panels_obj
 from hexwrap_server.files.picture import panels_png
+from hexwrap_server.files.result import result_json
 from hexwrap_server.files.rhino import panels_3dm
 from hexwrap_server.files.table import panels_csv
 from hexwrap_solver.pipeline import Solution
@@ -24,6 +25,7 @@ WRITERS: dict[str, Callable[[Solution, Meta], bytes]] = {
     "flat.dxf": flat_dxf,
     "domain.svg": domain_svg,
     "panels.png": panels_png,
+    "result.json": result_json,
     "result.npz": result_npz,
 }
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import ndimage
 
 from hexwrap_server.files.colours import encoded, from_hex, linear
@@ -61,13 +62,16 @@ def render(scene: Scene) -> Floats:
     lit = _lit(camera, drawn, middle, sun, scene, points, radius)
     sky_seen = _openness(nearest[FINE // 2 :: FINE, FINE // 2 :: FINE], radius)
     outline = _outline(owner, n_panels)
-    image = np.zeros((*middle.shape, 3))
+    # Half the memory of the usual numbers, and twice the speed: these are millions of samples.
+    tables = direct.astype(np.float32), sky.astype(np.float32)
+    lights = lit.astype(np.float32)[..., None], sky_seen.astype(np.float32)[..., None]
+    image = np.zeros((*middle.shape, 3), dtype=np.float32)
     for i in range(FINE):
         for j in range(FINE):
             of = owner[i::FINE, j::FINE]
-            light = direct[of] * lit[..., None] + sky[of] * sky_seen[..., None]
+            light = tables[0][of] * lights[0] + tables[1][of] * lights[1]
             image += light * outline[i::FINE, j::FINE, None]
-    return encoded(image / FINE**2)
+    return encoded(image.astype(np.float64) / FINE**2)
 
 
 def _camera(points: Floats, radius: float, view: Floats) -> Camera:
@@ -192,7 +196,7 @@ def _openness(nearest: Floats, radius: float) -> Floats:
     return np.where(there, light, 1.0)
 
 
-def _outline(owner: Ints, n_panels: int) -> Floats:
+def _outline(owner: Ints, n_panels: int) -> NDArray[np.float32]:
     """(h, w) what is left of the light at each sample: less along the edges of panels and of the model."""
     thing = np.minimum(owner, n_panels)  # the shell is one thing
     line = np.zeros(owner.shape, dtype=bool)
@@ -205,4 +209,4 @@ def _outline(owner: Ints, n_panels: int) -> Floats:
     shown = np.bincount(thing[(thing >= 0) & (thing < n_panels)], minlength=1)
     width = float(np.sqrt(np.median(shown[shown > 0]))) / FINE if np.any(shown) else 0.0
     strength = (1 - OUTLINE) * min(1.0, width / OUTLINE_FULL)
-    return np.where(line, 1 - strength, 1.0)
+    return np.where(line, np.float32(1 - strength), np.float32(1))

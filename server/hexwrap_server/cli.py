@@ -1,0 +1,175 @@
+"""The one program, ``hexwrap``: serve, solve, lift, demo.
+
+Exit status 0; 1 where the surface or the request cannot be solved (the problem's detail on stderr); 2 usage.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from hexwrap_server import __version__, wire
+from hexwrap_server.files import WRITERS, Meta, write
+from hexwrap_server.local import Task, UsageError, solve_here, task
+from hexwrap_server.options import add_request_options, is_option_at_fault
+from hexwrap_server.problems import FormError
+from hexwrap_server.settings import Settings, add_arguments
+from hexwrap_server.summary import print_summary
+from hexwrap_server.worker import Report
+from hexwrap_solver.errors import HexwrapError
+from hexwrap_solver.pipeline import Solution
+
+#: What an ending stands for where the name of the file says no more.
+ENDINGS = {
+    ".obj": "panels.obj", ".3dm": "panels.3dm", ".dxf": "panels.dxf", ".csv": "panels.csv",
+    ".svg": "domain.svg", ".png": "panels.png", ".json": "result.json", ".npz": "result.npz",
+}  # fmt: skip
+INPUT = "a mesh (OBJ, PLY, STL, OFF, NPZ), a Rhino file (3DM), a request (JSON), or sample:NAME"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the program; returns the exit status."""
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):  # consoles that lack a character show a stand-in
+            stream.reconfigure(errors="replace")
+    parser = _parser()
+    asked = parser.parse_args(arguments)
+    try:
+        return int(asked.command(asked))
+    except UsageError as error:
+        return _refuse(2, str(error))
+    except FormError as error:
+        status = 2 if is_option_at_fault(asked, [pointer for pointer, _ in error.faults]) else 1
+        return _refuse(status, error.detail, *(f"{place}: {detail}" for place, detail in error.faults[1:]))
+    except HexwrapError as error:
+        return _refuse(1, error.detail)
+    except KeyboardInterrupt:
+        return _refuse(130, "stopped.")
+
+
+def _refuse(status: int, *sentences: str) -> int:
+    for sentence in sentences:
+        print(f"hexwrap: {sentence}", file=sys.stderr)
+    return status
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="hexwrap", description="Seamless hexagonal, quad and triangle panels on tube-like surfaces."
+    )
+    parser.add_argument("--version", action="version", version=f"hexwrap {__version__}")
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    serve = commands.add_parser("serve", help="start the service on this machine")
+    add_arguments(serve)
+    serve.set_defaults(command=_serve)
+    solve = commands.add_parser("solve", help="panelize a surface and write files, without the service")
+    solve.add_argument("input", metavar="INPUT", help=INPUT)
+    solve.add_argument(
+        "-o",
+        "--output",
+        dest="outputs",
+        metavar="OUT",
+        action="append",
+        required=True,
+        help=f"file to write, any number of times; the ending picks what: {', '.join(_kinds())}",
+    )
+    solve.add_argument(
+        "--sheet", type=float, nargs=2, metavar=("WIDTH", "HEIGHT"), help="size of the sheets of flat.dxf"
+    )
+    solve.add_argument("-q", "--quiet", action="store_true", help="print nothing but errors")
+    add_request_options(solve)
+    solve.set_defaults(command=_solve)
+    return parser
+
+
+def _kinds() -> list[str]:
+    return [*ENDINGS, "flat.dxf"]
+
+
+def _serve(asked: argparse.Namespace) -> int:
+    from hexwrap_server.app import PortTakenError, serve  # the web framework takes a second to import
+    from hexwrap_server.store import FolderInUseError
+
+    try:
+        settings = Settings.from_arguments(asked)
+    except ValueError as error:
+        raise UsageError(str(error)) from None
+    try:
+        serve(settings)
+    except (PortTakenError, FolderInUseError, OSError) as error:
+        return _refuse(1, str(error))
+    return 0
+
+
+def _solve(asked: argparse.Namespace) -> int:
+    kinds = {out: file_kind(out) for out in asked.outputs}
+    _check_folders(asked.outputs)
+    if asked.sheet is not None and min(asked.sheet) <= 0:
+        raise UsageError(f"--sheet {asked.sheet[0]:g} {asked.sheet[1]:g}: both sides must be greater than 0.")
+    todo = task(asked.input, asked)
+    solution, timings = solve_with_progress(todo, asked.quiet)
+    meta = Meta(todo.name or "hexwrap", timings, tuple(asked.sheet) if asked.sheet else None)
+    console = Console(quiet=asked.quiet, soft_wrap=True)
+    parts = ("map", "pattern", "panels", "sizes", "quality", "timings")
+    print_summary(console, meta.name, {name: wire.part(solution, name, timings) for name in parts})
+    for out, kind in kinds.items():
+        save(out, write(kind, solution, meta))
+        console.print(f"wrote {out}", highlight=False)
+    return 0
+
+
+def solve_with_progress(todo: Task, quiet: bool) -> tuple[Solution, dict[str, float]]:
+    """Solve with a progress bar on stderr where that is a terminal."""
+    with _progress(quiet) as report:
+        return solve_here(todo, report)
+
+
+@contextmanager
+def _progress(quiet: bool) -> Iterator[Report]:
+    columns = (
+        TextColumn("{task.description:<8}"),
+        BarColumn(),
+        TimeElapsedColumn(),
+        TextColumn("{task.fields[what]}"),
+    )
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, transient=True, disable=quiet or not console.is_terminal) as bar:
+        row = bar.add_task("", total=1.0, what="")
+        yield lambda stage, fraction, what: bar.update(row, completed=fraction, description=stage, what=what)
+
+
+def file_kind(out: str) -> str:
+    """Which of the service's files an output is. Raises UsageError."""
+    path = Path(out)
+    name = path.name.lower()
+    for kind in WRITERS:
+        if name.endswith(kind):
+            return kind
+    if path.suffix.lower() not in ENDINGS:
+        raise UsageError(f"-o {out}: the ending must be one of {', '.join(_kinds())}.")
+    return ENDINGS[path.suffix.lower()]
+
+
+def _check_folders(outputs: Sequence[str]) -> None:
+    """Before the work, not after it."""
+    for out in outputs:
+        if not Path(out).resolve().parent.is_dir():
+            raise UsageError(f"-o {out}: there is no folder {Path(out).resolve().parent}.")
+
+
+def save(out: str, data: bytes) -> None:
+    """Raises UsageError where the file cannot be written."""
+    try:
+        Path(out).write_bytes(data)
+    except OSError as error:
+        raise UsageError(f"{out} cannot be written: {error.strerror or error}.") from None
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,173 @@
+"""The command line: every field has an option, every ending a writer, every refusal its exit status."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hexwrap_server import __version__, samples
+from hexwrap_server.cli import ENDINGS, file_kind, main
+from hexwrap_server.files import WRITERS
+from hexwrap_server.options import ANGLES, OPTIONS, SUPPORT, field_paths
+from hexwrap_server.schemas import parse_request
+
+TUBE_ROWS, TUBE_COLUMNS = 9, 24
+
+
+@pytest.fixture
+def tube(tmp_path: Path) -> Path:
+    """An OBJ file of a waisted tube of quads."""
+    t, z = np.meshgrid(np.arange(TUBE_COLUMNS) * 2 * np.pi / TUBE_COLUMNS, np.linspace(-1, 1, TUBE_ROWS))
+    r = 1 + 0.2 * z**2
+    points = np.stack([r * np.cos(t), r * np.sin(t), 1.5 * z], axis=-1).reshape(-1, 3)
+    lines = [f"v {x} {y} {z}" for x, y, z in points.tolist()]
+    for j in range(TUBE_ROWS - 1):
+        for i in range(TUBE_COLUMNS):
+            a, b = j * TUBE_COLUMNS + i, j * TUBE_COLUMNS + (i + 1) % TUBE_COLUMNS
+            lines.append(f"f {a + 1} {b + 1} {b + TUBE_COLUMNS + 1} {a + TUBE_COLUMNS + 1}")
+    path = tmp_path / "Röhre.obj"
+    path.write_text("\n".join(lines))
+    return path
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["--version"])
+    assert ended.value.code == 0
+    assert capsys.readouterr().out == f"hexwrap {__version__}\n"
+
+
+def test_every_field_of_a_request_has_an_option() -> None:
+    assert sorted([*(option.path for option in OPTIONS), ANGLES, SUPPORT]) == sorted(field_paths())
+
+
+def test_every_file_of_the_service_has_an_ending() -> None:
+    assert {file_kind(f"x/{name}") for name in WRITERS} == set(WRITERS)
+    assert {file_kind(f"x{ending.upper()}") for ending in ENDINGS} == {*WRITERS} - {"flat.dxf"}
+
+
+def test_solve_writes_every_file(tube: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    outs = [str(tmp_path / f"tube {name}") for name in WRITERS]
+    arguments = ["solve", str(tube), "--around", "12", "--sizes", "3"]
+    for out in outs:
+        arguments += ["-o", out]
+    assert main(arguments) == 0
+    assert all(Path(out).stat().st_size > 0 for out in outs)
+    result = json.loads(Path(outs[[*WRITERS].index("result.json")]).read_text(encoding="utf-8"))
+    assert len(result["sizes"]) == 3
+    assert result["pattern"]["around"] == 12
+    told = capsys.readouterr().out
+    assert told.startswith("Röhre\n")
+    assert all(f"wrote {out}" in told for out in outs)
+
+
+def test_options_reach_the_request(tube: Path, tmp_path: Path) -> None:
+    out = tmp_path / "r.json"
+    options = "--pattern quad --around 10 --sizes none --cells trim --boundary isometric -q"
+    assert main(["solve", str(tube), "-o", str(out), *options.split()]) == 0
+    result = json.loads(out.read_text(encoding="utf-8"))
+    assert result["pattern"]["kind"] == "quad"
+    assert result["map"]["cone_angle"] == pytest.approx(0, abs=1e-9)
+
+
+def test_a_request_file_and_a_bare_surface_are_both_inputs(tube: Path, tmp_path: Path) -> None:
+    points = [line.split()[1:] for line in tube.read_text().splitlines() if line.startswith("v ")]
+    faces = [line.split()[1:] for line in tube.read_text().splitlines() if line.startswith("f ")]
+    surface = {
+        "vertices": [[float(x) for x in point] for point in points],
+        "faces": [[int(i) - 1 for i in face] for face in faces],
+    }
+    request = {"surface": surface, "name": "named", "pattern": {"around": 14}, "panels": None}
+    for name, body, around in (("request", request, 14), ("surface", surface, 8)):
+        path, out = tmp_path / f"{name}.json", tmp_path / f"{name}.out.json"
+        path.write_text(json.dumps(body))
+        options = [] if around == 14 else ["--around", "8"]
+        assert main(["solve", str(path), "-q", "-o", str(out), *options]) == 0
+        assert json.loads(out.read_text(encoding="utf-8"))["pattern"]["around"] == around
+
+
+@pytest.mark.parametrize("name", samples.names())
+def test_samples_are_requests_that_the_service_takes(name: str) -> None:
+    assert parse_request(samples.load(name), 10**6, 10**6).name == name
+
+
+def refusal(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str]:
+    status = main(arguments)
+    told = capsys.readouterr()
+    assert told.out == ""
+    assert told.err.startswith("hexwrap: ")
+    return status, told.err
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--around", "0"], "/pattern/around"),
+        (["--around", "many"], "/pattern/around"),
+        (["--edge-range", "2", "1"], "min ≤ max"),
+        (["--angle", "12"], "give VERTEX=ANGLE or X,Y,Z=ANGLE"),
+        (["--around", "8", "--edge-length", "2"], "give either 'around' or 'edge_length'"),
+        (["-o", "x.docx"], "ending must be one of"),
+        (["-o", "no/such/folder/x.obj"], "there is no folder"),
+        (["--sheet", "0", "1"], "greater than 0"),
+    ],
+)
+def test_usage_is_status_2(
+    tube: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], options: list[str], words: str
+) -> None:
+    status, told = refusal(["solve", str(tube), "-o", str(tmp_path / "x.obj"), *options], capsys)
+    assert status == 2
+    assert words in told
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ("none.obj", "cannot be read"),
+        ("sample:no", "there is no sample 'no'; there are"),
+        (".", "cannot be read"),
+    ],
+)
+def test_inputs_that_do_not_exist_are_status_2(
+    given: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    status, told = refusal(["solve", given, "-o", str(tmp_path / "x.obj")], capsys)
+    assert status == 2
+    assert words in told
+
+
+def test_unknown_options_are_status_2() -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["solve", "sample:tower", "-o", "x.obj", "--boundary", "round"])
+    assert ended.value.code == 2
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "words"),
+    [
+        ("open.json", '{"vertices": [[0,0,0],[1,0,0],[0,1,0]], "faces": [[0,1,2]]}', "loop"),
+        ("broken.json", '{"surface": ', "not JSON"),
+        ("field.json", '{"surface": {"vertices": [], "faces": []}, "patern": {}}', "/patern"),
+        ("surface.xyz", "0 0 0", ".xyz"),
+        ("noise.ply", "ply?", "cannot be read"),
+    ],
+)
+def test_what_cannot_be_solved_is_status_1(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str, text: str, words: str
+) -> None:
+    (tmp_path / name).write_text(text)
+    status, told = refusal(["solve", str(tmp_path / name), "-o", str(tmp_path / "x.obj")], capsys)
+    assert status == 1
+    assert words in told
+
+
+def test_a_file_of_a_stage_that_was_left_out_is_status_1(
+    tube: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["solve", str(tube), "-q", "-o", str(tmp_path / "x.obj"), "--panels", "none"]
+    status, told = refusal(arguments, capsys)
+    assert status == 1
+    assert '"panels": null' in told
