@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import orjson
 import pytest
-from tests.server.bodies import request, tube
 
 from hexwrap_server.problems import FormError
 from hexwrap_server.schemas import parse_points, parse_request
+from tests.server.bodies import request, tube
 
 VERTICES = [[0.0, 0.0, 0.0], [1, 0, 0], [0, 1, 0], [1, 1, 0]]
 FACES = [[0, 1, 2], [1, 3, 2]]

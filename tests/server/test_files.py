@@ -14,7 +14,6 @@ import pytest
 import rhino3dm
 import trimesh
 from matplotlib.image import imread
-from tests.server.analytic import cylinder
 
 from hexwrap_server.files import WRITERS, Meta, NotMadeError, SheetError, scene, write
 from hexwrap_server.files.dxf import object_coordinates
@@ -22,6 +21,7 @@ from hexwrap_server.files.flat import lay_flat, pack
 from hexwrap_solver.arrays import Ragged
 from hexwrap_solver.panels.types import Components, Support
 from hexwrap_solver.pipeline import Solution
+from tests.server.analytic import cylinder
 
 ODD = Meta("Türme 塔 <&\"'> \n$x^2$")
 NEEDS_PANELS = ["panels.obj", "panels.3dm", "panels.dxf", "panels.csv", "flat.dxf", "panels.png"]

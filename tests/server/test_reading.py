@@ -14,12 +14,12 @@ import rhino3dm
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.solver.surface.shapes import mesh, triangles, tube
 
 from hexwrap_server.readers.errors import FileTypeError, SeveralObjectsError, UnreadableFileError
 from hexwrap_server.reading import READERS, read_surface
 from hexwrap_solver.errors import SurfaceError
 from hexwrap_solver.surface import NurbsSurface, SentMesh, surface_from_mesh
+from tests.solver.surface.shapes import mesh, triangles, tube
 
 
 def obj(vertices: np.ndarray, faces: list[list[int]]) -> bytes:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+
 from tests.server.bodies import request, tube
 from tests.server.live import Live, finished, running
 

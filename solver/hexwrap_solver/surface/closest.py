@@ -33,7 +33,8 @@ class TriangleTree:
     """Boxes around triangles sorted along a Morton curve, pairwise merged up to a single root.
 
     corners: (m, 3, 3). centroids: search tree over the triangles' centroids. order: (m,) triangles along
-    the curve. low, high: per level from the root downwards, (2^level, 3); boxes beyond the last triangle are empty (low = ∞).
+    the curve. low, high: per level from the root downwards, (2^level, 3); boxes beyond the last triangle
+    are empty (low = ∞).
     """
 
     corners: Floats

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tests.solver.conformal.annuli import bump, catenoid, flat_cone
 
 from hexwrap_solver.conformal import conformal_map
 from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap
+from tests.solver.conformal.annuli import bump, catenoid, flat_cone
 
 CONDITIONS = [
     BoundaryCondition(),

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.solver.conformal.annuli import bump
-from tests.solver.conformal.test_conformal_map import assert_honest
 
 from hexwrap_solver.conformal import conformal_map
 from hexwrap_solver.conformal.corners import GAUSS_BONNET_TOLERANCE, boundary_angles
 from hexwrap_solver.conformal.types import BoundaryCondition
 from hexwrap_solver.errors import BoundaryError, GaussBonnetError
 from hexwrap_solver.surface.types import Surface
+from tests.solver.conformal.annuli import bump
+from tests.solver.conformal.test_conformal_map import assert_honest
 
 SURFACE = bump(36, 12)
 TOP = SURFACE.loops[1]

@@ -9,6 +9,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
+from hexwrap_solver.arrays import Complexes, Floats
+from hexwrap_solver.conformal import boundary, conformal_map
+from hexwrap_solver.conformal.energy import Energy
+from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap, Deck
+from hexwrap_solver.surface.types import Surface
 from tests.solver.conformal.annuli import (
     bump,
     catenoid,
@@ -21,12 +27,6 @@ from tests.solver.conformal.annuli import (
     uneven,
 )
 from tests.solver.conformal.test_conformal_map import assert_honest
-
-from hexwrap_solver.arrays import Complexes, Floats
-from hexwrap_solver.conformal import boundary, conformal_map
-from hexwrap_solver.conformal.energy import Energy
-from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap, Deck
-from hexwrap_solver.surface.types import Surface
 
 TOWER = bump(28, 12)
 FAR = np.array([1e9, -1e9, 1e9])

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.solver.conformal.annuli import bump
 
 from hexwrap_solver.arrays import Floats, Ints
 from hexwrap_solver.conformal.boundary import constant_on_loops, straight
 from hexwrap_solver.conformal.dissection import LEAF, dissect
 from hexwrap_solver.conformal.energy import Energy
 from hexwrap_solver.conformal.factor import Factorisation
+from tests.solver.conformal.annuli import bump
 
 
 def dense(diagonal: Floats, off_diagonal: Floats, rows: Ints, columns: Ints) -> Floats:

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tests.solver.conformal.annuli import bump, catenoid
-from tests.solver.conformal.checks import faults
-from tests.solver.conformal.shared import MESHES, load
 
 from hexwrap_solver.arrays import Floats
 from hexwrap_solver.conformal import boundary, conformal_map
@@ -19,6 +16,9 @@ from hexwrap_solver.conformal.robust.metric import angle_sums, measure
 from hexwrap_solver.conformal.robust.mirror import MirrorMesh, mirror_mesh
 from hexwrap_solver.conformal.types import BoundaryCondition
 from hexwrap_solver.surface.types import Surface
+from tests.solver.conformal.annuli import bump, catenoid
+from tests.solver.conformal.checks import faults
+from tests.solver.conformal.shared import MESHES, load
 
 
 def _mirrored(surface: Surface) -> MirrorMesh:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tests.solver.conformal.annuli import bump, catenoid
 
 from hexwrap_solver.arrays import Complexes, Floats
 from hexwrap_solver.conformal import conformal_map
 from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap
 from hexwrap_solver.domain.interpolate import Interpolation, domain_weights, surface_weights
+from tests.solver.conformal.annuli import bump, catenoid
 
 
 @pytest.fixture(scope="module")

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.solver.pattern import annuli
 
 from hexwrap_solver.domain import flatten, lift
 from hexwrap_solver.domain.flatten import nearest_on_mesh
+from tests.solver.pattern import annuli
 
 CATENOID = annuli.revolution(np.cosh, np.linspace(-1, 1.5, 25), 40, cut=9, turn=1.7 * np.exp(0.4j))
 CONES = {k: annuli.flat_cone(k * np.pi / 3, 1.0, 2.0, 60, 12, cut=11) for k in (1, 3, -2, 5)}

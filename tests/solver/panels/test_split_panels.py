@@ -9,6 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
+
+from hexwrap_solver.errors import PanelsError
+from hexwrap_solver.panels import fit_panels, measure, quantize, rationalize
+from hexwrap_solver.panels.types import PanelSettings
 from tests.solver.panels.cells import (
     catenoid,
     cylinder,
@@ -20,10 +24,6 @@ from tests.solver.panels.cells import (
     torus,
     triangle_pattern,
 )
-
-from hexwrap_solver.errors import PanelsError
-from hexwrap_solver.panels import fit_panels, measure, quantize, rationalize
-from hexwrap_solver.panels.types import PanelSettings
 
 SURFACES = {"cylinder": cylinder, "catenoid": catenoid, "sphere": sphere, "torus": torus}
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tests.solver.pattern import annuli
 
 from hexwrap_solver.errors import NotAdaptedError, PatternError
 from hexwrap_solver.pattern import lay_pattern
 from hexwrap_solver.pattern.types import Pattern, PatternSettings
+from tests.solver.pattern import annuli
 
 DEGREE = {"hex": 3, "triangle": 6, "quad": 4}
 SIDES = {"hex": 6, "triangle": 3, "quad": 4}

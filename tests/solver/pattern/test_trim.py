@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tests.solver.pattern import annuli
 
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.pattern import lay_pattern
 from hexwrap_solver.pattern.types import Pattern, PatternSettings
+from tests.solver.pattern import annuli
 
 
 def cell_areas(cmap: ConformalMap, pattern: Pattern) -> np.ndarray:

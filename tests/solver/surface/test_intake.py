@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.solver.surface.shapes import mesh, triangles, tube, twisted
 
 from hexwrap_solver.surface import Surface, surface_from_mesh
 from hexwrap_solver.surface.topology import edge_lengths, face_normals
+from tests.solver.surface.shapes import mesh, triangles, tube, twisted
 
 
 def area_vector(surface: Surface) -> np.ndarray:

@@ -6,7 +6,6 @@ import pickle
 
 import numpy as np
 import pytest
-from tests.solver.surface.shapes import mesh, triangles, tube
 
 from hexwrap_solver.arrays import Ragged
 from hexwrap_solver.errors import SurfaceError
@@ -25,6 +24,7 @@ from hexwrap_solver.surface.errors import (
     SeveralComponentsError,
     ShapeError,
 )
+from tests.solver.surface.shapes import mesh, triangles, tube
 
 
 def refused(sent: SentMesh, kind: type[SurfaceError]) -> SurfaceError:
