@@ -62,3 +62,16 @@ def hoard(report: Report, mib: int) -> int:
 
 def unpicklable(report: Report) -> Any:
     return lambda: None
+
+
+def solve_after(report: Report, seconds: float, *arguments: Any) -> Any:
+    """A job that takes its time first."""
+    from hexwrap_server.work import solve
+
+    report("surface", 0.01, "waiting")
+    time.sleep(seconds)
+    return solve(report, *arguments)
+
+
+def die_at_once(report: Report, *arguments: Any) -> None:
+    os._exit(9)

@@ -1,0 +1,225 @@
+"""The queue's promises, through HTTP, with engines that are slow, deadly or counted."""
+
+from __future__ import annotations
+
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from hexwrap_server.engine import ProcessEngine
+from hexwrap_server.store import FolderInUseError, Store
+from tests.server.bodies import request
+from tests.server.live import Live, finished, running
+
+
+class Watched(ProcessEngine):
+    """Runs another function in place of a job's, and counts."""
+
+    def __init__(self, workers: int, instead: str = "", *first: Any) -> None:
+        super().__init__(workers)
+        self.instead = instead
+        self.first = first
+        self.calls = 0
+
+    async def run(self, function: str, *arguments: Any, **rest: Any) -> Any:
+        self.calls += 1
+        function = f"tests.server.calls:{self.instead}" if self.instead else function
+        return await super().run(function, *self.first, *arguments, **rest)
+
+
+def slow(seconds: float, workers: int = 1) -> Watched:
+    return Watched(workers, "solve_after", seconds)
+
+
+def post(client: Live, **changes: Any) -> str:
+    answer = client.post("/v1/jobs", json=request(**changes))
+    assert answer.status_code == 202, answer.text
+    id: str = answer.json()["id"]
+    return id
+
+
+def until_running(client: Live, id: str) -> None:
+    deadline = time.monotonic() + 20
+    while client.get(f"/v1/jobs/{id}").json()["stage"] != "surface":
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+def test_identical_requests_at_once_run_once(tmp_path: Path) -> None:
+    engine = slow(0.5, workers=2)
+    with running(tmp_path, engine) as client:
+        ids = [post(client, name=f"client {i}") for i in range(4)]
+        assert len(set(ids)) == 4
+        assert {finished(client, id)["status"] for id in ids} == {"done"}
+        assert engine.calls == 1
+        later = client.get(f"/v1/jobs/{post(client)}").json()
+        assert (later["status"], set(later["found"].values())) == ("done", {"result"})
+        assert engine.calls == 1
+
+
+def test_changed_settings_reuse_the_stages_before(tmp_path: Path) -> None:
+    with running(tmp_path, workers=1) as client:
+        finished(client, post(client))
+        found = finished(client, post(client, panels={"sizes": 3}))["found"]
+        assert {found[s] for s in ("surface", "map", "pattern", "fit")} == {"memory"}
+        assert found["panels"] == "computed"
+        found = finished(client, post(client, pattern={"around": 10}))["found"]
+        assert (found["map"], found["pattern"]) == ("memory", "computed")
+    with running(tmp_path, workers=1) as client:
+        job = finished(client, post(client, panels={"sizes": 4}))
+        assert (job["found"]["pattern"], job["found"]["panels"]) == ("disk", "computed")
+        header = client.get(f"/v1/jobs/{job['id']}/result").headers["server-timing"]
+        assert 'desc="disk"' in header
+
+
+def test_running_job_is_stopped_and_frees_its_worker(tmp_path: Path) -> None:
+    with running(tmp_path, slow(60)) as client:
+        id = post(client)
+        until_running(client, id)
+        start = time.monotonic()
+        assert client.delete(f"/v1/jobs/{id}").status_code == 204
+        assert time.monotonic() - start < 2
+        assert client.get(f"/v1/jobs/{id}").json()["status"] == "cancelled"
+        assert client.get("/health").json()["running"] == 0
+        refused = client.get(f"/v1/jobs/{id}/result")
+        assert (refused.status_code, refused.json()["type"]) == (409, "/problems/cancelled")
+        assert client.delete(f"/v1/jobs/{id}").status_code == 204
+        assert client.get(f"/v1/jobs/{id}").status_code == 404
+
+
+def test_queue_has_positions_and_an_end(tmp_path: Path) -> None:
+    with running(tmp_path, slow(60), max_queue=2) as client:
+        first = post(client, pattern={"around": 8})
+        until_running(client, first)
+        waiting = [post(client, pattern={"around": n}) for n in (10, 12)]
+        assert [client.get(f"/v1/jobs/{id}").json()["queue_position"] for id in waiting] == [0, 1]
+        full = client.post("/v1/jobs", json=request(pattern={"around": 14}))
+        assert (full.status_code, full.json()["type"]) == (503, "/problems/queue-full")
+        assert int(full.headers["retry-after"]) > 0
+        assert client.delete(f"/v1/jobs/{waiting[0]}").status_code == 204
+        assert client.get(f"/v1/jobs/{waiting[1]}").json()["queue_position"] == 0
+        assert client.get("/health").json()["queued"] == 1
+
+
+def test_cancelling_one_of_two_equal_jobs_leaves_the_other(tmp_path: Path) -> None:
+    with running(tmp_path, slow(0.5)) as client:
+        first, second = post(client), post(client)
+        assert client.delete(f"/v1/jobs/{first}").status_code == 204
+        assert finished(client, second)["status"] == "done"
+        assert client.get(f"/v1/jobs/{first}").json()["status"] == "cancelled"
+
+
+def test_cancelled_work_can_be_asked_for_again(tmp_path: Path) -> None:
+    engine = slow(60)
+    with running(tmp_path, engine) as client:
+        first = post(client)
+        until_running(client, first)
+        client.delete(f"/v1/jobs/{first}")
+        engine.first = (0.0,)
+        assert finished(client, post(client))["status"] == "done"
+
+
+@pytest.mark.parametrize(
+    ("engine", "settings", "slug", "status"),
+    [
+        (("die_at_once",), {}, "worker-died", 503),
+        (("solve_after", 60), {"job_seconds": 0.3}, "time-limit", 422),
+        (("solve_after", 60), {"job_mib": 20.0}, "memory-limit", 422),
+    ],
+)
+def test_job_that_cannot_finish_fails_alone(
+    tmp_path: Path, engine: tuple[Any, ...], settings: dict[str, Any], slug: str, status: int
+) -> None:
+    watched = Watched(1, *engine)
+    with running(tmp_path, watched, **settings) as client:
+        id = post(client)
+        job = finished(client, id)
+        assert (job["status"], job["problem"]["type"]) == ("failed", f"/problems/{slug}")
+        assert client.get(f"/v1/jobs/{id}/result").status_code == status
+        watched.instead, watched.first = "", ()
+        if slug != "memory-limit":
+            assert finished(client, post(client))["status"] in ("done", "failed")
+        assert client.get("/health").json()["status"] == "ok"
+
+
+def test_wait_holds_the_answer_and_lets_go(tmp_path: Path) -> None:
+    with running(tmp_path, slow(1.5)) as client:
+        id = post(client)
+        start = time.monotonic()
+        assert client.get(f"/v1/jobs/{id}", params={"wait": 0.3}).json()["status"] in ("queued", "running")
+        assert 0.25 < time.monotonic() - start < 1.2
+        refused = client.get(f"/v1/jobs/{id}/result")
+        assert (refused.status_code, refused.json()["type"]) == (409, "/problems/not-finished")
+        assert client.get(f"/v1/jobs/{id}", params={"wait": 30}).json()["status"] == "done"
+
+
+def test_client_that_goes_away_disturbs_nothing(tmp_path: Path) -> None:
+    with running(tmp_path, slow(1.0)) as client:
+        with pytest.raises(httpx.ReadTimeout):
+            client.post("/v1/solve", json=request(name="impatient"), timeout=0.3)
+        (job,) = client.get("/v1/jobs").json()["jobs"]
+        assert finished(client, job["id"])["status"] == "done"
+
+
+def test_jobs_survive_a_restart(tmp_path: Path) -> None:
+    with running(tmp_path) as client:
+        done = post(client, pattern={"around": 8})
+        finished(client, done)
+        before = client.get(f"/v1/jobs/{done}/result").content
+    with running(tmp_path, slow(60)) as client:
+        ids = [post(client, pattern={"around": n}) for n in (10, 12, 14)]
+        until_running(client, ids[0])
+    with running(tmp_path) as client:
+        assert [finished(client, id)["status"] for id in ids] == ["done"] * 3
+        assert client.get(f"/v1/jobs/{done}").json()["status"] == "done"
+        assert client.get(f"/v1/jobs/{done}/result").content == before
+        lifted = client.post(f"/v1/jobs/{done}/lift", json={"points": [[0.1, 0.1]]})
+        assert lifted.status_code == 200
+
+
+def test_work_that_killed_the_server_thrice_is_given_up(tmp_path: Path) -> None:
+    with running(tmp_path, slow(60)) as client:
+        id = post(client)
+        until_running(client, id)
+    store = Store(tmp_path)
+    job = store.job(id)
+    assert job is not None
+    work = store.work(job.identity)
+    assert work is not None
+    assert work.attempts == 0  # an orderly stop is no failed attempt
+    for _ in range(3):
+        store.start_work(job.identity)
+    store.close()
+    with running(tmp_path) as client:
+        told = client.get(f"/v1/jobs/{id}").json()
+        assert (told["status"], told["problem"]["type"]) == ("failed", "/problems/too-many-attempts")
+
+
+def test_one_folder_serves_one_server(tmp_path: Path) -> None:
+    with running(tmp_path, workers=1), pytest.raises(FolderInUseError):
+        Store(tmp_path)
+    Store(tmp_path).close()
+
+
+def test_stop_ends_long_polls_at_once(tmp_path: Path) -> None:
+    answers: list[float] = []
+
+    def poll(base: httpx.URL, id: str) -> None:
+        with httpx.Client(base_url=base, timeout=60, trust_env=False) as other:
+            start = time.monotonic()
+            other.get(f"/v1/jobs/{id}", params={"wait": 50})
+            answers.append(time.monotonic() - start)
+
+    with running(tmp_path, slow(60)) as client:
+        id = post(client)
+        poller = threading.Thread(target=poll, args=(client.base_url, id))
+        poller.start()
+        time.sleep(0.5)
+        client.service.manager.close_waits()
+        poller.join(10)
+    assert len(answers) == 1
+    assert answers[0] < 5
