@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import threading
 import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +14,10 @@ import pytest
 
 from hexwrap_server.engine import ProcessEngine
 from hexwrap_server.store import FolderInUseError, Store
-from tests.server.bodies import request
+from tests.server.bodies import request, tube
 from tests.server.live import Live, finished, running
+
+Behave = Callable[..., Live]
 
 
 class Watched(ProcessEngine):
@@ -35,6 +39,35 @@ def slow(seconds: float, workers: int = 1) -> Watched:
     return Watched(workers, "solve_after", seconds)
 
 
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Live, Watched]]:
+    engine = Watched(1)
+    with running(tmp_path_factory.mktemp("data"), engine, max_queue=2) as client:
+        yield client, engine
+
+
+@pytest.fixture
+def behave(server: tuple[Live, Watched]) -> Iterator[Behave]:
+    """The server of this module, whose engine behaves as told; afterwards nothing runs any more."""
+    client, engine = server
+
+    def told(instead: str = "", *first: Any) -> Live:
+        engine.instead, engine.first, engine.calls = instead, first, 0
+        return client
+
+    yield told
+    for job in client.get("/v1/jobs").json()["jobs"]:
+        client.delete(f"/v1/jobs/{job['id']}")
+
+
+_FRESH = itertools.count()
+
+
+def fresh() -> dict[str, Any]:
+    """A surface that no other test has sent."""
+    return tube(height=10 + 0.01 * next(_FRESH))
+
+
 def post(client: Live, **changes: Any) -> str:
     answer = client.post("/v1/jobs", json=request(**changes))
     assert answer.status_code == 202, answer.text
@@ -49,16 +82,15 @@ def until_running(client: Live, id: str) -> None:
         time.sleep(0.02)
 
 
-def test_identical_requests_at_once_run_once(tmp_path: Path) -> None:
-    engine = slow(0.5, workers=2)
-    with running(tmp_path, engine) as client:
-        ids = [post(client, name=f"client {i}") for i in range(4)]
-        assert len(set(ids)) == 4
-        assert {finished(client, id)["status"] for id in ids} == {"done"}
-        assert engine.calls == 1
-        later = client.get(f"/v1/jobs/{post(client)}").json()
-        assert (later["status"], set(later["found"].values())) == ("done", {"result"})
-        assert engine.calls == 1
+def test_identical_requests_at_once_run_once(behave: Behave, server: tuple[Live, Watched]) -> None:
+    client, surface = behave("solve_after", 0.5), fresh()
+    ids = [post(client, name=f"client {i}", surface=surface) for i in range(4)]
+    assert len(set(ids)) == 4
+    assert {finished(client, id)["status"] for id in ids} == {"done"}
+    assert server[1].calls == 1
+    later = client.get(f"/v1/jobs/{post(client, surface=surface)}").json()
+    assert (later["status"], set(later["found"].values())) == ("done", {"result"})
+    assert server[1].calls == 1
 
 
 def test_changed_settings_reuse_the_stages_before(tmp_path: Path) -> None:
@@ -76,104 +108,105 @@ def test_changed_settings_reuse_the_stages_before(tmp_path: Path) -> None:
         assert 'desc="disk"' in header
 
 
-def test_running_job_is_stopped_and_frees_its_worker(tmp_path: Path) -> None:
-    with running(tmp_path, slow(60)) as client:
-        id = post(client)
-        until_running(client, id)
-        start = time.monotonic()
-        assert client.delete(f"/v1/jobs/{id}").status_code == 204
-        assert time.monotonic() - start < 2
-        assert client.get(f"/v1/jobs/{id}").json()["status"] == "cancelled"
-        assert client.get("/health").json()["running"] == 0
-        refused = client.get(f"/v1/jobs/{id}/result")
-        assert (refused.status_code, refused.json()["type"]) == (409, "/problems/cancelled")
-        assert client.delete(f"/v1/jobs/{id}").status_code == 204
-        assert client.get(f"/v1/jobs/{id}").status_code == 404
+def test_running_job_is_stopped_and_frees_its_worker(behave: Behave) -> None:
+    client = behave("solve_after", 60)
+    id = post(client, surface=fresh())
+    until_running(client, id)
+    start = time.monotonic()
+    assert client.delete(f"/v1/jobs/{id}").status_code == 204
+    assert time.monotonic() - start < 2
+    assert client.get(f"/v1/jobs/{id}").json()["status"] == "cancelled"
+    assert client.get("/health").json()["running"] == 0
+    refused = client.get(f"/v1/jobs/{id}/result")
+    assert (refused.status_code, refused.json()["type"]) == (409, "/problems/cancelled")
+    assert client.delete(f"/v1/jobs/{id}").status_code == 204
+    assert client.get(f"/v1/jobs/{id}").status_code == 404
 
 
-def test_queue_has_positions_and_an_end(tmp_path: Path) -> None:
-    with running(tmp_path, slow(60), max_queue=2) as client:
-        first = post(client, pattern={"around": 8})
-        until_running(client, first)
-        waiting = [post(client, pattern={"around": n}) for n in (10, 12)]
-        assert [client.get(f"/v1/jobs/{id}").json()["queue_position"] for id in waiting] == [0, 1]
-        full = client.post("/v1/jobs", json=request(pattern={"around": 14}))
-        assert (full.status_code, full.json()["type"]) == (503, "/problems/queue-full")
-        assert int(full.headers["retry-after"]) > 0
-        assert client.delete(f"/v1/jobs/{waiting[0]}").status_code == 204
-        assert client.get(f"/v1/jobs/{waiting[1]}").json()["queue_position"] == 0
-        assert client.get("/health").json()["queued"] == 1
+def test_queue_has_positions_and_an_end(behave: Behave) -> None:
+    client = behave("solve_after", 60)
+    first = post(client, surface=fresh())
+    until_running(client, first)
+    waiting = [post(client, surface=fresh()) for _ in range(2)]
+    assert [client.get(f"/v1/jobs/{id}").json()["queue_position"] for id in waiting] == [0, 1]
+    full = client.post("/v1/jobs", json=request(surface=fresh()))
+    assert (full.status_code, full.json()["type"]) == (503, "/problems/queue-full")
+    assert int(full.headers["retry-after"]) > 0
+    assert client.delete(f"/v1/jobs/{waiting[0]}").status_code == 204
+    assert client.get(f"/v1/jobs/{waiting[1]}").json()["queue_position"] == 0
+    assert client.get("/health").json()["queued"] == 1
 
 
-def test_cancelling_one_of_two_equal_jobs_leaves_the_other(tmp_path: Path) -> None:
-    with running(tmp_path, slow(0.5)) as client:
-        first, second = post(client), post(client)
-        assert client.delete(f"/v1/jobs/{first}").status_code == 204
-        assert finished(client, second)["status"] == "done"
-        assert client.get(f"/v1/jobs/{first}").json()["status"] == "cancelled"
+def test_cancelling_one_of_two_equal_jobs_leaves_the_other(behave: Behave) -> None:
+    client, surface = behave("solve_after", 0.5), fresh()
+    first, second = post(client, surface=surface), post(client, surface=surface)
+    assert client.delete(f"/v1/jobs/{first}").status_code == 204
+    assert finished(client, second)["status"] == "done"
+    assert client.get(f"/v1/jobs/{first}").json()["status"] == "cancelled"
 
 
-def test_cancelled_work_can_be_asked_for_again(tmp_path: Path) -> None:
-    engine = slow(60)
-    with running(tmp_path, engine) as client:
-        first = post(client)
-        until_running(client, first)
-        client.delete(f"/v1/jobs/{first}")
-        engine.first = (0.0,)
-        assert finished(client, post(client))["status"] == "done"
+def test_cancelled_work_can_be_asked_for_again(behave: Behave) -> None:
+    client, surface = behave("solve_after", 60), fresh()
+    first = post(client, surface=surface)
+    until_running(client, first)
+    client.delete(f"/v1/jobs/{first}")
+    behave("solve_after", 0.0)
+    assert finished(client, post(client, surface=surface))["status"] == "done"
+
+
+def test_job_whose_worker_dies_fails_alone(behave: Behave) -> None:
+    client = behave("die_at_once")
+    id = post(client, surface=fresh())
+    job = finished(client, id)
+    assert (job["status"], job["problem"]["type"]) == ("failed", "/problems/worker-died")
+    assert client.get(f"/v1/jobs/{id}/result").status_code == 503
+    behave()
+    assert finished(client, post(client, surface=fresh()))["status"] == "done"
 
 
 @pytest.mark.parametrize(
-    ("engine", "settings", "slug", "status"),
-    [
-        (("die_at_once",), {}, "worker-died", 503),
-        (("solve_after", 60), {"job_seconds": 0.3}, "time-limit", 422),
-        (("solve_after", 60), {"job_mib": 20.0}, "memory-limit", 422),
-    ],
+    ("settings", "slug"),
+    [({"job_seconds": 0.3}, "time-limit"), ({"job_mib": 20.0}, "memory-limit")],
 )
-def test_job_that_cannot_finish_fails_alone(
-    tmp_path: Path, engine: tuple[Any, ...], settings: dict[str, Any], slug: str, status: int
-) -> None:
-    watched = Watched(1, *engine)
-    with running(tmp_path, watched, **settings) as client:
+def test_job_over_a_limit_fails(tmp_path: Path, settings: dict[str, Any], slug: str) -> None:
+    with running(tmp_path, slow(60), **settings) as client:
         id = post(client)
         job = finished(client, id)
         assert (job["status"], job["problem"]["type"]) == ("failed", f"/problems/{slug}")
-        assert client.get(f"/v1/jobs/{id}/result").status_code == status
-        watched.instead, watched.first = "", ()
-        if slug != "memory-limit":
-            assert finished(client, post(client))["status"] in ("done", "failed")
-        assert client.get("/health").json()["status"] == "ok"
+        assert client.get(f"/v1/jobs/{id}/result").status_code == 422
+        assert client.get("/health").json()["running"] == 0
 
 
-def test_wait_holds_the_answer_and_lets_go(tmp_path: Path) -> None:
-    with running(tmp_path, slow(1.5)) as client:
-        id = post(client)
-        start = time.monotonic()
-        assert client.get(f"/v1/jobs/{id}", params={"wait": 0.3}).json()["status"] in ("queued", "running")
-        assert 0.25 < time.monotonic() - start < 1.2
-        refused = client.get(f"/v1/jobs/{id}/result")
-        assert (refused.status_code, refused.json()["type"]) == (409, "/problems/not-finished")
-        assert client.get(f"/v1/jobs/{id}", params={"wait": 30}).json()["status"] == "done"
+def test_wait_holds_the_answer_and_lets_go(behave: Behave) -> None:
+    client = behave("solve_after", 1.5)
+    id = post(client, surface=fresh())
+    start = time.monotonic()
+    assert client.get(f"/v1/jobs/{id}", params={"wait": 0.3}).json()["status"] in ("queued", "running")
+    assert 0.25 < time.monotonic() - start < 1.2
+    refused = client.get(f"/v1/jobs/{id}/result")
+    assert (refused.status_code, refused.json()["type"]) == (409, "/problems/not-finished")
+    assert client.get(f"/v1/jobs/{id}", params={"wait": 30}).json()["status"] == "done"
 
 
-def test_client_that_goes_away_disturbs_nothing(tmp_path: Path) -> None:
-    with running(tmp_path, slow(1.0)) as client:
-        with pytest.raises(httpx.ReadTimeout):
-            client.post("/v1/solve", json=request(name="impatient"), timeout=0.3)
-        (job,) = client.get("/v1/jobs").json()["jobs"]
-        assert finished(client, job["id"])["status"] == "done"
+def test_client_that_goes_away_disturbs_nothing(behave: Behave) -> None:
+    client = behave("solve_after", 1.0)
+    with pytest.raises(httpx.ReadTimeout):
+        client.post("/v1/solve", json=request(name="impatient", surface=fresh()), timeout=0.5)
+    job = client.get("/v1/jobs").json()["jobs"][0]
+    assert job["name"] == "impatient"
+    assert finished(client, job["id"])["status"] == "done"
 
 
 def test_jobs_survive_a_restart(tmp_path: Path) -> None:
-    with running(tmp_path) as client:
+    engine = Watched(1)
+    with running(tmp_path, engine) as client:
         done = post(client, pattern={"around": 8})
         finished(client, done)
         before = client.get(f"/v1/jobs/{done}/result").content
-    with running(tmp_path, slow(60)) as client:
+        engine.instead, engine.first = "solve_after", (60,)
         ids = [post(client, pattern={"around": n}) for n in (10, 12, 14)]
         until_running(client, ids[0])
-    with running(tmp_path) as client:
+    with running(tmp_path, workers=1) as client:
         assert [finished(client, id)["status"] for id in ids] == ["done"] * 3
         assert client.get(f"/v1/jobs/{done}").json()["status"] == "done"
         assert client.get(f"/v1/jobs/{done}/result").content == before
@@ -221,5 +254,6 @@ def test_stop_ends_long_polls_at_once(tmp_path: Path) -> None:
         time.sleep(0.5)
         client.service.manager.close_waits()
         poller.join(10)
+        client.delete(f"/v1/jobs/{id}")
     assert len(answers) == 1
     assert answers[0] < 5
