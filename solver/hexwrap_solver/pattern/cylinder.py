@@ -11,12 +11,8 @@ from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.pattern.lattice import Lattice, Motion
 from hexwrap_solver.pattern.placement import Placement, anchor_vertex, edge_angle, is_straight
 from hexwrap_solver.pattern.rows import Rows, rows_along
-from hexwrap_solver.pattern.size import wanted_edge, width_per_cell
+from hexwrap_solver.pattern.size import size_spread, wanted_edge, width_per_cell
 from hexwrap_solver.pattern.types import PatternSettings
-
-#: How far the size may depart from an edge length asked for, or from the default, in search of less stretch.
-ASKED, FREE = 0.02, 0.10
-
 
 @dataclass(frozen=True)
 class _Strip:
@@ -38,12 +34,6 @@ def place_on_cylinder(cmap: ConformalMap, lattice: Lattice, settings: PatternSet
     angle = edge_angle(lattice, settings)
     notes: list[str] = []
     align = settings.align
-    if align != "none" and not is_straight(lattice, angle):
-        align = "none"
-        notes.append(
-            f"With edges at {np.rad2deg(angle):.4g}° to the boundary no lattice line can lie on it, so the "
-            "pattern is not aligned."
-        )
     strip = _strip(cmap, anchor_vertex(cmap))
     rows = rows_along(lattice, angle, settings.boundary)
     options = _translations(cmap, lattice, settings, angle)
@@ -99,7 +89,7 @@ def _translations(cmap: ConformalMap, lattice: Lattice, settings: PatternSetting
         )[None]
     row = lattice.shortest_towards(toward)
     count = abs(wanted) / abs(complex(lattice.position(row)))
-    spread = 0.0 if settings.around is not None else FREE if settings.edge_length is None else ASKED
+    spread = 0.0 if settings.around is not None else size_spread(settings)
     counts = np.arange(np.ceil(count * (1 - spread)), count * (1 + spread) + 1e-9)
     counts = np.unique(np.append(counts, max(1, round(count)))).astype(np.int64)
     return np.asarray(counts[np.argsort(abs(counts - count), kind="stable")][:, None] * row)

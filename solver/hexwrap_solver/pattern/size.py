@@ -46,3 +46,14 @@ def wanted_edge(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings,
         return settings.edge_length / mean_stretch(cmap)
     around = DEFAULT_AROUND if settings.around is None else settings.around
     return cmap.circumference / (around * width_per_cell(lattice, angle))
+
+
+#: How far the size may depart from an edge length asked for, or from the default, to fit the boundary better.
+ASKED, FREE = 0.02, 0.10
+
+
+def size_spread(settings: PatternSettings) -> float:
+    """Relative freedom of the size: within half a cell of a number around, 2 % of a length, 10 % of neither."""
+    if settings.around is not None:
+        return 0.5 / settings.around
+    return FREE if settings.edge_length is None else ASKED

@@ -1,0 +1,113 @@
+"""Straight sides of the domain's boundary, between corner vertices (paper, section 3.1; Figures 5 and 7)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hexwrap_solver.arrays import Complexes, Floats, Ints
+from hexwrap_solver.conformal.types import ConformalMap
+from hexwrap_solver.pattern.lattice import Lattice
+
+#: A boundary is straight where it turns by less than this altogether, and a corner is quantized within it, rad.
+QUANTIZED = 0.02
+
+
+@dataclass(frozen=True)
+class Sides:
+    """Sides of the boundary, each from corner to corner, the domain on the left.
+
+    direction: (s,) unit complex, in the frame of the loop: the loop unrolled from its first corner on, in
+    that vertex's own sheet. length: (s,) in the domain. loop: (s,). vertex, side, sheet: (k,) the vertices
+    of all sides, both ends included, and the sheet on which the loop's frame shows them; place: (k,) where.
+    """
+
+    direction: Complexes
+    length: Floats
+    loop: Ints
+    vertex: Ints
+    side: Ints
+    sheet: Ints
+    place: Complexes
+
+    @property
+    def n(self) -> int:
+        return len(self.length)
+
+
+def curvatures(cmap: ConformalMap, loop: int) -> Floats:
+    """π − angle sum at the vertices of a loop."""
+    return np.asarray(np.pi - cmap.boundary_angles[loop])
+
+
+def has_corners(cmap: ConformalMap, lattice: Lattice, loop: int) -> bool:
+    """Whether a loop has corners of quantized angles."""
+    return bool(_corners(curvatures(cmap, loop), lattice).any())
+
+
+def is_polygon(cmap: ConformalMap, lattice: Lattice, loop: int) -> bool:
+    """Whether a loop is straight but for corners of quantized angles, so that lattice lines can bound it."""
+    kappa = curvatures(cmap, loop)
+    corner = _corners(kappa, lattice)
+    if not corner.any():
+        return bool(abs(np.cumsum(kappa)).max() < QUANTIZED)
+    kappa = np.roll(kappa, -int(np.argmax(corner)))
+    corner = np.roll(corner, -int(np.argmax(corner)))
+    bent = np.cumsum(np.where(corner, 0.0, kappa))
+    at_corner = bent[corner]
+    drift = abs(bent - at_corner[np.cumsum(corner) - 1]).max()
+    sharp = abs(abs(np.rint(kappa[corner] / lattice.quantum) * lattice.quantum) - np.pi) < 0.1
+    return bool(drift < QUANTIZED and not sharp.any())
+
+
+def _corners(kappa: Floats, lattice: Lattice) -> np.ndarray:
+    steps = np.rint(kappa / lattice.quantum)
+    return np.asarray((steps != 0) & (abs(kappa - steps * lattice.quantum) < QUANTIZED))
+
+
+def sides_of(cmap: ConformalMap, lattice: Lattice, loops: list[int]) -> Sides:
+    """Sides of the given loops, each of which is a polygon with at least one corner or a closed line."""
+    gained = _sheets_gained(cmap)
+    parts = [_sides_of_loop(cmap, lattice, loop, gained) for loop in loops]
+    start = np.cumsum([0] + [p.n for p in parts])
+    fields = {k: np.concatenate([vars(p)[k] for p in parts]) for k in vars(parts[0]) if k != "side"}
+    side = np.concatenate([p.side + s for p, s in zip(parts, start, strict=False)])
+    return Sides(**fields, side=side)
+
+
+def _sheets_gained(cmap: ConformalMap) -> Ints:
+    """Sheets gained along each boundary edge, by its tail."""
+    faces = cmap.surface.faces
+    n = len(cmap.uv)
+    tail, head = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    gained = (np.roll(cmap.sheet, -1, axis=1) - cmap.sheet).ravel()
+    rim = np.concatenate([loop * n + np.roll(loop, -1) for loop in cmap.surface.loops])
+    on_rim = np.isin(tail * n + head, rim)
+    by_tail = np.zeros(n, dtype=np.int64)
+    by_tail[tail[on_rim]] = gained[on_rim]
+    return by_tail
+
+
+def _sides_of_loop(cmap: ConformalMap, lattice: Lattice, loop: int, gained: Ints) -> Sides:
+    corner = _corners(curvatures(cmap, loop), lattice)
+    shift = int(np.argmax(corner))
+    vertices = np.roll(cmap.surface.loops[loop], -shift)
+    corner = np.roll(corner, -shift)
+    corner[0] = True
+    sheet = np.concatenate([[0], np.cumsum(gained[vertices])])
+    vertices = np.append(vertices, vertices[0])
+    place = cmap.deck.apply(cmap.uv[vertices], sheet)
+    at = np.append(np.flatnonzero(corner), len(vertices) - 1)
+    step = place[at[1:]] - place[at[:-1]]
+    side = np.repeat(np.arange(len(step)), np.diff(at) + 1)
+    index = np.concatenate([np.arange(a, b + 1) for a, b in zip(at[:-1], at[1:], strict=True)])
+    return Sides(
+        step / abs(step),
+        abs(step),
+        np.full(len(step), loop),
+        vertices[index],
+        side,
+        sheet[index],
+        place[index],
+    )
