@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexwrap_solver.arrays import Complexes, Floats, Ints
+from hexwrap_solver.arrays import Complexes, Floats
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.pattern.deform import deform, distortion_of
 from hexwrap_solver.pattern.lattice import Lattice, Motion
@@ -57,7 +57,13 @@ def place_by_sides(
         for x in np.linspace(-1, 1, SCALES)
     ]
     best = min(trials, key=lambda trial: trial.cost)
-    place = deform(cmap, best.motion, best.scale, best.scale * cmap.uv + best.origin, *_lines(cmap, lattice, sides, normal, best))
+    place = deform(
+        cmap,
+        best.motion,
+        best.scale,
+        best.scale * cmap.uv + best.origin,
+        *_lines(cmap, lattice, sides, normal, best),
+    )
     width = width_per_cell(lattice, angle) * lattice.edge
     around = round(cmap.circumference * abs(best.scale) / width)
     if turns == 0:
@@ -77,16 +83,17 @@ def _best_at(
 ) -> _Trial:
     """The best centre and lines at one scale."""
     mean_depth = _mean_depth(sides, normal, scale)
-    weight = sides.length / sides.length.sum()
+    length = sides.length * abs(scale)
     trials = []
     for motion, origin in _origins(cmap, lattice, sides, rows, normal, turns, scale, mean_depth):
         depth = mean_depth + (normal.conj() * origin).real
         line = rows.first + rows.period * np.rint((depth - rows.first) / rows.period)
-        cost = float(weight @ ((depth - line) / rows.period) ** 2)
+        miss = abs(depth - line)
+        cost = float(((miss / rows.period) ** 2).mean() + ((miss / length) ** 2).max())
         cost += COST_OF_SIZE * off**2 + COST_OF_CORNERS * _corners_off_nodes(lattice, sides, normal, line)
         if motion.turns % lattice.order == 0:
-            miss = abs(scale * cmap.deck.translation - complex(lattice.position(np.array(motion.shift))))
-            cost += float(miss / rows.period) ** 2
+            apart = abs(scale * cmap.deck.translation - complex(lattice.position(np.array(motion.shift))))
+            cost += float(apart / rows.period) ** 2
         trials.append(_Trial(cost, scale, origin, motion, line))
     return min(trials, key=lambda trial: trial.cost)
 

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from hexwrap_solver.conformal.types import ConformalMap
+from hexwrap_solver.pattern.deform import deform, distortion_of
 from hexwrap_solver.pattern.lattice import Lattice, Motion
 from hexwrap_solver.pattern.placement import Placement, anchor_vertex, edge_angle
-from hexwrap_solver.pattern.size import wanted_edge, width_per_cell
+from hexwrap_solver.pattern.size import ASKED, wanted_edge, width_per_cell
 from hexwrap_solver.pattern.types import PatternSettings
+
+#: A translation g shorter than this part of the circumference is none.
+NO_SHIFT = 1e-9
 
 
 def boundary_direction(cmap: ConformalMap, lattice: Lattice, anchor: int) -> complex:
@@ -27,26 +33,74 @@ def boundary_direction(cmap: ConformalMap, lattice: Lattice, anchor: int) -> com
     mean = complex((length * (edges / length) ** lattice.order).sum() / length.sum())
     if abs(mean) > 0.05:
         return complex(np.exp(1j * np.angle(mean) / lattice.order))
-    apex = cmap.deck.apex
-    around = 1j * (cmap.uv[anchor] - (0 if apex is None else apex))
+    around = 1j * (cmap.uv[anchor] - _middle(cmap))
     return complex(around / abs(around))
 
 
-def place_on_cone(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings, turns: int) -> Placement:
-    """Paper, definition 2. The apex becomes the lattice point 0, a centre of the full symmetry."""
-    angle = edge_angle(lattice, settings)
-    anchor = anchor_vertex(cmap)
+def _middle(cmap: ConformalMap) -> complex:
+    """The apex, or where there is none the centre of the boundary."""
     apex = cmap.deck.apex
-    if apex is None:
-        raise ValueError("a translation has no apex")
-    edge = wanted_edge(cmap, lattice, settings, angle)
-    scale = lattice.edge / edge
-    middle = cmap.circumference / abs(cmap.deck.angle) * scale
-    width = width_per_cell(lattice, angle) * lattice.edge
-    scale *= 1 + settings.phase[1] * lattice.edge / middle
-    along = boundary_direction(cmap, lattice, anchor)
+    return complex(np.mean([cmap.uv[loop].mean() for loop in cmap.surface.loops])) if apex is None else apex
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """What is asked: scale and rotation as one factor, the angle of edges, and the width of a cell."""
+
+    factor: complex
+    angle: float
+    width: float
+
+
+def _frame(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings) -> _Frame:
+    angle = edge_angle(lattice, settings)
+    scale = lattice.edge / wanted_edge(cmap, lattice, settings, angle)
+    along = boundary_direction(cmap, lattice, anchor_vertex(cmap))
     step = complex(lattice.position(lattice.steps[0])) / lattice.edge
-    turn = np.exp(-1j * angle) * step / along * np.exp(1j * settings.phase[0] * width / middle)
-    place = (cmap.uv - apex) * scale * turn
-    around = round(cmap.circumference * scale / width)
-    return Placement(place, Motion(lattice, turns, (0, 0)), angle, around, 0.0, ())
+    return _Frame(
+        complex(scale * np.exp(-1j * angle) * step / along),
+        angle,
+        width_per_cell(lattice, angle) * lattice.edge,
+    )
+
+
+def place_on_cone(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings, turns: int) -> Placement:
+    """Paper, definition 2. The apex becomes the lattice point 0, a centre of the full symmetry.
+
+    phase: moves the pattern around by cells at the middle ring, and up or down by edges there.
+    """
+    frame = _frame(cmap, lattice, settings)
+    radius = cmap.circumference / abs(cmap.deck.angle) * abs(frame.factor)
+    turned = np.exp(1j * settings.phase[0] * frame.width / radius)
+    factor = frame.factor * turned * (1 + settings.phase[1] * lattice.edge / radius)
+    place = (cmap.uv - _middle(cmap)) * factor
+    around = round(cmap.circumference * abs(factor) / frame.width)
+    return Placement(place, Motion(lattice, turns, (0, 0)), frame.angle, around, 0.0, ())
+
+
+def place_on_flat_ring(
+    cmap: ConformalMap, lattice: Lattice, settings: PatternSettings, turns: int
+) -> Placement:
+    """K a multiple of 2π: g is a translation, usually not zero, and must become one of the lattice.
+
+    Where a lattice vector is near, scale and rotation follow from it; where none is, because the translation
+    is short against the cells, the layout is deformed a little so that it closes up with the nearest.
+    """
+    frame = _frame(cmap, lattice, settings)
+    wanted = frame.factor * cmap.deck.translation
+    shift = lattice.translation_near(wanted)
+    nearest = complex(lattice.position(shift))
+    motion = Motion(lattice, turns, (int(shift[0]), int(shift[1])))
+    phase = frame.width * settings.phase[0] + 1j * lattice.edge * settings.phase[1]
+    closes = abs(wanted) < NO_SHIFT * abs(frame.factor) * cmap.circumference
+    origin = _middle(cmap) if closes else cmap.uv[anchor_vertex(cmap)]
+    fits = nearest != 0 and abs(nearest / wanted - 1) < ASKED if not closes else True
+    factor = nearest / cmap.deck.translation if fits and not closes else frame.factor
+    place = (cmap.uv - origin) * factor + phase
+    around = round(cmap.circumference * abs(factor) / frame.width)
+    angle = frame.angle - float(np.angle(factor / frame.factor))
+    if fits:
+        return Placement(place, motion, angle, around, 0.0, ())
+    nowhere = np.zeros((len(place), 2))
+    place = deform(cmap, motion, factor, place, nowhere.astype(complex), nowhere)
+    return Placement(place, motion, angle, around, distortion_of(cmap, motion, place), ())

@@ -14,39 +14,42 @@ from hexwrap_solver.pattern.rows import Rows, rows_along
 from hexwrap_solver.pattern.size import size_spread, wanted_edge, width_per_cell
 from hexwrap_solver.pattern.types import PatternSettings
 
+
 @dataclass(frozen=True)
 class _Strip:
     """The domain turned so that g is the shift by its length along x, and the anchor vertex stands at 0.
 
-    low, high: heights of the two loops; base: 0 or 1, whether the anchor stands on the lower or upper one.
+    height: mean height of each loop; anchored: the loop on which the anchor stands.
     """
 
     place: Complexes
     length: float
-    low: float
-    high: float
-    lower_loop: int
-    base: int
+    height: tuple[float, float]
+    anchored: int
 
 
-def place_on_cylinder(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings) -> Placement:
-    """Scale and rotation follow from the translation; height and turn from ``align`` and ``phase``."""
+def place_on_cylinder(
+    cmap: ConformalMap, lattice: Lattice, settings: PatternSettings, loops: list[int]
+) -> Placement:
+    """Scale and rotation follow from the translation; height and turn from the loops to align and ``phase``.
+
+    loops: straight ones, on each of which a lattice line shall lie.
+    """
     angle = edge_angle(lattice, settings)
-    notes: list[str] = []
-    align = settings.align
-    strip = _strip(cmap, anchor_vertex(cmap))
+    strip = _strip(cmap, anchor_vertex(cmap), loops)
     rows = rows_along(lattice, angle, settings.boundary)
     options = _translations(cmap, lattice, settings, angle)
     stretches = np.array([_stretch(strip, rows, lattice, T) for T in options])
-    pick = int(np.argmin(abs(np.log(stretches)))) if align == "both" else 0
-    stretch = float(stretches[pick]) if align == "both" else 1.0
+    both = len(loops) == 2
+    pick = int(np.argmin(abs(np.log(stretches)))) if both else 0
+    stretch = float(stretches[pick]) if both else 1.0
     T = options[pick]
     along = complex(lattice.position(T))
     around = int(lattice.cells_around(T))
-    notes += _told(lattice, settings, angle, around, along)
+    notes = _told(lattice, settings, angle, around, along)
     scale = abs(along) / strip.length
     x = strip.place.real * scale + settings.phase[0] * width_per_cell(lattice, angle) * lattice.edge
-    y = _heights(strip, rows, settings, align, scale * stretch)
+    y = _heights(strip, rows, settings, loops, scale * stretch)
     place = (x + 1j * y) * along / abs(along)
     distortion = max(stretch, 1 / stretch) - 1
     return Placement(
@@ -65,15 +68,14 @@ def angle_taken(lattice: Lattice, along: complex, wanted: float) -> float:
     return taken + lattice.quantum * round((wanted - taken) / lattice.quantum)
 
 
-def _strip(cmap: ConformalMap, anchor: int) -> _Strip:
+def _strip(cmap: ConformalMap, anchor: int, loops: list[int]) -> _Strip:
     t = cmap.deck.translation
     place = (cmap.uv - cmap.uv[anchor]) * np.conj(t) / abs(t)
-    means = [float(place[loop].imag.mean()) for loop in cmap.surface.loops]
-    lower = int(means[1] < means[0])
-    for loop, mean in zip(cmap.surface.loops, means, strict=True):
-        place[loop] = place[loop].real + 1j * mean  # straight but for rounding; made exactly so
-    base = int(anchor in cmap.surface.loops[1 - lower])
-    return _Strip(place, abs(t), min(means), max(means), lower, base)
+    low, high = (float(place[loop].imag.mean()) for loop in cmap.surface.loops)
+    for which in loops:
+        loop = cmap.surface.loops[which]
+        place[loop] = place[loop].real + 1j * (low, high)[which]  # straight but for rounding; made exactly so
+    return _Strip(place, abs(t), (low, high), int(anchor in cmap.surface.loops[1]))
 
 
 def _translations(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings, angle: float) -> Ints:
@@ -97,20 +99,18 @@ def _translations(cmap: ConformalMap, lattice: Lattice, settings: PatternSetting
 
 def _stretch(strip: _Strip, rows: Rows, lattice: Lattice, T: Ints) -> float:
     """By which factor heights must change for a whole number of rows to fit between the loops."""
-    height = (strip.high - strip.low) * abs(complex(lattice.position(T))) / strip.length
+    height = abs(strip.height[1] - strip.height[0]) * abs(complex(lattice.position(T))) / strip.length
     return rows.nearest_height(height) / height
 
 
-def _heights(strip: _Strip, rows: Rows, settings: PatternSettings, align: str, scale: float) -> Floats:
+def _heights(strip: _Strip, rows: Rows, settings: PatternSettings, loops: list[int], scale: float) -> Floats:
     """Heights in lattice units; a loop that is aligned lies on a row line, exactly."""
-    if align == "none":
+    if not loops:
         return strip.place.imag * scale + settings.phase[1] * rows.period
-    if align == "both":
-        on_upper = bool(strip.base)
-    else:
-        on_upper = strip.lower_loop == 1  # loop 0 is the upper one
-    level, line = (strip.high, -rows.first) if on_upper else (strip.low, rows.first)
-    return line + (strip.place.imag - level) * scale
+    loop = strip.anchored if strip.anchored in loops else loops[0]
+    upper = strip.height[loop] > strip.height[1 - loop]
+    line = -rows.first if upper else rows.first
+    return line + (strip.place.imag - strip.height[loop]) * scale
 
 
 def _told(

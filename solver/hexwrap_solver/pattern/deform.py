@@ -1,9 +1,9 @@
 """The smallest smooth deformation of the layout that brings sides of the domain onto lattice lines.
 
-Unknown are the vertices W in lattice units, with the deck transformation an exact motion of the lattice. Least
-squares over the triangles: area · (|∂W/∂z̄|² + SIZE·|∂W/∂z − a|²), the first for angles (least-squares conformal
-maps, Lévy et al. 2002), the second, lightly, for sizes. Vertices on a side slide along their line; corners
-stand where two lines meet. Lines are met exactly, whatever the least squares leave.
+Unknown are the vertices W in lattice units, with the deck transformation an exact motion of the lattice.
+Least squares over the triangles of √area · (|∂W/∂z̄|² + SIZE·|∂W/∂z − a|²): the first for angles
+(least-squares conformal maps, Lévy et al. 2002), the second, lightly, for sizes. Vertices on a side slide
+along their line; corners stand where two lines meet. Lines are met exactly, whatever the least squares leave.
 """
 
 from __future__ import annotations
@@ -12,12 +12,16 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, cg, splu
 
-from hexwrap_solver.arrays import Complexes, Floats, Ints
+from hexwrap_solver.arrays import Complexes, Floats
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.pattern.lattice import Motion
 
 #: Weight of sizes against angles.
 SIZE = 0.1
+
+#: Rounds of reweighting, by which the sum of squares becomes one of fourth powers, and its least weight:
+#: what the triangles at corners bear is spread over more of them (a worst ratio of 0.04 instead of 0.18).
+ROUNDS, FLOOR = 4, 1e-3
 
 #: Pull towards the undeformed place, relative: it only settles what nothing else does.
 REST = 1e-9
@@ -36,25 +40,30 @@ def deform(
     """
     basis, fixed = _freedom(normal, depth, rest)
     angles, sizes, area, shift_a, shift_s = _derivatives(cmap, motion)
-    root = np.sqrt(area / area.sum())
-    rows = sparse.vstack([_real(sparse.diags_array(root) @ angles), _real(sparse.diags_array(SIZE**0.5 * root) @ sizes)])
-    aim = np.concatenate([_parts(-root * shift_a), _parts(SIZE**0.5 * root * (scale - shift_s))])
-    system = (rows @ basis).tocsr()
-    right = system.T @ (aim - rows @ _parts(fixed))
-    matrix = (system.T @ system).tocsc()
-    weight = REST * matrix.diagonal().mean()
-    matrix = matrix + weight * sparse.eye_array(matrix.shape[0], format="csc")
+    conformal, similar = _real(angles) @ basis, _real(sizes) @ basis
+    aim_a = _parts(-shift_a) - _real(angles) @ _parts(fixed)
+    aim_s = _parts(scale - shift_s) - _real(sizes) @ _parts(fixed)
     start = basis.T @ _parts(rest - fixed)  # the basis is orthonormal
-    free = _solve(matrix, right + weight * start, start)
-    moved = basis @ free
-    n = len(rest)
-    return np.asarray(fixed + moved[:n] + 1j * moved[n:])
+    weight = np.sqrt(area / area.sum())
+    n, place = len(rest), rest
+    for _ in range(ROUNDS if basis.shape[1] <= DIRECT else 1):
+        both = np.tile(weight, 2)
+        matrix = conformal.T @ (both[:, None] * conformal) + SIZE * (similar.T @ (both[:, None] * similar))
+        right = conformal.T @ (both * aim_a) + SIZE * (similar.T @ (both * aim_s))
+        pull = REST * float(matrix.diagonal().mean())
+        matrix = (matrix + pull * sparse.eye_array(matrix.shape[0])).tocsc()
+        moved = basis @ _solve(matrix, right + pull * start, start)
+        place = fixed + moved[:n] + 1j * moved[n:]
+        bent = abs(angles @ place + shift_a) ** 2
+        weight = np.sqrt(area / area.sum()) * (bent / max(bent.max(), 1e-300) + FLOOR)
+    return np.asarray(place)
 
 
 def distortion_of(cmap: ConformalMap, motion: Motion, place: Complexes) -> float:
     """Worst ratio of singular values − 1 over the triangles; infinite where one is turned over."""
     angles, sizes, _, shift_a, shift_s = _derivatives(cmap, motion)
-    bent, kept = abs(angles @ place + shift_a), abs(sizes @ place + shift_s)
+    bent = np.abs(np.asarray(angles @ place) + shift_a)
+    kept = np.abs(np.asarray(sizes @ place) + shift_s)
     if (bent >= kept).any():
         return float("inf")
     return float(((kept + bent) / (kept - bent)).max() - 1)
@@ -62,7 +71,9 @@ def distortion_of(cmap: ConformalMap, motion: Motion, place: Complexes) -> float
 
 def _solve(matrix: sparse.csc_array, right: Floats, start: Floats) -> Floats:
     if matrix.shape[0] <= DIRECT:
-        factors = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+        factors = splu(
+            matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+        )
         return np.asarray(factors.solve(right))
     inverse = 1 / matrix.diagonal()
     jacobi = LinearOperator(matrix.shape, matvec=lambda x: inverse * x, dtype=float)
@@ -78,7 +89,9 @@ def _real(matrix: sparse.csr_array) -> sparse.csr_array:
     return sparse.csr_array(sparse.block_array([[matrix.real, -matrix.imag], [matrix.imag, matrix.real]]))
 
 
-def _derivatives(cmap: ConformalMap, motion: Motion) -> tuple[sparse.csr_array, sparse.csr_array, Floats, Complexes, Complexes]:
+def _derivatives(
+    cmap: ConformalMap, motion: Motion
+) -> tuple[sparse.csr_array, sparse.csr_array, Floats, Complexes, Complexes]:
     """∂/∂z̄ and ∂/∂z per triangle as matrices on W with what the motion's translations add, and areas."""
     z = cmap.corners()
     faces, sheet = cmap.surface.faces, cmap.sheet

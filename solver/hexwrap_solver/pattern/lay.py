@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
@@ -16,14 +14,11 @@ from hexwrap_solver.domain.lift import points_at
 from hexwrap_solver.domain.locate import barycentric
 from hexwrap_solver.errors import PatternError
 from hexwrap_solver.pattern.cells import largest_part, manifold_corners, only_whole_cells
-from hexwrap_solver.pattern.cone import place_on_cone
-from hexwrap_solver.pattern.cylinder import place_on_cylinder
 from hexwrap_solver.pattern.lattice import LATTICES, Lattice
 from hexwrap_solver.pattern.links import link_nodes
 from hexwrap_solver.pattern.nodes import Layout, find_nodes
-from hexwrap_solver.pattern.align import place_by_sides
-from hexwrap_solver.pattern.placement import Placement, anchor_vertex, edge_angle, is_straight, quantum_turns
-from hexwrap_solver.pattern.sides import has_corners, is_polygon
+from hexwrap_solver.pattern.place import place_lattice
+from hexwrap_solver.pattern.placement import Placement, anchor_vertex
 from hexwrap_solver.pattern.rings import places, rows_from, turns_around, winding
 from hexwrap_solver.pattern.trim import Points, Trimmed, trim
 from hexwrap_solver.pattern.types import Pattern, PatternSettings
@@ -39,7 +34,7 @@ def lay_pattern(cmap: ConformalMap, settings: PatternSettings, progress: Progres
     cells are too many (``settings.max_cells``) or too large to close up around the surface.
     """
     lattice = LATTICES[settings.kind]
-    placement = place(cmap, lattice, settings)
+    placement = place_lattice(cmap, lattice, settings)
     progress(0.1, "placing the lattice")
     layout = layout_of(cmap, lattice, placement)
     _check_count(layout, settings)
@@ -55,37 +50,6 @@ def lay_pattern(cmap: ConformalMap, settings: PatternSettings, progress: Progres
         trimmed = Trimmed(cells, np.ones(cells.n, dtype=bool), points)
     progress(0.8, f"{trimmed.cells.n} cells")
     return _finish(cmap, settings, placement, layout, trimmed)
-
-
-def place(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings) -> Placement:
-    """The way of placing that suits the domain and what is to be aligned."""
-    turns = quantum_turns(cmap, lattice)
-    loops, notes = loops_to_align(cmap, lattice, settings)
-    if turns == 0 and not any(has_corners(cmap, lattice, loop) for loop in loops):
-        aligned = replace(settings, align=("none", "first", "both")[len(loops)])
-        placement = place_on_cylinder(cmap, lattice, aligned)
-    elif loops:
-        placement = place_by_sides(cmap, lattice, settings, turns, loops)
-    else:
-        placement = place_on_cone(cmap, lattice, settings, turns)
-    return replace(placement, notes=(*notes, *placement.notes))
-
-
-def loops_to_align(
-    cmap: ConformalMap, lattice: Lattice, settings: PatternSettings
-) -> tuple[list[int], list[str]]:
-    """Loops on which lattice lines can lie, of those on which they should."""
-    wanted = {"none": [], "first": [0], "both": [0, 1]}[settings.align]
-    if wanted and not is_straight(lattice, edge_angle(lattice, settings)):
-        angle = np.rad2deg(edge_angle(lattice, settings))
-        return [], [
-            f"With edges at {angle:.4g}° to the boundary no lattice line can lie on it: the pattern is not aligned."
-        ]
-    loops = [loop for loop in wanted if is_polygon(cmap, lattice, loop)]
-    if len(loops) == len(wanted):
-        return loops, []
-    curved = " and ".join(f"loop {loop}" for loop in wanted if loop not in loops)
-    return loops, [f"In the domain {curved} has no straight sides, so no lattice line can lie on it: not aligned."]
 
 
 def layout_of(cmap: ConformalMap, lattice: Lattice, placement: Placement) -> Layout:

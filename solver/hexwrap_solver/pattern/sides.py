@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from hexwrap_solver.arrays import Complexes, Floats, Ints
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.pattern.lattice import Lattice
 
-#: A boundary is straight where it turns by less than this altogether, and a corner is quantized within it, rad.
+#: A boundary is straight where it turns by less than this altogether, a corner quantized within it; rad.
 QUANTIZED = 0.02
 
 
@@ -101,7 +102,7 @@ def _sides_of_loop(cmap: ConformalMap, lattice: Lattice, loop: int, gained: Ints
     at = np.append(np.flatnonzero(corner), len(vertices) - 1)
     step = place[at[1:]] - place[at[:-1]]
     side = np.repeat(np.arange(len(step)), np.diff(at) + 1)
-    index = np.concatenate([np.arange(a, b + 1) for a, b in zip(at[:-1], at[1:], strict=True)])
+    index = np.concatenate([np.arange(a, b + 1) for a, b in pairwise(at.tolist())])
     return Sides(
         step / abs(step),
         abs(step),

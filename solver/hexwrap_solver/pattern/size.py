@@ -53,7 +53,7 @@ ASKED, FREE = 0.02, 0.10
 
 
 def size_spread(settings: PatternSettings) -> float:
-    """Relative freedom of the size: within half a cell of a number around, 2 % of a length, 10 % of neither."""
+    """Relative freedom of the size: half a cell of a number around, 2 % of a length, else 10 %."""
     if settings.around is not None:
         return 0.5 / settings.around
     return FREE if settings.edge_length is None else ASKED

@@ -1,0 +1,80 @@
+"""Choosing the way in which the lattice is placed on a domain."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from hexwrap_solver.conformal.types import ConformalMap
+from hexwrap_solver.pattern.align import place_by_sides
+from hexwrap_solver.pattern.cone import place_on_cone, place_on_flat_ring
+from hexwrap_solver.pattern.cylinder import place_on_cylinder
+from hexwrap_solver.pattern.lattice import Lattice
+from hexwrap_solver.pattern.placement import Placement, edge_angle, is_straight, quantum_turns
+from hexwrap_solver.pattern.sides import has_corners, is_polygon
+from hexwrap_solver.pattern.types import PatternSettings
+
+#: Worst ratio of singular values − 1 that an alignment may cost.
+BEARABLE = 0.5
+
+
+def place_lattice(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings) -> Placement:
+    """The way of placing that suits the domain and what is to be aligned."""
+    turns = quantum_turns(cmap, lattice)
+    loops, notes = loops_to_align(cmap, lattice, settings)
+    if turns == 0 and not any(has_corners(cmap, lattice, loop) for loop in loops):
+        placement = place_on_cylinder(cmap, lattice, settings, loops)
+    elif loops:
+        placement = _place_by_sides(cmap, lattice, settings, turns, loops)
+    else:
+        placement = _place_freely(cmap, lattice, settings, turns)
+    return replace(placement, notes=(*notes, *placement.notes))
+
+
+def _place_freely(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings, turns: int) -> Placement:
+    """Aligned nowhere."""
+    if turns == 0:
+        return place_on_cylinder(cmap, lattice, settings, [])
+    if cmap.deck.is_translation:
+        return place_on_flat_ring(cmap, lattice, settings, turns)
+    return place_on_cone(cmap, lattice, settings, turns)
+
+
+def _place_by_sides(
+    cmap: ConformalMap, lattice: Lattice, settings: PatternSettings, turns: int, loops: list[int]
+) -> Placement:
+    """Aligned on as many of the loops as bearable deformations allow."""
+    tried = place_by_sides(cmap, lattice, settings, turns, loops)
+    if tried.distortion <= BEARABLE:
+        return tried
+    told = (
+        f"To align loop {' and loop '.join(map(str, loops))} at this size would distort cells by "
+        f"{tried.distortion:.2f}, more than {BEARABLE}: smaller cells, or corners elsewhere, fit better."
+    )
+    fewer = [place_by_sides(cmap, lattice, settings, turns, [loop]) for loop in loops if len(loops) == 2]
+    best = min(fewer, key=lambda placement: placement.distortion, default=tried)
+    if best.distortion > BEARABLE:
+        best = _place_freely(cmap, lattice, settings, turns)
+    return replace(best, notes=(told, *best.notes))
+
+
+def loops_to_align(
+    cmap: ConformalMap, lattice: Lattice, settings: PatternSettings
+) -> tuple[list[int], list[str]]:
+    """Loops on which lattice lines can lie, of those on which they should."""
+    wanted: list[int] = {"none": [], "first": [0], "both": [0, 1]}[settings.align]
+    if wanted and not is_straight(lattice, edge_angle(lattice, settings)):
+        angle = np.rad2deg(edge_angle(lattice, settings))
+        return [], [
+            f"With edges at {angle:.4g}° to the boundary no lattice line can lie on it: the pattern is not "
+            "aligned."
+        ]
+    loops = [loop for loop in wanted if is_polygon(cmap, lattice, loop)]
+    if len(loops) == len(wanted):
+        return loops, []
+    curved = " and on ".join(f"loop {loop}" for loop in wanted if loop not in loops)
+    return loops, [
+        f"The pattern is not aligned on {curved}: only a boundary of straight sides with corners of "
+        "quantized angles can be a lattice line."
+    ]
