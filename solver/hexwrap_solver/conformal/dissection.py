@@ -14,7 +14,7 @@ import numpy as np
 from hexwrap_solver.arrays import Bools, Floats, Ints
 
 #: Parts of about this many vertices are not cut any further: dense algebra is faster there.
-LEAF = 96
+LEAF = 128
 #: Steps that bring each cutting plane to its part's median.
 MEDIAN_STEPS = 4
 #: Planes are found from every fourth unknown.

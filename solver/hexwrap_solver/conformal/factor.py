@@ -33,6 +33,14 @@ class _Front:
     into_rest: Ints
 
 
+def _cleared(size: int) -> Floats:
+    """(size,) zeros. NumPy asks for huge pages in ``empty`` but not in ``zeros``: on 200 MB that is a
+    difference of 0.03 to 0.4 s."""
+    array = np.empty(size)
+    array.fill(0.0)
+    return array
+
+
 class Factorisation:
     """Solves A x = b for symmetric positive definite A of a fixed pattern."""
 
@@ -47,7 +55,7 @@ class Factorisation:
         low, high = np.minimum(one, other), np.maximum(one, other)
         self._fronts = _analyse(tree, low, high)
         self._size, self._diagonal_at, self._off_diagonal_at = self._addresses(low, high)
-        self._factor = np.zeros(self._size)
+        self._factor = np.empty(self._size)  # cleared by factorise
         self._blocks = [self._block(front) for front in self._fronts]
 
     def _addresses(self, low: Ints, high: Ints) -> tuple[int, Ints, Ints]:
@@ -98,7 +106,7 @@ class Factorisation:
             if k and b:
                 dtrsm(1.0, own, rest, side=1, lower=1, trans_a=1, overwrite_b=1)
                 if update is None:
-                    update = np.zeros(b * b)
+                    update = _cleared(b * b)
                 dsyrk(-1.0, rest, beta=1.0, c=update.reshape(b, b).T, lower=1, overwrite_c=1)
             if update is not None:
                 self._extend_add(factor, updates, front, update.reshape(b, b).T)
@@ -123,7 +131,7 @@ class Factorisation:
         if len(rest):
             target = updates[front.parent]
             if target is None:
-                target = updates[front.parent] = np.zeros(b * b)
+                target = updates[front.parent] = _cleared(b * b)
             at = (b * rest)[:, None] + rest
             target[at] = target.take(at) + columns[s:, s:]
 

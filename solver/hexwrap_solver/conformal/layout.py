@@ -8,7 +8,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import breadth_first_order
 
-from hexwrap_solver.arrays import Complexes, Floats, Ints
+from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints
 from hexwrap_solver.conformal.cut import Cut, cut_open
 from hexwrap_solver.conformal.types import Deck
 
@@ -62,28 +62,36 @@ def _develop(twin: Ints, lengths: Floats, angles: Floats, faces: Ints) -> Comple
     """
     m = len(faces)
     order, up = _face_tree(twin)
-    faces, local = faces[order], _local_frames(lengths[:, order], angles[:, order])
     # faces in breadth-first order: parents then lie side by side in memory, too
-    child = np.arange(1, m)
-    parent = up[1:]
-    edge = (twin[order[1:]] == order[parent][:, None]).argmax(axis=1)
-    tail = faces[child, (edge + 1) % 3]
-    start = (faces[parent] == tail[:, None]).argmax(axis=1)  # the same edge runs backwards in the parent
-    mine = local[child, (edge + 1) % 3], local[child, (edge + 2) % 3]
-    theirs = local[parent, start], local[parent, (start + 2) % 3]
+    local = _local_frames(lengths[:, order], angles[:, order])
     turn = np.ones(m, dtype=complex)
     shift = np.zeros(m, dtype=complex)
-    ratio = (theirs[1] - theirs[0]) / (mine[1] - mine[0])
-    turn[1:] = ratio / np.abs(ratio)
-    shift[1:] = (theirs[0] + theirs[1] - turn[1:] * (mine[0] + mine[1])) / 2
+    turn[1:], shift[1:] = _motions(faces[order], local, twin[order[1:]] == order[up[1:], None], up[1:])
     while up.any():
-        shift = turn[up] * shift + shift[up]
-        turn = turn[up] * turn
+        above = turn[up]
+        shift = above * shift + shift[up]
+        turn = above * turn
         up = up[up]
     turn /= np.abs(turn)
     corners = np.empty((m, 3), dtype=complex)
     corners[order] = turn[:, None] * local + shift[:, None]
     return corners
+
+
+def _motions(faces: Ints, local: Complexes, through: Bools, parent: Ints) -> tuple[Complexes, Complexes]:
+    """Rotation and translation that lay faces 1, 2, … against their parents' frames. through: (m − 1, 3)
+    marks the edge between the two by the corner opposite to it."""
+    corner = faces.ravel()
+    place = local.ravel()
+    edge = through.argmax(axis=1)
+    base = 3 * np.arange(1, len(faces))
+    tail, head = base + (edge + 1) % 3, base + (edge + 2) % 3
+    start = (faces[parent] == corner[tail, None]).argmax(axis=1)  # the edge runs backwards in the parent
+    in_parent = place[3 * parent + start], place[3 * parent + (start + 2) % 3]
+    mine = place[tail], place[head]
+    turn = (in_parent[1] - in_parent[0]) / (mine[1] - mine[0])
+    turn /= np.abs(turn)
+    return turn, (in_parent[0] + in_parent[1] - turn * (mine[0] + mine[1])) / 2
 
 
 def _face_tree(twin: Ints) -> tuple[Ints, Ints]:

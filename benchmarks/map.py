@@ -1,0 +1,190 @@
+"""Time and memory of the conformal map against its floor.
+
+    python benchmarks/map.py [--vertices 2000 20000 200000] [--route plain flips]
+
+The floor is (Newton steps) × (one sparse Cholesky factorisation + two triangular solves) on the same matrix.
+It is measured with the solver's own factorisation and, where installed (``pip install cvxopt pypardiso``),
+with CHOLMOD (cvxopt) and MKL PARDISO, analysis not counted. Newton steps are those of Newton's method with
+a factorisation in each step. Times are processor seconds of one thread, the best of a few runs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+
+os.environ.update(dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1"))
+
+import sys
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+
+from hexwrap_solver.arrays import Ragged
+from hexwrap_solver.conformal import boundary, conformal_map
+from hexwrap_solver.conformal.energy import Energy
+from hexwrap_solver.conformal.factor import Factorisation
+from hexwrap_solver.conformal.newton import minimise
+from hexwrap_solver.conformal.robust import solve_with_flips
+from hexwrap_solver.conformal.types import BoundaryCondition
+from hexwrap_solver.surface import surface_from_mesh
+from hexwrap_solver.surface.types import SentMesh
+
+
+def tower(n: int) -> SentMesh:
+    """About n vertices on a doubly curved tower of no symmetry; rows of unequal height, random diagonals."""
+    random = np.random.default_rng(0)
+    around, rows = round(np.sqrt(2.0 * n)), round(np.sqrt(n / 2.0))
+    i, j = (x.ravel() for x in np.meshgrid(np.arange(around), np.arange(rows + 1)))
+    inside = (j > 0) & (j < rows)
+    phi = 2 * np.pi * (i + 0.25 * random.uniform(-1, 1, len(i))) / around
+    s = (j + 0.25 * inside * random.uniform(-1, 1, len(i))) / rows
+    r = 1.0 + 0.6 * s**2 + 0.15 * np.cos(3 * phi + 2 * s) + 0.2 * np.sin(4 * s) * np.cos(phi)
+    place = [r * np.cos(phi) + 0.3 * s, r * np.sin(phi), 2.5 * s + 0.1 * np.sin(2 * phi)]
+    i, j = (x.ravel() for x in np.meshgrid(np.arange(around), np.arange(rows)))
+    a, b = j * around + i, j * around + (i + 1) % around
+    c, d = b + around, a + around
+    flip = random.random(len(a)) < 0.5
+    first = np.where(flip, np.stack([a, b, d]), np.stack([a, b, c]))
+    second = np.where(flip, np.stack([b, c, d]), np.stack([a, c, d]))
+    return SentMesh(
+        np.stack(place, axis=1), Ragged.from_table(np.concatenate([first, second], axis=1).T.copy())
+    )
+
+
+def best(run: Callable[[], Any], repeats: int) -> tuple[float, Any]:
+    """Least processor time in seconds, and the result."""
+    least, result = np.inf, None
+    for _ in range(repeats):
+        start = time.process_time()
+        result = run()
+        least = min(least, time.process_time() - start)
+    return least, result
+
+
+def newton_steps(energy: Energy) -> int:
+    """Steps of Newton's method with a fresh Hessian in each, down to the residual of ``minimise``."""
+    goal = max(2 * minimise(energy).residual, 1e-12)
+    factorisation = Factorisation(energy.points, energy.rows, energy.columns)
+    x, steps = np.zeros(energy.n_dof), 0
+    while True:
+        corners = energy.corners(energy.scale_of(x))
+        gradient = energy.gradient(corners)
+        if np.abs(gradient).max() <= goal or steps == 20:
+            return steps
+        factorisation.factorise(*energy.hessian(corners))
+        x -= factorisation.solve(gradient)
+        steps += 1
+
+
+def floors(energy: Energy, repeats: int) -> dict[str, float]:
+    """Seconds of one factorisation and two triangular solves (one solution), per solver."""
+    diagonal, off_diagonal = energy.hessian(energy.corners(np.zeros(energy.n)))
+    right = np.random.default_rng(0).standard_normal(energy.n_dof)
+    own = Factorisation(energy.points, energy.rows, energy.columns)
+    times = {
+        "own": best(lambda: own.factorise(diagonal, off_diagonal), repeats)[0]
+        + best(lambda: own.solve(right), repeats)[0]
+    }
+    for name, measure in (("CHOLMOD", _cholmod), ("PARDISO", _pardiso)):
+        try:
+            times[name] = measure(energy, diagonal, off_diagonal, right, repeats)
+        except ImportError:
+            print(f"  ({name} is not installed)", file=sys.stderr)
+    return times
+
+
+def _cholmod(energy: Energy, diagonal: Any, off_diagonal: Any, right: Any, repeats: int) -> float:
+    from cvxopt import cholmod, matrix, spmatrix
+
+    n = energy.n_dof
+    rows = np.concatenate([np.arange(n), energy.rows])
+    columns = np.concatenate([np.arange(n), energy.columns])
+    lower = spmatrix(np.concatenate([diagonal, off_diagonal]), rows, columns, (n, n))
+    symbolic = cholmod.symbolic(lower)
+    b = matrix(right)
+    return (
+        best(lambda: cholmod.numeric(lower, symbolic), repeats)[0]
+        + best(lambda: cholmod.solve(symbolic, b), repeats)[0]
+    )
+
+
+def _pardiso(energy: Energy, diagonal: Any, off_diagonal: Any, right: Any, repeats: int) -> float:
+    from pypardiso import PyPardisoSolver
+
+    n = energy.n_dof
+    upper = sparse.coo_matrix((off_diagonal, (energy.columns, energy.rows)), shape=(n, n))
+    matrix = (upper + sparse.diags(diagonal)).tocsr()
+    solver = PyPardisoSolver(mtype=2)
+    solver.factorize(matrix)
+    solver.set_phase(22)
+    factorise = best(lambda: solver._call_pardiso(matrix, right), repeats)[0]
+    solver.set_phase(33)
+    return factorise + best(lambda: solver._call_pardiso(matrix, right), repeats)[0]
+
+
+def plain(n: int, repeats: int) -> float:
+    """Prints one size; returns the map's seconds."""
+    sent = tower(n)
+    intake, surface = best(lambda: surface_from_mesh(sent), repeats)
+    mapping, found = best(lambda: conformal_map(surface, BoundaryCondition()), repeats)
+    energy = Energy(surface, boundary.straight(surface))
+    steps = newton_steps(energy)
+    print(
+        f"{len(surface.vertices):>9,} vertices: intake {intake:.3f} s, map {mapping:.3f} s, "
+        f"{steps} Newton steps, residual {found.residual:.1e}, peak {peak_gigabytes():.2f} GB"
+    )
+    for name, seconds in floors(energy, repeats).items():
+        floor = steps * seconds
+        print(
+            f"{'':>20} floor with {name:<8} {floor:.3f} s: map {mapping / floor:.2f} ×, "
+            f"intake to layout {(intake + mapping) / floor:.2f} ×"
+        )
+    return mapping
+
+
+def flips(n: int, repeats: int) -> None:
+    """The robust route beside the plain one, on the same mesh."""
+    surface = surface_from_mesh(tower(n))
+    ordinary, _ = best(lambda: conformal_map(surface, BoundaryCondition()), repeats)
+    robust, found = best(lambda: solve_with_flips(surface, boundary.straight(surface)), repeats)
+    print(
+        f"{len(surface.vertices):>9,} vertices: with flips {robust:.3f} s, {found.flips} flips, "
+        f"{robust / ordinary:.2f} × the plain route"
+    )
+
+
+def peak_gigabytes() -> float:
+    """Peak memory of this process so far."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return float("nan")
+    unit = 1 if sys.platform == "darwin" else 1024
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e9
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--vertices", type=int, nargs="+", default=[2_000, 20_000, 200_000])
+    parser.add_argument("--route", nargs="+", choices=["plain", "flips"], default=["plain", "flips"])
+    parser.add_argument("--repeats", type=int, default=3)
+    args = parser.parse_args()
+    if "plain" in args.route:
+        seconds = [plain(n, args.repeats) for n in args.vertices]
+        for k in range(1, len(seconds)):
+            n, m = args.vertices[k - 1 : k + 1]
+            exponent = np.log(seconds[k] / seconds[k - 1]) / np.log(m / n)
+            print(f"time grows with exponent {exponent:.2f} from {n:,} to {m:,} vertices")
+    if "flips" in args.route:
+        for n in args.vertices:
+            flips(n, args.repeats)
+
+
+if __name__ == "__main__":
+    main()
