@@ -11,12 +11,18 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+import httpx
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from hexwrap_server import __version__, wire
+from hexwrap_server import __version__, samples, wire
+from hexwrap_server.carrying import flatten_curves, lift_curves
+from hexwrap_server.curves import READERS, read_curves, write_curves
+from hexwrap_server.curves import WRITERS as CURVE_WRITERS
+from hexwrap_server.demo import ALL, DemoError, run_demo
 from hexwrap_server.files import WRITERS, Meta, write
-from hexwrap_server.local import Task, UsageError, solve_here, task
+from hexwrap_server.files.text import length
+from hexwrap_server.local import Task, UsageError, only_map, solve_here, task
 from hexwrap_server.options import add_request_options, is_option_at_fault
 from hexwrap_server.problems import FormError
 from hexwrap_server.settings import Settings, add_arguments
@@ -85,6 +91,36 @@ def _parser() -> argparse.ArgumentParser:
     solve.add_argument("-q", "--quiet", action="store_true", help="print nothing but errors")
     add_request_options(solve)
     solve.set_defaults(command=_solve)
+    lift = commands.add_parser("lift", help="carry own points and curves from the domain onto the surface")
+    lift.add_argument("input", metavar="INPUT", help=f"{INPUT}; the boundary options say how it is mapped")
+    lift.add_argument(
+        "points", metavar="POINTS", help=f"drawing in the unrolled domain ({', '.join(READERS)})"
+    )
+    lift.add_argument(
+        "-o", "--output", required=True, metavar="OUT", help=f"file to write ({', '.join(CURVE_WRITERS)})"
+    )
+    lift.add_argument(
+        "--flatten", action="store_true", help="the other way: from the surface into the domain"
+    )
+    lift.add_argument(
+        "--step", type=float, metavar="LENGTH", help="how closely lines are followed, in units of the drawing"
+    )
+    lift.add_argument("-q", "--quiet", action="store_true", help="print nothing but errors")
+    add_request_options(lift)
+    lift.set_defaults(command=_lift)
+    demo = commands.add_parser(
+        "demo", help="send a bundled sample through the service and show what comes out"
+    )
+    demo.add_argument(
+        "--sample", choices=[*samples.names(), ALL], default="tower", help="which surface (default: tower)"
+    )
+    demo.add_argument(
+        "--out", default="hexwrap-demo", metavar="DIR", help="folder for the files (default: %(default)s)"
+    )
+    demo.add_argument(
+        "--port", type=int, default=Settings.port, help="port of the service (default: %(default)s)"
+    )
+    demo.set_defaults(command=_demo)
     return parser
 
 
@@ -121,6 +157,41 @@ def _solve(asked: argparse.Namespace) -> int:
     for out, kind in kinds.items():
         save(out, write(kind, solution, meta))
         console.print(f"wrote {out}", highlight=False)
+    return 0
+
+
+def _lift(asked: argparse.Namespace) -> int:
+    ending = Path(asked.output).suffix.lower()
+    if ending not in CURVE_WRITERS:
+        raise UsageError(f"-o {asked.output}: the ending must be one of {', '.join(CURVE_WRITERS)}.")
+    if asked.step is not None and asked.step <= 0:
+        raise UsageError(f"--step {asked.step:g}: must be greater than 0.")
+    _check_folders([asked.output])
+    if not Path(asked.points).is_file():
+        raise UsageError(f"{asked.points}: there is no such file.")
+    curves = read_curves(Path(asked.points))
+    solution, _ = solve_with_progress(only_map(task(asked.input, asked)), asked.quiet)
+    carry = flatten_curves if asked.flatten else lift_curves
+    carried = carry(solution.map, curves, asked.step)
+    if not carried.curves:
+        return _refuse(1, "no point of the drawing lies in the domain; see domain.svg for where that is.")
+    save(asked.output, write_curves(ending, carried.curves))
+    console = Console(quiet=asked.quiet, soft_wrap=True, highlight=False)
+    if carried.outside:
+        console.print(f"{carried.outside} points of the drawing lie outside the domain and were left out")
+    if carried.farthest:
+        console.print(f"points stood at most {length(carried.farthest)} off the surface")
+    console.print(f"wrote {asked.output}")
+    return 0
+
+
+def _demo(asked: argparse.Namespace) -> int:
+    console = Console(soft_wrap=True)
+    try:
+        with _progress(quiet=False) as listen:
+            run_demo(asked.sample, Path(asked.out), asked.port, console, listen)
+    except (DemoError, httpx.HTTPError) as error:
+        return _refuse(1, str(error))
     return 0
 
 
