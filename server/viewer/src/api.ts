@@ -1,0 +1,150 @@
+// The wire contract as this page uses it: types, and one function per route.
+
+export type Vec2 = [number, number];
+export type Vec3 = [number, number, number];
+
+export interface Problem {
+  type: string;
+  title: string;
+  status: number;
+  detail: string;
+  errors?: { pointer: string; detail: string }[];
+  vertices?: number[];
+  faces?: number[];
+  edges?: [number, number][];
+}
+
+export interface Job {
+  id: string;
+  name: string | null;
+  status: "queued" | "running" | "done" | "failed" | "cancelled";
+  stage: string | null;
+  progress: number;
+  created: string | number;
+  timings: Record<string, number>;
+  problem: Problem | null;
+}
+
+export interface BoundaryAngle {
+  vertex?: number;
+  point?: Vec3;
+  angle: number;
+}
+
+export interface Request {
+  name?: string;
+  surface: Record<string, unknown>;
+  boundary?: Record<string, unknown>;
+  pattern?: Record<string, unknown> | null;
+  panels?: Record<string, unknown> | null;
+  support?: unknown;
+}
+
+export interface Result {
+  mesh: { vertices: Vec3[]; faces: number[][]; input_vertex: number[]; loops: [number[], number[]]; repairs: string[] };
+  map: {
+    kind: string;
+    cone_angle: number;
+    log_scale: number[];
+    uv: Vec2[];
+    sheet: number[][];
+    deck: { angle: number; translation: Vec2 };
+    apex: Vec2 | null;
+    circumference: number;
+    boundary_angles: [number[], number[]];
+    iterations: number;
+    residual: number;
+    flips: number;
+  };
+  pattern?: {
+    kind: string;
+    vertices: Vec3[];
+    normals: Vec3[];
+    uv: Vec2[];
+    faces: number[][];
+    sheet?: number[][];
+    whole: boolean[];
+    neighbours: number[][];
+    rings: number;
+    around: number;
+    distortion: number;
+    notes?: string[];
+  } | null;
+  panels?: {
+    polygons: Vec3[][];
+    face: number[];
+    label: string[];
+    size: number[];
+    edge_length: number[];
+    center: Vec3[];
+    normal: Vec3[];
+    whole: boolean[];
+    planarity?: (number | null)[];
+    surface_distance?: (number | null)[];
+    gap?: (number | null)[];
+  } | null;
+  sizes?: { size: number; edge_length: number; count: number; color: string }[] | null;
+  trade_off?: { sizes: number[]; uncovered: number[]; worst_gap: number[] } | null;
+  support?: { nodes: Vec3[]; axes: Vec3[]; edges: [number, number][]; strips: Vec3[][] } | null;
+  quality: Record<string, any>;
+  timings?: Record<string, number>;
+}
+
+export class ProblemError extends Error {
+  constructor(readonly problem: Problem) {
+    super(problem.detail || problem.title);
+  }
+}
+
+/** The server did not answer at all (stopped, restarting). */
+export class UnreachableError extends Error {}
+
+async function call(path: string, init?: RequestInit): Promise<Response> {
+  let response: Response;
+  try {
+    response = await fetch(path, init);
+  } catch (cause) {
+    if (init?.signal?.aborted) throw cause;
+    throw new UnreachableError("The server does not answer. Is hexwrap serve running?");
+  }
+  if (response.ok) return response;
+  const kind = response.headers.get("content-type") ?? "";
+  const problem: Problem = kind.includes("json")
+    ? await response.json()
+    : { type: "about:blank", title: response.statusText, status: response.status, detail: `The server answered ${response.status}.` };
+  throw new ProblemError(problem);
+}
+
+const json = async <T>(path: string, init?: RequestInit): Promise<T> => (await call(path, init)).json() as Promise<T>;
+
+const post = (body: unknown): RequestInit => ({
+  method: "POST",
+  headers: { "Content-Type": "application/json" },
+  body: JSON.stringify(body),
+});
+
+export const api = {
+  health: () => json<{ status: string; version: string }>("/health"),
+  jobs: () => json<{ jobs: Job[] }>("/v1/jobs?limit=50").then((answer) => answer.jobs),
+  job: (id: string, wait = 0) => json<Job>(`/v1/jobs/${id}${wait ? `?wait=${wait}` : ""}`),
+  submit: (request: Request) => json<Job>("/v1/jobs", post(request)),
+  cancel: (id: string) => call(`/v1/jobs/${id}`, { method: "DELETE" }),
+  result: (id: string) => json<Result>(`/v1/jobs/${id}/result`),
+  request: (id: string) => json<Request>(`/v1/jobs/${id}/request`),
+  samples: () => json<{ samples: { name: string; title: string }[] }>("/v1/samples").then((answer) => answer.samples),
+  sample: (name: string) => json<Request>(`/v1/samples/${name}`),
+  /** The file's mesh as it stands, unchecked: to have something to point at when it is refused. */
+  preview: (file: File) => json<{ vertices: Vec3[]; faces: number[][] }>("/v1/surfaces/preview", upload(file)),
+  surface: (file: File) => json<{ id: string; vertices: number; faces: number; repairs: string[] }>("/v1/surfaces", upload(file)),
+};
+
+function upload(file: File): RequestInit {
+  const form = new FormData();
+  form.append("file", file, file.name);
+  return { method: "POST", body: form };
+}
+
+export const FILES = [
+  "panels.obj", "panels.3dm", "panels.dxf", "panels.csv", "flat.dxf",
+  "domain.svg", "panels.png", "result.json", "result.npz",
+];

@@ -1,0 +1,95 @@
+// Two small charts: how many panels of each size, and what each number of sizes would leave uncovered.
+import type { Result } from "./api";
+import { number } from "./colors";
+
+const NS = "http://www.w3.org/2000/svg";
+
+function svg(tag: string, attributes: Record<string, string | number>, ...children: (Node | string)[]): SVGElement {
+  const element = document.createElementNS(NS, tag);
+  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, String(value));
+  element.append(...children);
+  return element;
+}
+
+const W = 340;
+const H = 132;
+const PAD = { left: 40, right: 8, top: 10, bottom: 24 };
+
+export function histogram(sizes: NonNullable<Result["sizes"]>): SVGElement {
+  const root = svg("svg", { viewBox: `0 0 ${W} ${H}`, role: "img", "aria-label": "Panels per size" });
+  const most = Math.max(...sizes.map((s) => s.count), 1);
+  const width = (W - PAD.left - PAD.right) / sizes.length;
+  sizes.forEach((s, i) => {
+    const h = ((H - PAD.top - PAD.bottom) * s.count) / most;
+    const bar = svg("rect", {
+      x: PAD.left + i * width + 0.5, y: H - PAD.bottom - h, width: Math.max(width - 1.5, 0.7), height: Math.max(h, 0.8), fill: s.color, rx: 1.5,
+    });
+    bar.append(svg("title", {}, `edge ${number(s.edge_length)}: ${s.count} panels`));
+    root.append(bar);
+  });
+  root.append(
+    svg("line", { x1: PAD.left, x2: W - PAD.right, y1: H - PAD.bottom, y2: H - PAD.bottom, class: "axis" }),
+    svg("text", { x: PAD.left - 5, y: PAD.top + 8, "text-anchor": "end" }, String(most)),
+    svg("text", { x: PAD.left, y: H - 8 }, number(sizes[0].edge_length)),
+    svg("text", { x: W - PAD.right, y: H - 8, "text-anchor": "end" }, number(sizes[sizes.length - 1].edge_length)),
+  );
+  return root;
+}
+
+export function tradeOff(curve: NonNullable<Result["trade_off"]>, current: number | null, choose: (k: number) => void): SVGElement {
+  const root = svg("svg", { viewBox: `0 0 ${W} ${H}`, class: "curve", "aria-label": "Uncovered area for each number of sizes" });
+  const n = curve.sizes.length;
+  const top = Math.max(...curve.uncovered, 1e-9);
+  const x = (i: number) => PAD.left + ((W - PAD.left - PAD.right) * (i + 0.5)) / n;
+  const y = (u: number) => H - PAD.bottom - ((H - PAD.top - PAD.bottom) * u) / top;
+  root.append(
+    svg("line", { x1: PAD.left, x2: W - PAD.right, y1: H - PAD.bottom, y2: H - PAD.bottom, class: "axis" }),
+    svg("text", { x: PAD.left - 5, y: PAD.top + 8, "text-anchor": "end" }, `${number(100 * top, 2)} %`),
+    svg("text", { x: PAD.left - 5, y: H - PAD.bottom, "text-anchor": "end" }, "0"),
+    svg("polyline", { points: curve.uncovered.map((u, i) => `${x(i)},${y(u)}`).join(" "), class: "line" }),
+  );
+  curve.sizes.forEach((k, i) => {
+    const spot = svg("g", { class: k === current ? "spot current" : "spot", tabindex: 0, role: "button", "data-k": k,
+      "aria-label": `${k} sizes: ${number(100 * curve.uncovered[i], 3)} % uncovered` });
+    spot.append(
+      svg("rect", { x: x(i) - (W - PAD.left - PAD.right) / n / 2, y: 0, width: (W - PAD.left - PAD.right) / n, height: H, fill: "transparent" }),
+      svg("circle", { cx: x(i), cy: y(curve.uncovered[i]), r: k === current ? 5 : 2.6 }),
+      svg("title", {}, `${k} sizes: ${number(100 * curve.uncovered[i], 3)} % uncovered, worst gap ${number(curve.worst_gap[i])}`),
+    );
+    spot.addEventListener("click", () => choose(k));
+    spot.addEventListener("keydown", (event) => {
+      if ((event as KeyboardEvent).key === "Enter" || (event as KeyboardEvent).key === " ") choose(k);
+    });
+    root.append(spot);
+    if (k === 1 || k % 10 === 0 || k === current) root.append(svg("text", { x: x(i), y: H - 8, "text-anchor": "middle" }, String(k)));
+  });
+  return root;
+}
+
+/** A panel laid flat, as a small outline with its edge lengths. */
+export function flatOutline(polygon: [number, number, number][], normal: [number, number, number]): SVGElement {
+  const sub = (a: number[], b: number[]) => a.map((v, d) => v - b[d]);
+  const dot = (a: number[], b: number[]) => a.reduce((s, v, d) => s + v * b[d], 0);
+  const cross = (a: number[], b: number[]) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+  const first = sub(polygon[1], polygon[0]);
+  const along = first.map((v, d) => v - dot(first, normal) * normal[d]);
+  const x = along.map((v) => v / Math.hypot(...along));
+  const y = cross(normal, x);
+  const flat = polygon.map((p) => [dot(sub(p, polygon[0]), x), -dot(sub(p, polygon[0]), y)]);
+  const xs = flat.map((p) => p[0]);
+  const ys = flat.map((p) => p[1]);
+  const [x0, x1, y0, y1] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
+  const scale = 120 / Math.max(x1 - x0, y1 - y0);
+  const px = flat.map(([a, b]) => [(a - (x0 + x1) / 2) * scale + 95, (b - (y0 + y1) / 2) * scale + 80]);
+  const root = svg("svg", { viewBox: "0 0 190 160", class: "outline", role: "img", "aria-label": "Flat outline" });
+  root.append(svg("polygon", { points: px.map((p) => p.join(",")).join(" ") }));
+  px.forEach((p, i) => {
+    const q = px[(i + 1) % px.length];
+    const m = [(p[0] + q[0]) / 2, (p[1] + q[1]) / 2];
+    const away = [m[0] - 95, m[1] - 80];
+    const reach = 13 / (Math.hypot(away[0], away[1]) || 1);
+    const length = Math.hypot(...sub(polygon[(i + 1) % px.length], polygon[i]));
+    root.append(svg("text", { x: m[0] + away[0] * reach, y: m[1] + away[1] * reach + 3, "text-anchor": "middle" }, number(length)));
+  });
+  return root;
+}

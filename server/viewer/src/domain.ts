@@ -1,0 +1,165 @@
+// The unrolled domain: pattern cells, mesh boundary, corners; linked with the view in space through panel numbers.
+import * as THREE from "three";
+import { MapControls } from "three/examples/jsm/controls/MapControls.js";
+import type { Result, Vec2 } from "./api";
+import { placer } from "./colors";
+import { pack, PolygonLayer } from "./polygons";
+
+const CORNER_TOLERANCE = 1e-3;
+
+export class DomainView {
+  private readonly renderer: THREE.WebGLRenderer;
+  private readonly camera = new THREE.OrthographicCamera(-1, 1, 1, -1, -10, 10);
+  private readonly controls: MapControls;
+  private readonly scene = new THREE.Scene();
+  private readonly marks = new THREE.Group();
+  private layer: PolygonLayer | null = null;
+  private panelOfPolygon: number[] = [];
+  private polygonOfPanel = new Map<number, number>();
+  private box = new THREE.Box2(new THREE.Vector2(-1, -1), new THREE.Vector2(1, 1));
+  private dirty = true;
+
+  constructor(readonly element: HTMLElement) {
+    this.renderer = new THREE.WebGLRenderer({ antialias: true, alpha: true });
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    const canvas = this.renderer.domElement;
+    canvas.tabIndex = 0;
+    canvas.setAttribute("aria-label", "Unrolled domain with the pattern");
+    element.prepend(canvas);
+    this.camera.position.set(0, 0, 5);
+    this.controls = new MapControls(this.camera, canvas);
+    this.controls.enableRotate = false;
+    this.controls.screenSpacePanning = true;
+    this.controls.zoomToCursor = true;
+    this.controls.mouseButtons.LEFT = THREE.MOUSE.PAN;
+    this.controls.addEventListener("change", () => this.invalidate());
+    this.scene.add(this.marks);
+    new ResizeObserver(() => this.fit()).observe(element);
+    const frame = () => {
+      this.controls.update();
+      if (this.dirty) {
+        this.dirty = false;
+        this.renderer.render(this.scene, this.camera);
+      }
+      requestAnimationFrame(frame);
+    };
+    frame();
+  }
+
+  invalidate(): void {
+    this.dirty = true;
+  }
+
+  clear(): void {
+    this.layer?.dispose();
+    this.layer = null;
+    this.marks.clear();
+    this.polygonOfPanel.clear();
+    this.invalidate();
+  }
+
+  show(result: Result, keepView: boolean): void {
+    this.clear();
+    const place = placer(result.map);
+    const middle = this.middleOf(result.map.uv);
+    const local = ([x, y]: Vec2): Vec2 => [x - middle[0], y - middle[1]];
+    const { pattern, panels } = result;
+    this.box.makeEmpty();
+    if (pattern) {
+      const cells = pattern.faces.map((face, f) => face.map((v, k) => local(place(pattern.uv[v], pattern.sheet?.[f]?.[k] ?? 0))));
+      this.layer = new PolygonLayer(pack(cells), false);
+      for (const cell of cells) for (const p of cell) this.box.expandByPoint(new THREE.Vector2(...p));
+      this.scene.add(this.layer.group);
+      this.panelOfPolygon = new Array(cells.length).fill(-1);
+      panels?.face.forEach((face, i) => {
+        this.panelOfPolygon[face] = i;
+        this.polygonOfPanel.set(i, face);
+      });
+    }
+    this.drawBoundary(result, (z, s) => local(place(z, s)));
+    if (!keepView) this.fit();
+    this.invalidate();
+  }
+
+  private middleOf(uv: Vec2[]): Vec2 {
+    let [x, y] = [0, 0];
+    for (const p of uv) {
+      x += p[0];
+      y += p[1];
+    }
+    return [x / uv.length, y / uv.length];
+  }
+
+  /** Mesh boundary as drawn by the faces that hold it, corners as dots, the cut's two images left open. */
+  private drawBoundary(result: Result, place: (z: Vec2, s: number) => Vec2): void {
+    const { mesh, map } = result;
+    const count = new Map<string, number>();
+    const key = (a: number, b: number) => (a < b ? `${a},${b}` : `${b},${a}`);
+    for (const f of mesh.faces) for (let k = 0; k < 3; k++) count.set(key(f[k], f[(k + 1) % 3]), (count.get(key(f[k], f[(k + 1) % 3])) ?? 0) + 1);
+    const corner = new Set<number>();
+    mesh.loops.forEach((loop, l) => loop.forEach((v, i) => Math.abs(map.boundary_angles[l][i] - Math.PI) > 0.02 && corner.add(v)));
+    const curved = corner.size > 24; // an isometric boundary bends at every vertex: no corners to mark
+    const lines: number[] = [];
+    const dots: number[] = [];
+    mesh.faces.forEach((f, i) => {
+      for (let k = 0; k < 3; k++) {
+        const [a, b] = [f[k], f[(k + 1) % 3]];
+        if (count.get(key(a, b)) !== 1) continue;
+        const p = place(map.uv[a], map.sheet[i][k]);
+        const q = place(map.uv[b], map.sheet[i][(k + 1) % 3]);
+        lines.push(...p, 0.01, ...q, 0.01);
+        this.box.expandByPoint(new THREE.Vector2(...p));
+        if (!curved && corner.has(a)) dots.push(...p, 0.02);
+      }
+    });
+    this.marks.add(new THREE.LineSegments(positions(lines), new THREE.LineBasicMaterial({ color: 0xc2410c })));
+    if (dots.length) this.marks.add(new THREE.Points(positions(dots), new THREE.PointsMaterial({ color: 0xc2410c, size: 8, sizeAttenuation: false })));
+    if (map.apex && this.box.clone().expandByScalar(0.3 * this.box.getSize(new THREE.Vector2()).length()).containsPoint(new THREE.Vector2(...place(map.apex, 0))))
+      this.marks.add(new THREE.Points(positions([...place(map.apex, 0), 0.02]), new THREE.PointsMaterial({ color: 0x1f6f78, size: 7, sizeAttenuation: false })));
+  }
+
+  fit(): void {
+    const { clientWidth: w, clientHeight: h } = this.element;
+    if (!w || !h) return;
+    this.renderer.setSize(w, h);
+    const size = this.box.getSize(new THREE.Vector2());
+    const center = this.box.getCenter(new THREE.Vector2());
+    const half = (Math.max(size.y, (size.x * h) / w, CORNER_TOLERANCE) / 2) * 1.06;
+    Object.assign(this.camera, { left: (-half * w) / h, right: (half * w) / h, top: half, bottom: -half, zoom: 1 });
+    this.camera.position.set(center.x, center.y, 5);
+    this.controls.target.set(center.x, center.y, 0);
+    this.camera.updateProjectionMatrix();
+    this.invalidate();
+  }
+
+  paint(panelColors: Uint8Array): void {
+    if (!this.layer) return;
+    const colors = new Uint8Array(3 * this.layer.count).fill(205);
+    this.polygonOfPanel.forEach((polygon, panel) => colors.set(panelColors.subarray(3 * panel, 3 * panel + 3), 3 * polygon));
+    this.layer.paint(colors);
+    this.invalidate();
+  }
+
+  select(panel: number | null): void {
+    this.layer?.select(panel === null ? null : this.polygonOfPanel.get(panel) ?? null);
+    this.invalidate();
+  }
+
+  hover(panel: number | null): void {
+    this.layer?.hover(panel === null ? null : this.polygonOfPanel.get(panel) ?? null);
+    this.invalidate();
+  }
+
+  pick(x: number, y: number): number | null {
+    const polygon = this.layer?.pick(this.renderer, this.camera, x, y, this.element.clientWidth, this.element.clientHeight);
+    const panel = polygon === null || polygon === undefined ? -1 : this.panelOfPolygon[polygon];
+    this.invalidate();
+    return panel < 0 ? null : panel;
+  }
+}
+
+function positions(flat: number[]): THREE.BufferGeometry {
+  const geometry = new THREE.BufferGeometry();
+  geometry.setAttribute("position", new THREE.Float32BufferAttribute(flat, 3));
+  return geometry;
+}

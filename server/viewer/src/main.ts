@@ -1,0 +1,621 @@
+// The page: reads settings, submits jobs, shows results. All state stands in one object; draw functions read it.
+import { balance, choices, close, loopOf, type Corner } from "./angles";
+import { api, FILES, ProblemError, UnreachableError, type Job, type Problem, type Request, type Result } from "./api";
+import { flatOutline, histogram, tradeOff } from "./charts";
+import { colour, MODES, number, RAMP_CSS, type Legend, type Mode } from "./colors";
+import { DomainView } from "./domain";
+import { View3D } from "./view3d";
+
+const $ = <T extends HTMLElement = HTMLElement>(id: string) => document.getElementById(id) as T;
+const form = $<HTMLFormElement>("form");
+const field = (name: string) => form.elements.namedItem(name) as HTMLInputElement | HTMLSelectElement;
+
+interface State {
+  surface: Request["surface"] | null;
+  name: string;
+  corners: Corner[];
+  job: Job | null;
+  result: Result | null;
+  request: Request | null;
+  selected: number | null;
+  mode: Mode;
+  /** counts submissions, so that an answer to an older one is dropped */
+  turn: number;
+}
+
+const state: State = {
+  surface: null, name: "", corners: [], job: null, result: null, request: null, selected: null, mode: "size", turn: 0,
+};
+const space = new View3D($("view3d"));
+const domain = new DomainView($("domain"));
+
+function element(tag: string, attributes: Record<string, string> = {}, ...children: (Node | string)[]): HTMLElement {
+  const node = document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes)) node.setAttribute(name, value);
+  node.append(...children);
+  return node;
+}
+
+// ---------------------------------------------------------------- settings and submission
+
+function currentRequest(): Request {
+  const value = (name: string) => field(name).value;
+  const request: Request = { name: state.name, surface: state.surface! };
+  request.boundary = { mode: value("mode") };
+  if (value("mode") === "angles")
+    Object.assign(request.boundary, { angle_unit: "pi", angles: state.corners.map(({ point, angle }) => ({ point, angle })) });
+  const rotation = value("rotation");
+  request.pattern = {
+    kind: value("kind"), align: value("align"), boundary: value("edge"),
+    rotation: Number.isNaN(Number(rotation)) ? rotation : Number(rotation),
+  };
+  if (value("measure") === "around") request.pattern.around = Number(value("around"));
+  else if (Number(value("edge_length")) > 0) request.pattern.edge_length = Number(value("edge_length"));
+  request.panels = { sizes: Number(value("sizes")), target: value("target"), joint: Number(value("joint")) || 0 };
+  if ((field("support") as HTMLInputElement).checked) request.panels.components = { depth: supportDepth() };
+  return request;
+}
+
+/** Beams as deep as a third of a mean edge: visible, and in proportion. */
+function supportDepth(): number {
+  const lengths = state.result?.panels?.edge_length;
+  return lengths?.length ? lengths.reduce((a, b) => a + b, 0) / lengths.length / 3 : 1;
+}
+
+function adopt(request: Request): void {
+  const set = (name: string, value: unknown) => {
+    if (value === undefined || value === null) return;
+    const control = field(name);
+    if (control instanceof HTMLSelectElement && ![...control.options].some((o) => o.value === String(value)))
+      control.append(element("option", { value: String(value) }, String(value)));
+    control.value = String(value);
+  };
+  const { boundary = {}, pattern, panels } = request;
+  set("mode", boundary.mode ?? "straight");
+  set("kind", pattern?.kind);
+  set("rotation", pattern?.rotation);
+  set("align", pattern?.align);
+  set("edge", pattern?.boundary);
+  if (pattern?.edge_length) set("measure", "edge_length");
+  else if (pattern?.around) set("measure", "around");
+  set("edge_length", pattern?.edge_length);
+  set("around", pattern?.around);
+  set("sizes", panels?.sizes);
+  set("target", panels?.target);
+  set("joint", panels?.joint);
+  drawForm();
+}
+
+/** The corners of a request, once the mesh is known that says on which loop each stands. */
+function adoptCorners(request: Request, result: Result): void {
+  const listed = (request.boundary?.angles as { vertex?: number; point?: [number, number, number]; angle: number }[]) ?? [];
+  const unit = { rad: 1 / Math.PI, deg: 1 / 180, pi: 1 }[(request.boundary?.angle_unit as string) ?? "rad"] ?? 1;
+  const all = result.mesh.loops.flat();
+  state.corners = listed.map(({ vertex, point, angle }) => {
+    const at = point
+      ? all.reduce((best, v) => (distance(result.mesh.vertices[v], point) < distance(result.mesh.vertices[best], point) ? v : best))
+      : Math.max(result.mesh.input_vertex.indexOf(vertex!), 0);
+    return { point: result.mesh.vertices[at], loop: loopOf(result, at), angle: angle * unit };
+  });
+}
+
+const distance = (p: number[], q: number[]) => Math.hypot(p[0] - q[0], p[1] - q[1], p[2] - q[2]);
+
+let waiting = 0;
+/** Sliders call this: the newest value wins, and a job that is still running for an older one is cancelled. */
+function solveSoon(): void {
+  if (!state.surface) return;
+  clearTimeout(waiting);
+  waiting = window.setTimeout(() => void solve(), 220);
+}
+
+async function solve(request = state.surface ? currentRequest() : null): Promise<void> {
+  if (!request) return note("Choose a sample or drop a file first.", true);
+  clearTimeout(waiting);
+  const turn = ++state.turn;
+  const before = state.job;
+  if (before && (before.status === "queued" || before.status === "running")) void api.cancel(before.id).catch(() => undefined);
+  try {
+    const job = await api.submit(request);
+    if (turn !== state.turn) return void api.cancel(job.id).catch(() => undefined);
+    state.request = request;
+    await follow(job, turn, sameSurface(before));
+  } catch (error) {
+    if (turn === state.turn) report(error);
+  }
+}
+
+let shownSurface: unknown = null;
+const sameSurface = (before: Job | null) => before !== null && shownSurface === state.surface;
+
+async function follow(job: Job, turn: number, keepView: boolean): Promise<void> {
+  banner(null);
+  const started = performance.now();
+  while (job.status === "queued" || job.status === "running") {
+    setJob(job);
+    try {
+      job = await api.job(job.id, performance.now() - started < 600 ? 0.15 : 0.4);
+    } catch (error) {
+      if (!(error instanceof UnreachableError)) throw error;
+      banner("The server does not answer; trying again.");
+      await new Promise((resolve) => setTimeout(resolve, 700));
+    }
+    if (turn !== state.turn) return;
+  }
+  setJob(job);
+  void drawJobs();
+  if (job.status === "failed" && job.problem) throw new ProblemError(job.problem);
+  if (job.status !== "done") return note(`This job was ${job.status}.`);
+  const result = await api.result(job.id);
+  if (turn !== state.turn) return;
+  present(job, result, keepView);
+}
+
+function setJob(job: Job): void {
+  state.job = job;
+  const busy = job.status === "queued" || job.status === "running";
+  $("cancel").hidden = !busy;
+  $("progress").hidden = !busy;
+  ($("progress").firstElementChild as HTMLElement).style.width = `${100 * job.progress}%`;
+  $("progress").lastElementChild!.textContent = job.status === "queued" ? "queued" : `${job.stage ?? "working"} · ${Math.round(100 * job.progress)} %`;
+}
+
+async function cancel(): Promise<void> {
+  state.turn++;
+  if (state.job) await api.cancel(state.job.id).catch(report);
+  if (state.job) setJob({ ...state.job, status: "cancelled" });
+  note("Cancelled.");
+  void drawJobs();
+}
+
+function present(job: Job, result: Result, keepView: boolean): void {
+  state.result = result;
+  state.selected = null;
+  shownSurface = state.surface;
+  location.hash = `job/${job.id}`;
+  banner(null);
+  note([...(result.mesh.repairs ?? []), ...(result.quality?.notes ?? [])].join(" "));
+  space.show(result, keepView);
+  domain.show(result, keepView);
+  drawColours();
+  drawCharts();
+  drawQuality();
+  drawCard();
+  drawFiles();
+  drawAngles();
+  document.documentElement.dataset.shown = job.id;
+}
+
+// ---------------------------------------------------------------- surfaces: files and samples
+
+async function takeFile(file: File): Promise<void> {
+  const turn = ++state.turn;
+  state.surface = null;
+  state.corners = [];
+  state.name = file.name.replace(/\.[^.]*$/, "");
+  ($("sample") as HTMLSelectElement).value = "";
+  note(`Reading ${file.name} …`);
+  try {
+    const stored = await api.surface(file);
+    if (turn !== state.turn) return;
+    state.surface = { id: stored.id };
+    note(`${stored.vertices} vertices, ${stored.faces} faces. ${stored.repairs.join(" ")}`);
+    await solve();
+  } catch (error) {
+    if (turn !== state.turn) return;
+    report(error);
+    if (error instanceof ProblemError) await showFaults(file, error.problem);
+  }
+}
+
+/** The dropped mesh as it was sent, with the faulty vertices, edges and faces in red. */
+async function showFaults(file: File, problem: Problem): Promise<void> {
+  try {
+    const mesh = await api.preview(file);
+    state.result = null;
+    domain.clear();
+    space.showMesh(mesh.vertices, mesh.faces, problem);
+    document.documentElement.dataset.shown = "faults";
+  } catch {
+    space.clear(); // not even readable: the sentence stands alone
+  }
+}
+
+async function takeSample(name: string): Promise<void> {
+  if (!name) return;
+  try {
+    const request = await api.sample(name);
+    state.surface = request.surface;
+    state.name = request.name ?? name;
+    state.corners = [];
+    adopt(request);
+    await solve(request);
+    if (state.result && request.boundary?.mode === "angles") {
+      adoptCorners(request, state.result);
+      drawAngles();
+    }
+  } catch (error) {
+    report(error);
+  }
+}
+
+async function openJob(id: string): Promise<void> {
+  const turn = ++state.turn;
+  try {
+    const [job, request] = await Promise.all([api.job(id), api.request(id)]);
+    state.surface = request.surface;
+    state.name = request.name ?? "";
+    state.request = request;
+    state.corners = [];
+    adopt(request);
+    await follow(job, turn, false);
+    if (state.result && request.boundary?.mode === "angles") {
+      adoptCorners(request, state.result);
+      drawAngles();
+    }
+  } catch (error) {
+    if (turn === state.turn) report(error);
+  }
+}
+
+// ---------------------------------------------------------------- telling
+
+function note(text: string, error = false): void {
+  const p = $("surface-note");
+  p.textContent = text;
+  p.classList.toggle("error", error);
+}
+
+function banner(text: string | null): void {
+  $("banner").hidden = text === null;
+  $("banner").textContent = text ?? "";
+}
+
+function report(error: unknown): void {
+  $("progress").hidden = true;
+  $("cancel").hidden = true;
+  if (error instanceof ProblemError) {
+    const where = error.problem.errors?.map((e) => e.detail).filter((d) => d !== error.problem.detail) ?? [];
+    banner([error.problem.detail || error.problem.title, ...where.slice(0, 3)].join(" "));
+    const { result } = state;
+    const { vertices = [], faces = [], edges = [] } = error.problem;
+    // A refusal by a job speaks of the sent mesh; where the last result knows it, show the faults on it.
+    if (result && vertices.length + faces.length + edges.length) {
+      const back = new Map(result.mesh.input_vertex.map((sent, i) => [sent, i]));
+      const here = (v: number) => back.get(v) ?? -1;
+      space.showMesh(result.mesh.vertices, result.mesh.faces, {
+        ...error.problem, vertices: vertices.map(here), faces: [], edges: edges.map(([a, b]) => [here(a), here(b)]),
+      });
+    }
+  } else banner(error instanceof Error ? error.message : String(error));
+}
+
+// ---------------------------------------------------------------- drawing the page
+
+async function drawJobs(): Promise<void> {
+  let jobs: Job[];
+  try {
+    jobs = await api.jobs();
+  } catch (error) {
+    if (error instanceof UnreachableError) banner(error.message);
+    return;
+  }
+  if ($("banner").textContent?.startsWith("The server does not answer")) banner(null);
+  $("jobs").replaceChildren(...jobs.map((job) => {
+    const busy = job.status === "running" || job.status === "queued";
+    const seconds = Object.values(job.timings ?? {}).filter((t) => typeof t === "number").reduce((a, b) => a + b, 0);
+    const button = element("button", { class: job.status, "aria-current": String(job.id === state.job?.id), "data-job": job.id },
+      element("span", {}, job.name || job.id.slice(0, 8)), element("small", {}, job.status === "done" ? `${number(seconds, 2)} s` : job.status));
+    if (busy) button.append(element("progress", { max: "1", value: String(job.progress) }));
+    button.addEventListener("click", () => void openJob(job.id));
+    return element("li", {}, button);
+  }));
+}
+
+function drawForm(): void {
+  for (const output of form.querySelectorAll("output")) output.textContent = output.parentElement!.querySelector("input")!.value;
+  const measure = field("measure").value;
+  for (const row of form.querySelectorAll<HTMLElement>("[data-for]")) row.hidden = row.dataset.for !== measure;
+  $("angles").hidden = field("mode").value !== "angles";
+  const select = $<HTMLSelectElement>("angle-value");
+  const chosen = select.value;
+  select.replaceChildren(...choices(field("kind").value).map(({ value, label }) => element("option", { value: String(value) }, label)));
+  if ([...select.options].some((o) => o.value === chosen)) select.value = chosen;
+  drawAngles();
+}
+
+function drawAngles(): void {
+  const on = field("mode").value === "angles";
+  const { result } = state;
+  const marked = new Set<number>();
+  if (on && result)
+    for (const c of state.corners)
+      for (const v of result.mesh.loops[c.loop]) if (distance(result.mesh.vertices[v], c.point) < 1e-9 * (1 + Math.hypot(...c.point))) marked.add(v);
+  space.showBoundary(on && result ? result.mesh.vertices : null, result?.mesh.loops ?? [], marked);
+  $("angle-list").replaceChildren(...state.corners.map((c, i) => {
+    const remove = element("button", { type: "button", "aria-label": `Remove corner ${i + 1}` }, "×");
+    remove.addEventListener("click", () => {
+      state.corners.splice(i, 1);
+      drawAngles();
+      anglesChanged();
+    });
+    return element("li", {}, `${number(180 * c.angle)}° on loop ${c.loop} `, remove);
+  }));
+  const { loops, total } = balance(state.corners);
+  const closed = Math.abs(total) < 0.05;
+  $("balance").textContent = `Σκ: loop 0 ${number(loops[0])}°, loop 1 ${number(loops[1])}°; ${closed ? "balanced" : `${number(total)}° too much`}`;
+  $("balance").classList.toggle("open", !closed);
+}
+
+function anglesChanged(): void {
+  if (Math.abs(balance(state.corners).total) < 0.05) solveSoon();
+}
+
+function drawColours(): void {
+  const { result } = state;
+  if (!result?.panels) {
+    $("legend").replaceChildren();
+    return;
+  }
+  const { colors, legend } = colour(result, state.mode);
+  space.paint(colors);
+  domain.paint(colors);
+  $("legend").replaceChildren(...legendNodes(legend));
+}
+
+function legendNodes(legend: Legend): Node[] {
+  if (legend.kind === "none") return [element("span", {}, legend.text)];
+  if (legend.kind === "classes")
+    return [element("table", {}, ...legend.rows.map((row) => element("tr", {},
+      element("td", {}, element("i", { style: `background:${row.color}` })), element("td", {}, row.label), element("td", {}, `× ${row.count}`))))];
+  return [element("div", {}, legend.title), element("div", { class: "ramp", style: `background:${RAMP_CSS}` }),
+    element("div", { class: "ends" }, element("span", {}, legend.low), element("span", {}, legend.high))];
+}
+
+function drawCharts(): void {
+  const { result } = state;
+  $("histogram").replaceChildren(...(result?.sizes?.length ? [histogram(result.sizes)] : []));
+  const sizes = result?.sizes?.length ?? null;
+  $("curve").replaceChildren(...(result?.trade_off ? [tradeOff(result.trade_off, sizes, chooseSizes)] : []));
+}
+
+function chooseSizes(k: number): void {
+  field("sizes").value = String(k);
+  drawForm();
+  void solve();
+}
+
+function drawQuality(): void {
+  const { result } = state;
+  const rows: [string, string][] = [];
+  if (result) {
+    const { map, pattern, panels, quality: q } = result;
+    rows.push(["Domain", map.kind === "cone" ? `cone, ${number((180 * map.cone_angle) / Math.PI)}°` : "cylinder"]);
+    if (pattern) rows.push(["Pattern", `${pattern.around} around × ${pattern.rings} rings`], ["Distortion", number(pattern.distortion, 2)]);
+    rows.push(["Scale ratio", number(q.scale_ratio)]);
+    if (panels) rows.push(
+      ["Panels", String(panels.face.length)], ["Planarity", number(q.planarity?.max, 2)], ["Overlaps", String(q.overlaps)],
+      ["Coverage", `${number(100 * q.coverage)} %`], ["Gap (mean, max)", `${number(q.gap?.tangential?.mean, 3)}, ${number(q.gap?.tangential?.max, 3)}`],
+      ["Distance (max)", number(q.surface_distance?.max, 3)], ["Distinct panels", String(q.distinct_panels)]);
+  }
+  $("quality").replaceChildren(...rows.flatMap(([name, value]) => [element("dt", {}, name), element("dd", {}, value)]));
+}
+
+function drawCard(): void {
+  const card = $("card");
+  const { result, selected } = state;
+  card.replaceChildren(element("h2", {}, "Panel"));
+  const panels = result?.panels;
+  if (!panels || selected === null) return void card.append(element("p", { class: "note" }, "Click a panel."));
+  const facts: [string, string][] = [
+    ["Label", panels.label[selected]], ["Size", panels.size[selected] < 0 ? "cut to fit" : String(panels.size[selected] + 1)],
+    ["Edge", number(panels.edge_length[selected], 6)], ["Gap", number(panels.gap?.[selected], 3)],
+    ["Planarity", number(panels.planarity?.[selected], 2)], ["Distance", number(panels.surface_distance?.[selected], 3)],
+  ];
+  const list = element("dl", {}, ...facts.flatMap(([name, value]) => [element("dt", {}, name), element("dd", {}, value)]));
+  const figures = element("div", { class: "figures" }, list);
+  figures.append(flatOutline(panels.polygons[selected], panels.normal[selected]));
+  card.append(figures);
+  const panelOf = new Map(panels.face.map((face, i) => [face, i]));
+  const around = (result!.pattern?.neighbours[panels.face[selected]] ?? []).filter((f) => f >= 0).map((f) => panelOf.get(f)).filter((i) => i !== undefined);
+  card.append(element("div", { class: "neighbours" }, "Neighbours ", ...around.map((i) => {
+    const button = element("button", {}, panels.label[i]);
+    button.addEventListener("click", () => select(i));
+    return button;
+  })));
+}
+
+function select(i: number | null): void {
+  state.selected = i;
+  space.select(i);
+  domain.select(i);
+  drawCard();
+}
+
+function hover(i: number | null): void {
+  space.hover(i);
+  domain.hover(i);
+}
+
+function drawFiles(): void {
+  const { job } = state;
+  $("files").replaceChildren(...(job ? FILES.map((name) =>
+    element("a", { href: `/v1/jobs/${job.id}/files/${name}`, download: name }, name)) : []));
+}
+
+async function copy(text: string, what: string): Promise<void> {
+  try {
+    await navigator.clipboard.writeText(text);
+    $("copied").textContent = `${what} copied.`;
+  } catch {
+    $("copied").textContent = text; // the clipboard may be closed to pages: show it, to be copied by hand
+  }
+}
+
+function asCurl(): string {
+  const body = JSON.stringify(state.request ?? currentRequest()).replace(/'/g, "'\\''");
+  return `curl -s ${location.origin}/v1/solve -H 'Content-Type: application/json' -d '${body}'`;
+}
+
+function asGrasshopper(): string {
+  const { boundary, pattern, panels } = state.request ?? currentRequest();
+  return JSON.stringify({ boundary, pattern, panels }, null, 1);
+}
+
+// ---------------------------------------------------------------- wiring
+
+function pointer(view: HTMLElement, pick: (x: number, y: number) => number | null, click: (x: number, y: number) => void): void {
+  const canvas = view.querySelector("canvas")!;
+  let down: { x: number; y: number } | null = null;
+  let pending = 0;
+  const here = (event: PointerEvent) => {
+    const box = canvas.getBoundingClientRect();
+    return { x: event.clientX - box.left, y: event.clientY - box.top };
+  };
+  canvas.addEventListener("pointerdown", (event) => (down = here(event)));
+  canvas.addEventListener("pointerup", (event) => {
+    const up = here(event);
+    if (down && Math.hypot(up.x - down.x, up.y - down.y) < 4) click(up.x, up.y);
+    down = null;
+  });
+  canvas.addEventListener("pointermove", (event) => {
+    if (event.buttons) return;
+    const { x, y } = here(event);
+    cancelAnimationFrame(pending);
+    pending = requestAnimationFrame(() => hover(pick(x, y)));
+  });
+  canvas.addEventListener("pointerleave", () => hover(null));
+}
+
+function clickInSpace(x: number, y: number): void {
+  const { result } = state;
+  if (field("mode").value === "angles" && result) {
+    const v = space.pickBoundary(x, y);
+    if (v !== null) {
+      const point = result.mesh.vertices[v];
+      const angle = Number($<HTMLSelectElement>("angle-value").value);
+      state.corners = state.corners.filter((c) => distance(c.point, point) > 1e-9 * (1 + Math.hypot(...point)));
+      state.corners.push({ point, loop: loopOf(result, v), angle });
+      drawAngles();
+      return anglesChanged();
+    }
+  }
+  select(space.pick(x, y));
+}
+
+pointer($("view3d"), (x, y) => space.pick(x, y), clickInSpace);
+pointer($("domain"), (x, y) => domain.pick(x, y), (x, y) => select(domain.pick(x, y)));
+
+form.addEventListener("submit", (event) => {
+  event.preventDefault();
+  void solve();
+});
+form.addEventListener("input", (event) => {
+  drawForm();
+  const name = (event.target as HTMLInputElement).name;
+  if (!name) return;
+  if (field("mode").value === "angles" && Math.abs(balance(state.corners).total) > 0.05) return;
+  solveSoon();
+});
+$("cancel").addEventListener("click", () => void cancel());
+$("close-balance").addEventListener("click", () => {
+  state.corners = close(state.corners);
+  drawAngles();
+  anglesChanged();
+});
+$("clear-angles").addEventListener("click", () => {
+  state.corners = [];
+  drawAngles();
+});
+
+const drop = $("drop");
+$<HTMLInputElement>("file").addEventListener("change", (event) => {
+  const input = event.target as HTMLInputElement;
+  if (input.files?.[0]) void takeFile(input.files[0]);
+  input.value = "";
+});
+drop.addEventListener("keydown", (event) => {
+  if (event.key === "Enter" || event.key === " ") $("file").click();
+});
+for (const type of ["dragover", "dragleave", "drop"] as const)
+  document.addEventListener(type, (event) => {
+    event.preventDefault();
+    drop.classList.toggle("over", type === "dragover");
+    const file = type === "drop" ? (event as DragEvent).dataTransfer?.files[0] : undefined;
+    if (file) void takeFile(file);
+  });
+$<HTMLSelectElement>("sample").addEventListener("change", (event) => void takeSample((event.target as HTMLSelectElement).value));
+
+$<HTMLSelectElement>("mode").append(...MODES.map(({ mode, label }) => element("option", { value: mode }, label)));
+$<HTMLSelectElement>("mode").addEventListener("change", (event) => {
+  state.mode = (event.target as HTMLSelectElement).value as Mode;
+  drawColours();
+});
+const toggles = () => {
+  const on = (name: string) => $<HTMLInputElement>(`t-${name}`).checked;
+  space.toggle({ edges: on("edges"), labels: on("labels"), normals: on("normals"), supports: on("supports"), mesh: on("mesh") });
+};
+for (const name of ["edges", "labels", "normals", "supports", "mesh"]) $(`t-${name}`).addEventListener("change", toggles);
+$("fit").addEventListener("click", () => {
+  space.fit();
+  domain.fit();
+});
+const cut = () => space.cut(Number($<HTMLSelectElement>("axis").value), Number($<HTMLInputElement>("cut").value));
+$("cut").addEventListener("input", cut);
+$("axis").addEventListener("change", cut);
+$("copy-curl").addEventListener("click", () => void copy(asCurl(), "The request"));
+$("copy-gh").addEventListener("click", () => void copy(asGrasshopper(), "The settings"));
+
+document.addEventListener("keydown", (event) => {
+  if ((event.target as HTMLElement).matches("input, select, textarea")) return;
+  const count = state.result?.panels?.face.length ?? 0;
+  if (event.key === "f" || event.key === "F") {
+    space.fit();
+    domain.fit();
+  } else if (event.key === "Escape") {
+    if (!$("cancel").hidden) void cancel();
+    else select(null);
+  } else if (count && (event.key === "]" || event.key === "["))
+    select(((state.selected ?? -1) + (event.key === "]" ? 1 : -1) + count) % count);
+});
+
+function theme(dark: boolean): void {
+  document.documentElement.dataset.theme = dark ? "dark" : "light";
+  try {
+    localStorage.setItem("hexwrap-theme", dark ? "dark" : "light");
+  } catch {
+    // private windows may refuse storage; the theme then lasts for the visit
+  }
+}
+$("theme").addEventListener("click", () => theme(document.documentElement.dataset.theme !== "dark"));
+
+function storedTheme(): boolean {
+  try {
+    const stored = localStorage.getItem("hexwrap-theme");
+    if (stored) return stored === "dark";
+  } catch {
+    // see theme()
+  }
+  return matchMedia("(prefers-color-scheme: dark)").matches;
+}
+
+async function start(): Promise<void> {
+  theme(storedTheme());
+  drawForm();
+  const names = await api.samples().catch(() => []);
+  $("sample").append(...names.map(({ name, title }) => element("option", { value: name, title }, name)));
+  await drawJobs();
+  setInterval(() => document.visibilityState === "visible" && void drawJobs(), 2000);
+  const wanted = /^#job\/([\w-]+)$/.exec(location.hash);
+  if (wanted) await openJob(wanted[1]);
+  else if (names.length) note("Choose a sample, drop a file, or open a job.");
+}
+
+declare global {
+  interface Window {
+    hexwrapViewer: { space: View3D; state: State };
+  }
+}
+// For those who script the page (and for the tests): where things stand on the screen.
+window.hexwrapViewer = { space, state };
+void start();

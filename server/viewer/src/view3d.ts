@@ -1,0 +1,357 @@
+// The surface in space: panels, mesh, supports, faults, boundary vertices, labels.
+import * as THREE from "three";
+import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
+import type { Problem, Result, Vec3 } from "./api";
+import { pack, PolygonLayer } from "./polygons";
+
+export interface Toggles {
+  edges: boolean;
+  labels: boolean;
+  normals: boolean;
+  supports: boolean;
+  mesh: boolean;
+}
+
+const MAX_LABELS = 120;
+
+export class View3D {
+  readonly renderer: THREE.WebGLRenderer;
+  readonly camera = new THREE.PerspectiveCamera(35, 1, 0.01, 1000);
+  readonly controls: OrbitControls;
+  private readonly scene = new THREE.Scene();
+  private readonly content = new THREE.Group();
+  private readonly headlight = new THREE.DirectionalLight(0xffffff, 1.6);
+  private readonly section = new THREE.Plane(new THREE.Vector3(0, 0, -1), Infinity);
+  private readonly labels: HTMLElement;
+  private layer: PolygonLayer | null = null;
+  private mesh: THREE.Object3D | null = null;
+  private normals: THREE.LineSegments | null = null;
+  private supports: THREE.Object3D | null = null;
+  private boundary: THREE.Points | null = null;
+  private labelText: { text: string[]; centers: Vec3[]; normals: Vec3[] } | null = null;
+  private shown: Toggles = { edges: true, labels: false, normals: false, supports: false, mesh: false };
+  private box = new THREE.Box3(new THREE.Vector3(-1, -1, -1), new THREE.Vector3(1, 1, 1));
+  private origin = new THREE.Vector3();
+  private dirty = true;
+
+  constructor(readonly element: HTMLElement) {
+    this.renderer = new THREE.WebGLRenderer({ antialias: true, alpha: true, preserveDrawingBuffer: false });
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.renderer.clippingPlanes = [];
+    const canvas = this.renderer.domElement;
+    canvas.tabIndex = 0;
+    canvas.setAttribute("aria-label", "Panels in space. Arrow keys turn, plus and minus zoom, F fits, brackets step through panels.");
+    element.prepend(canvas);
+    this.labels = document.createElement("div");
+    this.labels.className = "labels";
+    element.append(this.labels);
+    this.camera.up.set(0, 0, 1);
+    this.controls = new OrbitControls(this.camera, canvas);
+    this.controls.enableDamping = true;
+    this.controls.dampingFactor = 0.12;
+    this.controls.zoomToCursor = true;
+    this.controls.addEventListener("change", () => this.invalidate());
+    this.scene.add(new THREE.HemisphereLight(0xffffff, 0x8a8f94, 1.7), this.content, this.camera);
+    this.headlight.position.set(0.5, 0.8, 1);
+    this.camera.add(this.headlight);
+    new ResizeObserver(() => this.resize()).observe(element);
+    canvas.addEventListener("keydown", (event) => this.key(event));
+    this.resize();
+    const frame = () => {
+      this.controls.update();
+      if (this.dirty) this.render();
+      requestAnimationFrame(frame);
+    };
+    frame();
+  }
+
+  invalidate(): void {
+    this.dirty = true;
+  }
+
+  /** Draws now; public so that a frame can be timed. */
+  render(): void {
+    this.dirty = false;
+    this.renderer.render(this.scene, this.camera);
+    this.placeLabels();
+  }
+
+  private resize(): void {
+    const { clientWidth: w, clientHeight: h } = this.element;
+    if (!w || !h) return;
+    this.renderer.setSize(w, h);
+    this.camera.aspect = w / h;
+    this.camera.updateProjectionMatrix();
+    this.render();
+  }
+
+  private key(event: KeyboardEvent): void {
+    const turn = 0.12;
+    const offset = this.camera.position.clone().sub(this.controls.target);
+    if (event.key === "ArrowLeft" || event.key === "ArrowRight")
+      offset.applyAxisAngle(new THREE.Vector3(0, 0, 1), event.key === "ArrowLeft" ? -turn : turn);
+    else if (event.key === "ArrowUp" || event.key === "ArrowDown") {
+      const polar = Math.acos(THREE.MathUtils.clamp(offset.z / offset.length(), -1, 1));
+      const next = THREE.MathUtils.clamp(polar + (event.key === "ArrowUp" ? -turn : turn), 0.02, Math.PI - 0.02);
+      const axis = new THREE.Vector3(-offset.y, offset.x, 0).normalize();
+      offset.applyAxisAngle(axis, next - polar);
+    } else if (event.key === "+" || event.key === "=") offset.multiplyScalar(0.88);
+    else if (event.key === "-") offset.multiplyScalar(1 / 0.88);
+    else return;
+    event.preventDefault();
+    this.camera.position.copy(this.controls.target).add(offset);
+    this.invalidate();
+  }
+
+  /** Moves the camera so that everything is seen; keeps the direction of view. */
+  fit(): void {
+    const sphere = this.box.getBoundingSphere(new THREE.Sphere());
+    const half = THREE.MathUtils.degToRad(this.camera.fov / 2);
+    const distance = (1.02 * sphere.radius) / Math.sin(Math.min(half, Math.atan(Math.tan(half) * this.camera.aspect)));
+    const direction = this.camera.position.clone().sub(this.controls.target);
+    if (direction.lengthSq() < 1e-12 || !Number.isFinite(direction.x)) direction.set(1, -1.6, 0.7);
+    this.controls.target.copy(sphere.center);
+    this.camera.position.copy(sphere.center).addScaledVector(direction.normalize(), distance);
+    this.camera.near = distance / 200;
+    this.camera.far = distance * 20;
+    this.camera.updateProjectionMatrix();
+    this.invalidate();
+  }
+
+  clear(): void {
+    this.layer?.dispose();
+    this.layer = null;
+    for (const child of [...this.content.children]) dispose(child);
+    this.mesh = this.normals = this.supports = this.boundary = null;
+    this.labelText = null;
+    this.invalidate();
+  }
+
+  /** Shows a finished result. keepView: a slider moved, the person did not. */
+  show(result: Result, keepView: boolean): void {
+    this.clear();
+    this.frame(result.mesh.vertices);
+    this.mesh = this.meshObject(result.mesh.vertices, result.mesh.faces, Boolean(result.panels));
+    this.content.add(this.mesh);
+    const { panels, support } = result;
+    if (panels) {
+      this.layer = new PolygonLayer(pack(panels.polygons.map((polygon) => polygon.map((p) => this.local(p)))), true);
+      this.content.add(this.layer.group);
+      this.labelText = { text: panels.label, centers: panels.center.map((c) => this.local(c)), normals: panels.normal };
+      this.normals = this.normalLines(panels.center, panels.normal, panels.edge_length);
+      this.content.add(this.normals);
+    }
+    if (support) {
+      this.supports = this.stripObject(support.strips);
+      this.content.add(this.supports);
+    }
+    this.toggle(this.shown);
+    if (!keepView) this.fit();
+  }
+
+  /** Shows a mesh that has not been solved (or was refused), with the faults of the problem in red. */
+  showMesh(vertices: Vec3[], faces: number[][], problem: Problem | null): void {
+    this.clear();
+    this.frame(vertices);
+    this.mesh = this.meshObject(vertices, faces, false);
+    this.content.add(this.mesh);
+    if (problem) this.content.add(this.faults(vertices, faces, problem));
+    this.fit();
+  }
+
+  private frame(vertices: Vec3[]): void {
+    const box = new THREE.Box3();
+    for (const v of vertices) if (v.every(Number.isFinite)) box.expandByPoint(new THREE.Vector3(...v));
+    if (box.isEmpty()) box.set(new THREE.Vector3(-1, -1, -1), new THREE.Vector3(1, 1, 1));
+    // Single precision on the graphics card: everything is drawn about the middle of the model.
+    this.origin = box.getCenter(new THREE.Vector3());
+    this.box = new THREE.Box3(box.min.clone().sub(this.origin), box.max.clone().sub(this.origin));
+  }
+
+  private local(p: Vec3): Vec3 {
+    return [p[0] - this.origin.x, p[1] - this.origin.y, p[2] - this.origin.z];
+  }
+
+  private meshObject(vertices: Vec3[], faces: number[][], quiet: boolean): THREE.Object3D {
+    const position = new Float32Array(vertices.flatMap((v) => this.local(v)));
+    const index: number[] = [];
+    for (const f of faces) for (let k = 1; k + 1 < f.length; k++) if (f.every((v) => v >= 0 && v < vertices.length)) index.push(f[0], f[k], f[k + 1]);
+    const geometry = new THREE.BufferGeometry();
+    geometry.setAttribute("position", new THREE.BufferAttribute(position, 3));
+    geometry.setIndex(index);
+    geometry.computeVertexNormals();
+    const material = new THREE.MeshLambertMaterial({
+      color: 0xb9c4c4, side: THREE.DoubleSide, polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 2,
+    });
+    const group = new THREE.Group();
+    const wire = new THREE.LineSegments(new THREE.WireframeGeometry(geometry), new THREE.LineBasicMaterial({ color: 0x32525a, transparent: true, opacity: quiet ? 0.35 : 0.28 }));
+    group.add(wire);
+    if (!quiet) group.add(new THREE.Mesh(geometry, material));
+    return group;
+  }
+
+  private normalLines(centers: Vec3[], normals: Vec3[], lengths: number[]): THREE.LineSegments {
+    const position = new Float32Array(6 * centers.length);
+    centers.forEach((center, i) => {
+      const c = this.local(center);
+      for (let d = 0; d < 3; d++) {
+        position[6 * i + d] = c[d];
+        position[6 * i + 3 + d] = c[d] + normals[i][d] * lengths[i];
+      }
+    });
+    const geometry = new THREE.BufferGeometry();
+    geometry.setAttribute("position", new THREE.BufferAttribute(position, 3));
+    return new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ color: 0xd9622b }));
+  }
+
+  private stripObject(strips: Vec3[][]): THREE.Object3D {
+    const position = new Float32Array(strips.flatMap((s) => s.flatMap((p) => this.local(p))));
+    const index = new Uint32Array(6 * strips.length);
+    for (let i = 0; i < strips.length; i++) index.set([0, 1, 2, 0, 2, 3].map((k) => 4 * i + k), 6 * i);
+    const geometry = new THREE.BufferGeometry();
+    geometry.setAttribute("position", new THREE.BufferAttribute(position, 3));
+    geometry.setIndex(new THREE.BufferAttribute(index, 1));
+    const flat = geometry.toNonIndexed();
+    flat.computeVertexNormals();
+    return new THREE.Mesh(flat, new THREE.MeshLambertMaterial({ color: 0x5b4a3f, side: THREE.DoubleSide }));
+  }
+
+  private faults(vertices: Vec3[], faces: number[][], problem: Problem): THREE.Object3D {
+    const group = new THREE.Group();
+    const red = 0xd62828;
+    const known = (v: number) => v >= 0 && v < vertices.length && vertices[v].every(Number.isFinite);
+    const buffer = (points: Vec3[]) => {
+      const geometry = new THREE.BufferGeometry();
+      geometry.setAttribute("position", new THREE.Float32BufferAttribute(points.flatMap((p) => this.local(p)), 3));
+      return geometry;
+    };
+    const dots = (problem.vertices ?? []).filter(known).map((v) => vertices[v]);
+    const lines = (problem.edges ?? []).filter((e) => e.every(known)).flatMap(([a, b]) => [vertices[a], vertices[b]]);
+    const fills = (problem.faces ?? []).filter((f) => faces[f]?.every(known))
+      .flatMap((f) => faces[f].slice(2).flatMap((_, k) => [vertices[faces[f][0]], vertices[faces[f][k + 1]], vertices[faces[f][k + 2]]]));
+    const over = { color: red, depthTest: false, transparent: true };
+    if (dots.length) group.add(new THREE.Points(buffer(dots), new THREE.PointsMaterial({ ...over, size: 9, sizeAttenuation: false })));
+    if (lines.length) {
+      group.add(new THREE.LineSegments(buffer(lines), new THREE.LineBasicMaterial(over)));
+      group.add(new THREE.Points(buffer(lines), new THREE.PointsMaterial({ ...over, size: 5, sizeAttenuation: false })));
+    }
+    if (fills.length) group.add(new THREE.Mesh(buffer(fills), new THREE.MeshBasicMaterial({ ...over, opacity: 0.75, side: THREE.DoubleSide })));
+    group.renderOrder = 20;
+    return group;
+  }
+
+  toggle(shown: Toggles): void {
+    this.shown = { ...shown };
+    if (this.layer) this.layer.edges.visible = shown.edges;
+    if (this.normals) this.normals.visible = shown.normals;
+    if (this.supports) this.supports.visible = shown.supports;
+    if (this.mesh) this.mesh.visible = shown.mesh || !this.layer;
+    this.invalidate();
+  }
+
+  /** Cuts the model open: axis 0–2, fraction 1 shows all. */
+  cut(axis: number, fraction: number): void {
+    const low = this.box.min.getComponent(axis);
+    const high = this.box.max.getComponent(axis);
+    this.section.normal.set(0, 0, 0).setComponent(axis, -1);
+    this.section.constant = low + fraction * (high - low) * 1.001;
+    this.renderer.clippingPlanes = fraction >= 1 ? [] : [this.section];
+    this.invalidate();
+  }
+
+  paint(colors: Uint8Array): void {
+    this.layer?.paint(colors);
+    this.invalidate();
+  }
+
+  select(i: number | null): void {
+    this.layer?.select(i);
+    this.invalidate();
+  }
+
+  hover(i: number | null): void {
+    this.layer?.hover(i);
+    this.invalidate();
+  }
+
+  pick(x: number, y: number): number | null {
+    const { clientWidth: w, clientHeight: h } = this.element;
+    return this.layer?.pick(this.renderer, this.camera, x, y, w, h) ?? null;
+  }
+
+  /** Boundary vertices that can be given angles; marked: those that have one. */
+  showBoundary(vertices: Vec3[] | null, loops: number[][], marked: Set<number>): void {
+    if (this.boundary) dispose(this.boundary);
+    this.boundary = null;
+    if (vertices) {
+      const list = loops.flat();
+      const geometry = new THREE.BufferGeometry();
+      geometry.setAttribute("position", new THREE.Float32BufferAttribute(list.flatMap((v) => this.local(vertices[v])), 3));
+      geometry.setAttribute("color", new THREE.Float32BufferAttribute(list.flatMap((v) => (marked.has(v) ? [0.84, 0.32, 0.05] : [0.12, 0.44, 0.47])), 3));
+      this.boundary = new THREE.Points(geometry, new THREE.PointsMaterial({ size: 8, sizeAttenuation: false, vertexColors: true, depthTest: false, transparent: true }));
+      this.boundary.renderOrder = 15;
+      this.boundary.userData.list = list;
+      this.content.add(this.boundary);
+    }
+    this.invalidate();
+  }
+
+  /** The boundary vertex within 14 pixels of (x, y), nearest to the eye among them. */
+  pickBoundary(x: number, y: number): number | null {
+    if (!this.boundary) return null;
+    const { clientWidth: w, clientHeight: h } = this.element;
+    const position = this.boundary.geometry.getAttribute("position");
+    let best: { depth: number; distance: number; v: number } | null = null;
+    const p = new THREE.Vector3();
+    (this.boundary.userData.list as number[]).forEach((v, i) => {
+      p.fromBufferAttribute(position as THREE.BufferAttribute, i).project(this.camera);
+      const distance = Math.hypot(((p.x + 1) / 2) * w - x, ((1 - p.y) / 2) * h - y);
+      if (distance < 14 && (!best || distance + 40 * p.z < best.distance + 40 * best.depth)) best = { depth: p.z, distance, v };
+    });
+    return best ? (best as { v: number }).v : null;
+  }
+
+  /** Where a point of the model stands on the screen, in CSS pixels of this view. */
+  project(p: Vec3): { x: number; y: number } {
+    const q = new THREE.Vector3(...this.local(p)).project(this.camera);
+    return { x: ((q.x + 1) / 2) * this.element.clientWidth, y: ((1 - q.y) / 2) * this.element.clientHeight };
+  }
+
+  private placeLabels(): void {
+    const { labelText } = this;
+    if (!labelText || !this.shown.labels) {
+      this.labels.replaceChildren();
+      return;
+    }
+    const { clientWidth: w, clientHeight: h } = this.element;
+    const eye = this.camera.position;
+    const p = new THREE.Vector3();
+    const seen: { x: number; y: number; rank: number; i: number }[] = [];
+    labelText.centers.forEach((c, i) => {
+      const n = labelText.normals[i];
+      if ((eye.x - c[0]) * n[0] + (eye.y - c[1]) * n[1] + (eye.z - c[2]) * n[2] <= 0) return;
+      p.set(...c);
+      if (this.renderer.clippingPlanes.some((plane) => plane.distanceToPoint(p) < 0)) return;
+      p.project(this.camera);
+      if (Math.abs(p.x) > 1 || Math.abs(p.y) > 1) return;
+      seen.push({ x: ((p.x + 1) / 2) * w, y: ((1 - p.y) / 2) * h, rank: p.x * p.x + p.y * p.y, i });
+    });
+    seen.sort((a, b) => a.rank - b.rank);
+    this.labels.replaceChildren(...seen.slice(0, MAX_LABELS).map(({ x, y, i }) => {
+      const span = document.createElement("span");
+      span.textContent = labelText.text[i];
+      span.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px) translate(-50%, -50%)`;
+      return span;
+    }));
+  }
+}
+
+function dispose(object: THREE.Object3D): void {
+  object.traverse((child) => {
+    const drawn = child as THREE.Mesh;
+    drawn.geometry?.dispose();
+    const material = drawn.material as THREE.Material | undefined;
+    material?.dispose?.();
+  });
+  object.removeFromParent();
+}
