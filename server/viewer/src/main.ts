@@ -613,9 +613,9 @@ async function start(): Promise<void> {
 
 declare global {
   interface Window {
-    hexwrapViewer: { space: View3D; state: State };
+    hexwrapViewer: { space: View3D; domain: DomainView; state: State };
   }
 }
 // For those who script the page (and for the tests): where things stand on the screen.
-window.hexwrapViewer = { space, state };
+window.hexwrapViewer = { space, domain, state };
 void start();

@@ -1,0 +1,211 @@
+"""The wire contract as a checker: what a stranger can verify about a Result from the JSON alone.
+
+Nothing here imports the product. Each function returns sentences that say what is violated; none means it holds.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from typing import Any
+
+import numpy as np
+import shapely
+
+Json = dict[str, Any]
+
+
+def _deck(result: Json):
+    deck = result["map"]["deck"]
+    rotation = np.exp(1j * deck["angle"])
+    shift = complex(*deck["translation"])
+    if abs(rotation - 1) < 1e-9:
+        return lambda z, s: z + s * shift
+    apex = shift / (1 - rotation)
+    return lambda z, s: apex + np.exp(1j * deck["angle"] * np.asarray(s)) * (z - apex)
+
+
+def corners(result: Json) -> np.ndarray:
+    """(m, 3) complex places of the corners of every mesh face."""
+    uv = np.array(result["map"]["uv"])
+    uv = uv[:, 0] + 1j * uv[:, 1]
+    return _deck(result)(uv[np.array(result["mesh"]["faces"])], np.array(result["map"]["sheet"]))
+
+
+def check_mesh(result: Json) -> list[str]:
+    """An oriented annulus with the loops as the contract describes them."""
+    bad = []
+    mesh = result["mesh"]
+    faces = np.array(mesh["faces"])
+    n = len(mesh["vertices"])
+    half = Counter((int(a), int(b)) for f in faces for a, b in zip(f, np.roll(f, -1), strict=True))
+    if max(half.values()) > 1:
+        bad.append("an oriented edge occurs twice")
+    edges = {tuple(sorted(e)) for e in half}
+    if n - len(edges) + len(faces) != 0:
+        bad.append(f"Euler characteristic {n - len(edges) + len(faces)}")
+    boundary = {e for e in half if (e[1], e[0]) not in half}
+    listed = {(a, b) for loop in mesh["loops"] for a, b in zip(loop, loop[1:] + loop[:1], strict=True)}
+    if listed != boundary:
+        bad.append("loops are not the boundary with the surface on their left")
+    sent = [mesh["input_vertex"][v] for loop in mesh["loops"] for v in loop]
+    real = [s for s in sent if s >= 0]
+    first = {mesh["input_vertex"][v] for v in mesh["loops"][0]}
+    if real and min(real) not in first:
+        bad.append("loop 0 does not hold the lowest sent vertex of the boundary")
+    return bad
+
+
+def check_map(result: Json) -> list[str]:
+    """Positively oriented faces, edges shared up to one power of g, angle sums, Gauss–Bonnet, edge lengths."""
+    bad = []
+    m = result["map"]
+    vertices = np.array(result["mesh"]["vertices"])
+    faces = np.array(result["mesh"]["faces"])
+    z = corners(result)
+    area = ((z[:, 1] - z[:, 0]).conj() * (z[:, 2] - z[:, 0])).imag / 2
+    if (area <= 0).any():
+        bad.append(f"{int((area <= 0).sum())} faces are not positively oriented")
+    where: dict[tuple[int, int], list[tuple[int, int]]] = defaultdict(list)
+    for f, face in enumerate(faces):
+        for k in range(3):
+            where[tuple(sorted((int(face[k]), int(face[(k + 1) % 3]))))].append((f, k))
+    sheet = np.array(m["sheet"])
+    for (a, b), places in where.items():
+        if len(places) == 2:
+            (f, k), (h, j) = places
+            step = sheet[h][(j + 1) % 3] - sheet[f][k] if faces[h][j] != faces[f][k] else sheet[h][j] - sheet[f][k]
+            other = (j, (j + 1) % 3) if faces[h][j] != faces[f][k] else ((j + 1) % 3, j)
+            step2 = sheet[h][other[0]] - sheet[f][(k + 1) % 3]
+            if step != step2:
+                bad.append(f"faces {f} and {h} disagree on edge {a}–{b} by more than one power of g")
+                break
+    angle = np.angle((np.roll(z, -2, 1) - z) / (np.roll(z, -1, 1) - z))
+    total = np.bincount(faces.ravel(), angle.ravel(), minlength=len(vertices))
+    loops = [np.array(loop) for loop in result["mesh"]["loops"]]
+    inside = np.setdiff1d(np.arange(len(vertices)), np.concatenate(loops))
+    if len(inside) and (worst := np.abs(total[inside] - 2 * np.pi).max()) > 1e-6:
+        bad.append(f"interior angle sums miss 2π by {worst:.2e}")
+    for loop, angles in zip(loops, m["boundary_angles"], strict=True):
+        if (worst := np.abs(total[loop] - np.array(angles)).max()) > 1e-6:
+            bad.append(f"boundary angle sums differ from boundary_angles by {worst:.2e}")
+    kappa = [float(np.sum(np.pi - np.array(a))) for a in m["boundary_angles"]]
+    if abs(kappa[0] + kappa[1]) > 1e-6:
+        bad.append(f"Gauss–Bonnet: loop sums {kappa}")
+    if abs(kappa[0] - m["cone_angle"]) > 1e-6 or abs(m["deck"]["angle"] - m["cone_angle"]) > 1e-9:
+        bad.append(f"K is {m['cone_angle']}, loop 0 sums to {kappa[0]}, deck has {m['deck']['angle']}")
+    if m["flips"] == 0:
+        u = np.array(m["log_scale"])
+        for k in range(3):
+            i, j = faces[:, k], faces[:, (k + 1) % 3]
+            want = np.exp((u[i] + u[j]) / 2) * np.linalg.norm(vertices[i] - vertices[j], axis=1)
+            have = np.abs(z[:, (k + 1) % 3] - z[:, k])
+            if (worst := np.abs(have / want - 1).max()) > 1e-6:
+                bad.append(f"an edge's length differs from e^((u_i+u_j)/2)·l by {worst:.2e}")
+                break
+    # one turn: a loop's edges add up to g
+    boundary = {}
+    for (_, _), places in where.items():
+        if len(places) == 1:
+            f, k = places[0]
+            boundary[int(faces[f][k])] = (int(faces[f][(k + 1) % 3]), int(sheet[f][(k + 1) % 3] - sheet[f][k]))
+    turns = [sum(boundary[int(v)][1] for v in loop) for loop in loops]
+    if sorted(turns) != [-1, 1]:
+        bad.append(f"the loops turn {turns} times, wanted ±1")
+    return bad
+
+
+def check_pattern(result: Json, whole: bool = True) -> list[str]:
+    """A closed mesh of cells, neighbours symmetric, counter-clockwise from outside."""
+    bad = []
+    p = result["pattern"]
+    faces = p["faces"]
+    half: dict[tuple[int, int], tuple[int, int]] = {}
+    for f, face in enumerate(faces):
+        for k, v in enumerate(face):
+            key = (v, face[(k + 1) % len(face)])
+            if key in half:
+                bad.append(f"cells {half[key][0]} and {f} run along the same edge in the same sense")
+                return bad
+            half[key] = (f, k)
+    for (a, b), (f, k) in half.items():
+        other = half.get((b, a), (-1, -1))[0]
+        if p["neighbours"][f][k] != other:
+            bad.append(f"neighbours[{f}][{k}] is {p['neighbours'][f][k]}, the mesh says {other}")
+            break
+    used = {v for face in faces for v in face}
+    edges = {tuple(sorted(e)) for e in half}
+    if used != set(range(len(p["vertices"]))):
+        bad.append("vertices that belong to no cell")
+    if whole and len(used) - len(edges) + len(faces) != 0:
+        bad.append(f"the pattern's Euler characteristic is {len(used) - len(edges) + len(faces)}")
+    sides = {"hex": 6, "triangle": 3, "quad": 4}[p["kind"]]
+    x = np.array(p["vertices"])
+    n = np.array(p["normals"])
+    against = 0
+    for face, is_whole in zip(faces, p["whole"], strict=True):
+        if is_whole and len(face) != sides:
+            bad.append(f"a whole cell has {len(face)} corners")
+            break
+        q = x[face]
+        area = np.cross(q - q[0], np.roll(q, -1, 0) - q[0]).sum(0)
+        against += bool(area @ n[face].sum(0) <= 0)
+    if against:
+        bad.append(f"{against} cells do not run counter-clockwise seen from outside")
+    return bad
+
+
+def check_panels(result: Json, *, regular: bool = True, overlap_free: bool = True) -> list[str]:
+    """Whole hexagons are planar and regular to 1e-9 ℓ, sizes are those listed, neighbours do not overlap."""
+    bad = []
+    p = result["panels"]
+    table = {s["size"]: s["edge_length"] for s in result["sizes"]}
+    for i, polygon in enumerate(p["polygons"]):
+        if not (p["whole"][i] and regular):
+            continue
+        q = np.array(polygon)
+        length = p["edge_length"][i]
+        edge = np.linalg.norm(np.roll(q, -1, 0) - q, axis=1)
+        c = q.mean(0)
+        normal = np.linalg.svd(q - c)[2][2]
+        a, b = np.roll(q, -1, 0) - q, np.roll(q, 1, 0) - q
+        cos = (a * b).sum(1) / (np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1))
+        worst = max(np.abs(edge - length).max(), np.abs((q - c) @ normal).max(), length * np.abs(cos + 0.5).max())
+        if worst > 1e-9 * max(length, 1e-7 * np.abs(q).max() * 1e-3) + 4e-16 * np.abs(q).max() * 8:
+            bad.append(f"panel {p['label'][i]} is off by {worst / length:.2e} ℓ")
+            break
+        if p["size"][i] in table and abs(table[p["size"][i]] - length) > 1e-9 * length:
+            bad.append(f"panel {p['label'][i]} has ℓ = {length}, its class {table[p['size'][i]]}")
+            break
+    counts = Counter(p["size"])
+    for s in result["sizes"]:
+        if counts[s["size"]] != s["count"]:
+            bad.append(f"size {s['size']} lists {s['count']} panels, {counts[s['size']]} have it")
+    if len(set(p["label"])) != len(p["label"]):
+        bad.append("labels repeat")
+    if overlap_free:
+        bad += overlaps(result)
+    return bad
+
+
+def overlaps(result: Json) -> list[str]:
+    """Pairs of neighbours that share more than 1e-9 ℓ² seen along the mean of their normals."""
+    p, pattern = result["panels"], result["pattern"]
+    of = {f: i for i, f in enumerate(p["face"])}
+    pairs = {
+        tuple(sorted((of[f], of[h])))
+        for f, row in enumerate(pattern["neighbours"])
+        for h in row
+        if h >= 0 and f in of and h in of and h != f
+    }
+    count = 0
+    for i, j in pairs:
+        axis = np.array(p["normal"][i]) + np.array(p["normal"][j])
+        axis /= np.linalg.norm(axis)
+        e1 = np.cross(axis, [1.0, 0, 0] if abs(axis[0]) < 0.7 else [0, 1.0, 0])
+        e1 /= np.linalg.norm(e1)
+        e2 = np.cross(axis, e1)
+        origin = np.array(p["center"][i])
+        flat = [shapely.Polygon(np.stack([(np.array(p["polygons"][k]) - origin) @ e for e in (e1, e2)], 1)) for k in (i, j)]
+        if flat[0].intersection(flat[1]).area > 1e-9 * min(p["edge_length"][i], p["edge_length"][j]) ** 2:
+            count += 1
+    return [f"{count} pairs of neighbours overlap"] if count else []

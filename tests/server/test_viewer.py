@@ -1,0 +1,313 @@
+"""The page in a real browser, against a real server process: what a person does, step by step."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import httpx
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+VIEWER = ROOT / "server" / "viewer"
+STATIC = ROOT / "server" / "hexwrap_server" / "static"
+
+
+def _chromium() -> str | None:
+    for name in ("chromium", "chromium-browser", "google-chrome"):
+        if found := shutil.which(name):
+            return found
+    return None
+
+
+try:
+    from playwright.sync_api import Page, sync_playwright
+except ImportError:  # the browser tests are the only ones that need it
+    sync_playwright = None
+
+pytestmark = [
+    pytest.mark.skipif(sync_playwright is None, reason="playwright is not installed (pip install '.[test]')"),
+    pytest.mark.skipif(_chromium() is None, reason="no Chromium on this machine (apt-get install chromium)"),
+    # Playwright's own event loop leaves its sockets to the garbage collector.
+    pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning"),
+]
+
+
+def _free_port() -> int:
+    with socket.socket() as s:
+        s.bind(("127.0.0.1", 0))
+        return int(s.getsockname()[1])
+
+
+class Server:
+    """A ``hexwrap serve`` of its own, which can be stopped and started again."""
+
+    def __init__(self, data: Path) -> None:
+        self.data, self.port = data, _free_port()
+        self.url = f"http://127.0.0.1:{self.port}"
+        self.start()
+
+    def start(self) -> None:
+        env = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT / "solver"), str(ROOT / "server")])}
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "hexwrap_server.cli", "serve", "--port", str(self.port), "--data", str(self.data), "--workers", "1"],
+            env=env,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        for _ in range(300):
+            try:
+                if httpx.get(f"{self.url}/health", timeout=1, trust_env=False).status_code == 200:
+                    return
+            except httpx.TransportError:
+                time.sleep(0.1)
+        raise RuntimeError("the server did not come up")
+
+    def stop(self) -> None:
+        self.process.terminate()
+        self.process.wait(20)
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    server = Server(tmp_path_factory.mktemp("viewer-data"))
+    yield server
+    server.stop()
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[object]:
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(
+            executable_path=_chromium(),
+            args=["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-background-networking"],
+        )
+        yield browser
+        browser.close()
+
+
+@contextmanager
+def opened(browser, server: Server, path: str = "/") -> Iterator[Page]:
+    """A page that must ask nobody else and must not complain, except where the test says so."""
+    page = browser.new_page(viewport={"width": 1280, "height": 720})
+    page.complaints, page.strangers = [], []
+    page.on("console", lambda m: page.complaints.append(m.text) if m.type == "error" else None)
+    page.on("pageerror", lambda e: page.complaints.append(str(e)))
+    page.on("request", lambda r: page.strangers.append(r.url) if not r.url.startswith((server.url, "blob:", "data:")) else None)
+    page.goto(server.url + path)
+    try:
+        yield page
+        assert page.strangers == []
+    finally:
+        page.close()
+
+
+def shown(page: Page, before: str | None = None, timeout: int = 60_000) -> str:
+    """Waits until another result than ``before`` is on the screen; its job."""
+    page.wait_for_function("old => (document.documentElement.dataset.shown || null) !== old", arg=before, timeout=timeout)
+    return page.evaluate("document.documentElement.dataset.shown")
+
+
+def pixel_of_panel(page: Page, i: int) -> tuple[float, float]:
+    box = page.locator("#view3d canvas").bounding_box()
+    at = page.evaluate("i => { const {space, state} = window.hexwrapViewer; return space.project(state.result.panels.center[i]) }", i)
+    return box["x"] + at["x"], box["y"] + at["y"]
+
+
+def facing_panel(page: Page) -> int:
+    """A panel near the middle of the picture that looks at the eye."""
+    return page.evaluate("""() => { const {space, state} = window.hexwrapViewer; const p = state.result.panels;
+        const e = space.camera.position; const w = space.element.clientWidth, h = space.element.clientHeight;
+        let best = 0, least = 1e9;
+        p.center.forEach((c, i) => { const n = p.normal[i]; const s = space.project(c);
+            const t = space.controls.target; const v = [e.x - t.x, e.y - t.y, e.z - t.z];
+            const facing = (v[0]*n[0] + v[1]*n[1] + v[2]*n[2]) / Math.hypot(...v);
+            const d = Math.hypot(s.x - w/2, s.y - h/2); if (facing > 0.6 && d < least) { least = d; best = i; } });
+        return best; }""")
+
+
+def tube(n: int = 24, rows: int = 9) -> str:
+    """A bulged tube as OBJ text, quads, two open ends."""
+    t = np.arange(n) * 2 * np.pi / n
+    lines = []
+    for r in range(rows):
+        radius = 2 + 0.7 * np.sin(np.pi * r / (rows - 1))
+        lines += [f"v {radius * np.cos(a):.9f} {radius * np.sin(a):.9f} {r * 0.6:.9f}" for a in t]
+    for r in range(rows - 1):
+        for i in range(n):
+            a, b = r * n + i, r * n + (i + 1) % n
+            lines.append(f"f {a + 1} {b + 1} {b + n + 1} {a + n + 1}")
+    return "\n".join(lines) + "\n"
+
+
+def test_sample_solves_and_panels_can_be_picked_and_read(browser, server: Server) -> None:
+    with opened(browser, server) as page:
+        page.select_option("#sample", "tower")
+        job = shown(page)
+        result = httpx.get(f"{server.url}/v1/jobs/{job}/result", trust_env=False).json()
+        i = facing_panel(page)
+        page.mouse.click(*pixel_of_panel(page, i))
+        label = page.locator("#card dd").first.inner_text()
+        assert label == result["panels"]["label"][i]
+        assert page.locator("#card svg.outline text").count() == len(result["panels"]["polygons"][i])
+        # the legend counts what the result counts
+        counts = [int(t.removeprefix("× ")) for t in page.locator("#legend td:last-child").all_inner_texts()]
+        assert sum(counts) == len(result["panels"]["polygons"])
+        # each way of colouring has a legend of its own
+        for mode in ("planarity", "gap", "distance", "scale"):
+            page.select_option("#mode", mode)
+            assert page.locator("#legend .ramp").count() == 1, mode
+        # brackets step from panel to panel
+        page.locator("#view3d canvas").focus()
+        page.keyboard.press("]")
+        assert page.locator("#card dd").first.inner_text() == result["panels"]["label"][(i + 1) % len(result["panels"]["label"])]
+        assert page.complaints == []
+
+
+def test_hover_is_linked_between_space_and_domain(browser, server: Server) -> None:
+    with opened(browser, server) as page:
+        page.select_option("#sample", "tower")
+        shown(page)
+        page.mouse.move(*pixel_of_panel(page, facing_panel(page)))
+        page.wait_for_timeout(300)
+        visible = page.evaluate("""() => { const {space, domain} = window.hexwrapViewer;
+            return [space.layer.hoverLine.visible, domain.layer.hoverLine.visible]; }""")
+        assert visible == [True, True]
+
+
+def test_choosing_a_number_of_sizes_on_the_curve_recomputes(browser, server: Server) -> None:
+    with opened(browser, server) as page:
+        page.select_option("#sample", "tower")
+        before = shown(page)
+        page.locator("#curve .spot[data-k='5']").focus()
+        page.keyboard.press("Enter")
+        job = shown(page, before)
+        result = httpx.get(f"{server.url}/v1/jobs/{job}/result?include=sizes", trust_env=False).json()
+        assert len(result["sizes"]) == 5
+        assert page.locator("#histogram rect").count() == 5
+        assert page.complaints == []
+
+
+def test_a_dropped_file_is_solved(browser, server: Server, tmp_path: Path) -> None:
+    path = tmp_path / "tube.obj"
+    path.write_text(tube())
+    with opened(browser, server) as page:
+        page.set_input_files("#file", str(path))
+        job = shown(page)
+        answer = httpx.get(f"{server.url}/v1/jobs/{job}", trust_env=False).json()
+        assert (answer["status"], answer["name"]) == ("done", "tube")
+        assert page.complaints == []
+
+
+def test_faults_are_shown_in_red_where_they_are(browser, server: Server, tmp_path: Path) -> None:
+    path = tmp_path / "pinched.obj"
+    path.write_text(tube() + "v 9 9 9\nf 1 2 217\n")  # a third face on an edge
+    with opened(browser, server) as page:
+        page.set_input_files("#file", str(path))
+        page.wait_for_function("document.documentElement.dataset.shown === 'faults'", timeout=60_000)
+        assert "manifold" in page.locator("#banner").inner_text().lower()
+        red = page.evaluate("""() => { let n = 0; window.hexwrapViewer.space.scene.traverse(o => {
+            if (o.material?.color?.getHex?.() === 0xd62828) n += o.geometry.getAttribute('position').count; }); return n; }""")
+        assert red > 0
+
+
+def test_angles_are_set_by_clicking_and_the_balance_closes(browser, server: Server, tmp_path: Path) -> None:
+    path = tmp_path / "tube.obj"
+    path.write_text(tube(48, 17))
+    with opened(browser, server) as page:
+        page.set_input_files("#file", str(path))
+        before = shown(page)
+        page.select_option("[name=mode]", "angles")
+        before = shown(page, before)  # no corners yet: solved as straight
+        loop = page.evaluate("window.hexwrapViewer.state.result.mesh.loops[0]")
+        page.select_option("#angle-value", label="240°")
+        place = page.locator("#view3d canvas").bounding_box()
+        for v in (loop[0], loop[3]):
+            at = page.evaluate("v => { const {space, state} = window.hexwrapViewer; return space.project(state.result.mesh.vertices[v]) }", v)
+            page.mouse.click(place["x"] + at["x"], place["y"] + at["y"])
+        assert page.locator("#angle-list li").count() == 2
+        assert "-120" in page.locator("#balance").inner_text()
+        page.click("#close-balance")
+        assert "balanced" in page.locator("#balance").inner_text()
+        job = shown(page, before)
+        request = httpx.get(f"{server.url}/v1/jobs/{job}/request", trust_env=False).json()
+        assert [round(180 * a["angle"]) for a in request["boundary"]["angles"]] == [240, 120]
+
+
+def test_cancel_stops_the_job(browser, server: Server, tmp_path: Path) -> None:
+    path = tmp_path / "fine.obj"
+    path.write_text(tube(900, 300))
+    with opened(browser, server) as page:
+        page.set_input_files("#file", str(path))
+        page.wait_for_selector("#cancel:not([hidden])", timeout=60_000)
+        page.click("#cancel")
+        page.wait_for_selector("#cancel", state="hidden")
+        deadline = time.monotonic() + 10
+        while time.monotonic() < deadline:
+            health = httpx.get(f"{server.url}/health", trust_env=False).json()
+            if health["running"] == health["queued"] == 0:
+                break
+            time.sleep(0.2)
+        assert (health["running"], health["queued"]) == (0, 0)
+
+
+def test_the_page_outlives_a_restart_of_the_server(browser, server: Server) -> None:
+    with opened(browser, server) as page:
+        page.select_option("#sample", "tower")
+        before = shown(page)
+        server.stop()
+        page.wait_for_selector("#banner:not([hidden])", timeout=15_000)
+        server.start()
+        page.wait_for_selector("#banner", state="hidden", timeout=15_000)
+        page.fill("[name=sizes]", "4")
+        job = shown(page, before)
+        assert len(httpx.get(f"{server.url}/v1/jobs/{job}/result?include=sizes", trust_env=False).json()["sizes"]) == 4
+
+
+def test_copied_curl_request_is_the_request(browser, server: Server) -> None:
+    with opened(browser, server) as page:
+        page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+        page.select_option("#sample", "tower")
+        shown(page)
+        page.click("#copy-curl")
+        page.wait_for_function("document.getElementById('copied').textContent !== ''")
+        text = page.evaluate("navigator.clipboard.readText()")
+        body = json.loads(text.split(" -d '", 1)[1][:-1].replace("'\\''", "'"))
+        assert text.startswith(f"curl -s {server.url}/v1/solve")
+        assert body["pattern"]["kind"] == "hex"
+
+
+def test_theme_and_keyboard(browser, server: Server) -> None:
+    with opened(browser, server) as page:
+        first = page.evaluate("document.documentElement.dataset.theme")
+        page.click("#theme")
+        assert page.evaluate("document.documentElement.dataset.theme") != first
+        reached = set()
+        for _ in range(60):
+            page.keyboard.press("Tab")
+            reached.add(page.evaluate("document.activeElement.id || document.activeElement.name || document.activeElement.tagName"))
+        assert {"sample", "mode", "kind", "sizes", "solve", "CANVAS", "fit", "cut"} <= reached
+
+
+@pytest.mark.skipif(shutil.which("npm") is None, reason="npm is not installed: the bundle cannot be built again")
+def test_the_bundle_is_what_the_source_builds(tmp_path: Path) -> None:
+    copy = tmp_path / "server" / "viewer"
+    shutil.copytree(VIEWER, copy, ignore=shutil.ignore_patterns("node_modules"))
+    npm = shutil.which("npm")
+    done = subprocess.run([npm, "install", "--silent"], cwd=copy, capture_output=True, text=True, timeout=300)
+    if done.returncode:
+        pytest.skip(f"npm could not install the build's packages: {done.stderr.strip()[-200:]}")
+    subprocess.run([npm, "run", "check"], cwd=copy, check=True, capture_output=True, timeout=300)
+    subprocess.run([npm, "run", "build"], cwd=copy, check=True, capture_output=True, timeout=300)
+    built = tmp_path / "server" / "hexwrap_server" / "static"
+    for name in sorted(p.name for p in STATIC.iterdir()):
+        assert (built / name).read_bytes() == (STATIC / name).read_bytes(), f"{name}: run npm run build in server/viewer"
