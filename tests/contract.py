@@ -1,6 +1,6 @@
 """The wire contract as a checker: what a stranger can verify about a Result from the JSON alone.
 
-Nothing here imports the product. Each function returns sentences that say what is violated; none means it holds.
+Nothing here imports the product. Each function returns sentences that say what is violated; none: it holds.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def check_mesh(result: Json) -> list[str]:
 
 
 def check_map(result: Json) -> list[str]:
-    """Positively oriented faces, edges shared up to one power of g, angle sums, Gauss–Bonnet, edge lengths."""
+    """Positive faces, edges shared up to one power of g, angle sums, Gauss–Bonnet, edge lengths."""
     bad = []
     m = result["map"]
     vertices = np.array(result["mesh"]["vertices"])
@@ -73,7 +73,11 @@ def check_map(result: Json) -> list[str]:
     for (a, b), places in where.items():
         if len(places) == 2:
             (f, k), (h, j) = places
-            step = sheet[h][(j + 1) % 3] - sheet[f][k] if faces[h][j] != faces[f][k] else sheet[h][j] - sheet[f][k]
+            step = (
+                sheet[h][(j + 1) % 3] - sheet[f][k]
+                if faces[h][j] != faces[f][k]
+                else sheet[h][j] - sheet[f][k]
+            )
             other = (j, (j + 1) % 3) if faces[h][j] != faces[f][k] else ((j + 1) % 3, j)
             step2 = sheet[h][other[0]] - sheet[f][(k + 1) % 3]
             if step != step2:
@@ -104,11 +108,14 @@ def check_map(result: Json) -> list[str]:
                 break
     # one turn: a loop's edges add up to g
     boundary = {}
-    for (_, _), places in where.items():
+    for places in where.values():
         if len(places) == 1:
             f, k = places[0]
-            boundary[int(faces[f][k])] = (int(faces[f][(k + 1) % 3]), int(sheet[f][(k + 1) % 3] - sheet[f][k]))
-    turns = [sum(boundary[int(v)][1] for v in loop) for loop in loops]
+            boundary[int(faces[f][k])] = (
+                int(faces[f][(k + 1) % 3]),
+                int(sheet[f][(k + 1) % 3] - sheet[f][k]),
+            )
+    turns = [sum(boundary[int(v)] for v in loop) for loop in loops]
     if sorted(turns) != [-1, 1]:
         bad.append(f"the loops turn {turns} times, wanted ±1")
     return bad
@@ -169,7 +176,9 @@ def check_panels(result: Json, *, regular: bool = True, overlap_free: bool = Tru
         normal = np.linalg.svd(q - c)[2][2]
         a, b = np.roll(q, -1, 0) - q, np.roll(q, 1, 0) - q
         cos = (a * b).sum(1) / (np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1))
-        worst = max(np.abs(edge - length).max(), np.abs((q - c) @ normal).max(), length * np.abs(cos + 0.5).max())
+        worst = max(
+            np.abs(edge - length).max(), np.abs((q - c) @ normal).max(), length * np.abs(cos + 0.5).max()
+        )
         if worst > 1e-9 * max(length, 1e-7 * np.abs(q).max() * 1e-3) + 4e-16 * np.abs(q).max() * 8:
             bad.append(f"panel {p['label'][i]} is off by {worst / length:.2e} ℓ")
             break
@@ -205,7 +214,10 @@ def overlaps(result: Json) -> list[str]:
         e1 /= np.linalg.norm(e1)
         e2 = np.cross(axis, e1)
         origin = np.array(p["center"][i])
-        flat = [shapely.Polygon(np.stack([(np.array(p["polygons"][k]) - origin) @ e for e in (e1, e2)], 1)) for k in (i, j)]
+        flat = [
+            shapely.Polygon(np.stack([(np.array(p["polygons"][k]) - origin) @ e for e in (e1, e2)], 1))
+            for k in (i, j)
+        ]
         if flat[0].intersection(flat[1]).area > 1e-9 * min(p["edge_length"][i], p["edge_length"][j]) ** 2:
             count += 1
     return [f"{count} pairs of neighbours overlap"] if count else []

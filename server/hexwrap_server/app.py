@@ -27,6 +27,7 @@ from hexwrap_server.routes import JobFailedError, router
 from hexwrap_server.security import Doorkeeper
 from hexwrap_server.service import Service
 from hexwrap_server.settings import Settings
+from hexwrap_server.viewer import add_viewer
 from hexwrap_server.worker import InternalError
 from hexwrap_solver.errors import HexwrapError
 
@@ -64,6 +65,7 @@ def create_app(settings: Settings | None = None, engine: Engine | None = None) -
     )
     app.state.service = service
     app.include_router(router)
+    add_viewer(app)
     app.add_exception_handler(HexwrapError, _on_error)
     app.add_exception_handler(HTTPException, _on_http_exception)
     app.add_exception_handler(RequestValidationError, _on_parameters)

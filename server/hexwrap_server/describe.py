@@ -143,3 +143,7 @@ FLATTEN = _route(
 FILES = _route(
     _answers({"application/octet-stream": {"schema": {"type": "string"}}}, 200, 404, 409, 410, 500, 503)
 )
+SAMPLES = _route(_answers(_json(_object(("samples",), samples=_list(_object(("name",)))))))
+SAMPLE = _route(_answers(_json(_object(("surface",))), 200, 404))
+REQUEST = _route(_answers(_json(_object(("surface", "boundary", "pattern", "panels"))), 200, 404))
+PREVIEW = _route(_answers(_json(_object(("vertices", "faces"))), 200, *_BODY_FAULTS, 500, 503), _FILE)

@@ -20,7 +20,7 @@ export interface Job {
   status: "queued" | "running" | "done" | "failed" | "cancelled";
   stage: string | null;
   progress: number;
-  created: string | number;
+  created: string;
   timings: Record<string, number>;
   problem: Problem | null;
 }
@@ -37,7 +37,13 @@ export interface Request {
   boundary?: Record<string, unknown>;
   pattern?: Record<string, unknown> | null;
   panels?: Record<string, unknown> | null;
-  support?: unknown;
+  support?: boolean;
+}
+
+export interface TradeOff {
+  sizes: number[];
+  uncovered: number[];
+  worst_gap: number[];
 }
 
 export interface Result {
@@ -79,14 +85,13 @@ export interface Result {
     center: Vec3[];
     normal: Vec3[];
     whole: boolean[];
-    planarity?: (number | null)[];
-    surface_distance?: (number | null)[];
-    gap?: (number | null)[];
+    planarity?: (number | null)[] | null;
+    surface_distance?: (number | null)[] | null;
+    gap_tangential?: (number | null)[] | null;
   } | null;
   sizes?: { size: number; edge_length: number; count: number; color: string }[] | null;
-  trade_off?: { sizes: number[]; uncovered: number[]; worst_gap: number[] } | null;
   support?: { nodes: Vec3[]; axes: Vec3[]; edges: [number, number][]; strips: Vec3[][] } | null;
-  quality: Record<string, any>;
+  quality: Record<string, any> & { trade_off?: TradeOff | null };
   timings?: Record<string, number>;
 }
 
@@ -131,7 +136,7 @@ export const api = {
   cancel: (id: string) => call(`/v1/jobs/${id}`, { method: "DELETE" }),
   result: (id: string) => json<Result>(`/v1/jobs/${id}/result`),
   request: (id: string) => json<Request>(`/v1/jobs/${id}/request`),
-  samples: () => json<{ samples: { name: string; title: string }[] }>("/v1/samples").then((answer) => answer.samples),
+  samples: () => json<{ samples: { name: string }[] }>("/v1/samples").then((answer) => answer.samples),
   sample: (name: string) => json<Request>(`/v1/samples/${name}`),
   /** The file's mesh as it stands, unchecked: to have something to point at when it is refused. */
   preview: (file: File) => json<{ vertices: Vec3[]; faces: number[][] }>("/v1/surfaces/preview", upload(file)),

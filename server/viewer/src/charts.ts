@@ -1,5 +1,5 @@
 // Two small charts: how many panels of each size, and what each number of sizes would leave uncovered.
-import type { Result } from "./api";
+import type { Result, TradeOff } from "./api";
 import { number } from "./colors";
 
 const NS = "http://www.w3.org/2000/svg";
@@ -36,7 +36,7 @@ export function histogram(sizes: NonNullable<Result["sizes"]>): SVGElement {
   return root;
 }
 
-export function tradeOff(curve: NonNullable<Result["trade_off"]>, current: number | null, choose: (k: number) => void): SVGElement {
+export function tradeOff(curve: TradeOff, current: number | null, choose: (k: number) => void): SVGElement {
   const root = svg("svg", { viewBox: `0 0 ${W} ${H}`, class: "curve", "aria-label": "Uncovered area for each number of sizes" });
   const n = curve.sizes.length;
   const top = Math.max(...curve.uncovered, 1e-9);

@@ -41,7 +41,7 @@ export const MODES: { mode: Mode; label: string; unit: "relative" | "length" | "
 /** One number per panel, NaN where it has none. */
 export function measure(result: Result, mode: Mode): Float64Array {
   const panels = result.panels!;
-  const per = (list: (number | null)[] | undefined) =>
+  const per = (list: (number | null)[] | null | undefined) =>
     Float64Array.from({ length: panels.face.length }, (_, i) => list?.[i] ?? NaN);
   switch (mode) {
     case "size":
@@ -49,7 +49,7 @@ export function measure(result: Result, mode: Mode): Float64Array {
     case "planarity":
       return per(panels.planarity);
     case "gap":
-      return per(panels.gap);
+      return per(panels.gap_tangential);
     case "distance":
       return per(panels.surface_distance);
     case "scale":

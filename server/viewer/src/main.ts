@@ -52,7 +52,10 @@ function currentRequest(): Request {
   if (value("measure") === "around") request.pattern.around = Number(value("around"));
   else if (Number(value("edge_length")) > 0) request.pattern.edge_length = Number(value("edge_length"));
   request.panels = { sizes: Number(value("sizes")), target: value("target"), joint: Number(value("joint")) || 0 };
-  if ((field("support") as HTMLInputElement).checked) request.panels.components = { depth: supportDepth() };
+  if ((field("support") as HTMLInputElement).checked) {
+    request.support = true;
+    request.panels.components = { depth: supportDepth() };
+  }
   return request;
 }
 
@@ -83,6 +86,7 @@ function adopt(request: Request): void {
   set("sizes", panels?.sizes);
   set("target", panels?.target);
   set("joint", panels?.joint);
+  (field("support") as HTMLInputElement).checked = Boolean(request.support);
   drawForm();
 }
 
@@ -376,7 +380,7 @@ function drawCharts(): void {
   const { result } = state;
   $("histogram").replaceChildren(...(result?.sizes?.length ? [histogram(result.sizes)] : []));
   const sizes = result?.sizes?.length ?? null;
-  $("curve").replaceChildren(...(result?.trade_off ? [tradeOff(result.trade_off, sizes, chooseSizes)] : []));
+  $("curve").replaceChildren(...(result?.quality.trade_off ? [tradeOff(result.quality.trade_off, sizes, chooseSizes)] : []));
 }
 
 function chooseSizes(k: number): void {
@@ -409,7 +413,7 @@ function drawCard(): void {
   if (!panels || selected === null) return void card.append(element("p", { class: "note" }, "Click a panel."));
   const facts: [string, string][] = [
     ["Label", panels.label[selected]], ["Size", panels.size[selected] < 0 ? "cut to fit" : String(panels.size[selected] + 1)],
-    ["Edge", number(panels.edge_length[selected], 6)], ["Gap", number(panels.gap?.[selected], 3)],
+    ["Edge", number(panels.edge_length[selected], 6)], ["Gap", number(panels.gap_tangential?.[selected], 3)],
     ["Planarity", number(panels.planarity?.[selected], 2)], ["Distance", number(panels.surface_distance?.[selected], 3)],
   ];
   const list = element("dl", {}, ...facts.flatMap(([name, value]) => [element("dt", {}, name), element("dd", {}, value)]));
@@ -603,7 +607,7 @@ async function start(): Promise<void> {
   theme(storedTheme());
   drawForm();
   const names = await api.samples().catch(() => []);
-  $("sample").append(...names.map(({ name, title }) => element("option", { value: name, title }, name)));
+  $("sample").append(...names.map(({ name }) => element("option", { value: name }, name)));
   await drawJobs();
   setInterval(() => document.visibilityState === "visible" && void drawJobs(), 2000);
   const wanted = /^#job\/([\w-]+)$/.exec(location.hash);

@@ -100,6 +100,12 @@ void main() {
   #include <clipping_planes_fragment>
   gl_FragColor = vec4(vId, 1.0); }`;
 
+/** 8-bit sRGB → 16-bit linear light, in which the graphics card reckons. */
+const LINEAR = Uint16Array.from({ length: 256 }, (_, i) => {
+  const x = i / 255;
+  return Math.round(65535 * (x <= 0.04045 ? x / 12.92 : ((x + 0.055) / 1.055) ** 2.4));
+});
+
 export class PolygonLayer {
   readonly group = new THREE.Group();
   readonly fills: THREE.Mesh;
@@ -109,8 +115,8 @@ export class PolygonLayer {
   private readonly firstTriangle: Uint32Array;
   private readonly picker: THREE.Mesh;
   private readonly pickScene = new THREE.Scene();
-  private readonly outline: THREE.LineLoop;
-  private readonly hoverLine: THREE.LineLoop;
+  private readonly chosen = new Mark(0xff6a13, 0.75);
+  readonly pointed = new Mark(0xffb347, 0.45);
 
   constructor(readonly data: PolygonData, lit: boolean) {
     this.count = data.offsets.length - 1;
@@ -125,9 +131,7 @@ export class PolygonLayer {
       vertexShader: PICK_VERTEX, fragmentShader: PICK_FRAGMENT, side: THREE.DoubleSide, clipping: true,
     }));
     this.pickScene.add(this.picker);
-    this.outline = loop(0xff7a1a);
-    this.hoverLine = loop(0xffc24d);
-    this.group.add(this.fills, this.edges, this.outline, this.hoverLine);
+    this.group.add(this.fills, this.edges, this.chosen.group, this.pointed.group);
   }
 
   private fillGeometry(corners: Uint32Array): THREE.BufferGeometry {
@@ -149,7 +153,7 @@ export class PolygonLayer {
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute("position", new THREE.BufferAttribute(position, 3));
     geometry.setAttribute("normal", new THREE.BufferAttribute(normal, 3));
-    geometry.setAttribute("color", new THREE.BufferAttribute(new Uint8Array(3 * corners.length).fill(200), 3, true));
+    geometry.setAttribute("color", new THREE.BufferAttribute(new Uint16Array(3 * corners.length).fill(40000), 3, true));
     geometry.setAttribute("id", new THREE.BufferAttribute(id, 3, true));
     return geometry;
   }
@@ -172,34 +176,30 @@ export class PolygonLayer {
   /** colors: r g b (0–255) per polygon. */
   paint(colors: Uint8Array): void {
     const attribute = this.fills.geometry.getAttribute("color") as THREE.BufferAttribute;
-    const array = attribute.array as Uint8Array;
+    const array = attribute.array as Uint16Array;
     for (let t = 0; t < this.owner.length; t++) {
       const i = 3 * this.owner[t];
       for (let c = 0; c < 3; c++) {
         const k = 9 * t + 3 * c;
-        array[k] = colors[i];
-        array[k + 1] = colors[i + 1];
-        array[k + 2] = colors[i + 2];
+        array[k] = LINEAR[colors[i]];
+        array[k + 1] = LINEAR[colors[i + 1]];
+        array[k + 2] = LINEAR[colors[i + 2]];
       }
     }
     attribute.needsUpdate = true;
   }
 
   select(i: number | null): void {
-    this.trace(this.outline, i);
+    this.chosen.show(this.corners(i));
   }
 
   hover(i: number | null): void {
-    this.trace(this.hoverLine, i);
+    this.pointed.show(this.corners(i));
   }
 
-  private trace(line: THREE.LineLoop, i: number | null): void {
-    line.visible = i !== null && i < this.count;
-    if (!line.visible || i === null) return;
+  private corners(i: number | null): Float32Array | null {
     const { points, offsets } = this.data;
-    line.geometry.dispose();
-    line.geometry = new THREE.BufferGeometry();
-    line.geometry.setAttribute("position", new THREE.BufferAttribute(points.slice(3 * offsets[i], 3 * offsets[i + 1]), 3));
+    return i === null || i >= this.count ? null : points.slice(3 * offsets[i], 3 * offsets[i + 1]);
   }
 
   /** The polygon drawn at pixel (x, y) of a canvas of w × h, or null: the scene once more, ids for colours, one pixel. */
@@ -227,10 +227,12 @@ export class PolygonLayer {
   }
 
   dispose(): void {
-    for (const object of [this.fills, this.edges, this.outline, this.hoverLine, this.picker]) {
+    for (const object of [this.fills, this.edges, this.picker]) {
       object.geometry.dispose();
       (object.material as THREE.Material).dispose();
     }
+    this.chosen.show(null);
+    this.pointed.show(null);
     this.group.removeFromParent();
   }
 }
@@ -243,10 +245,33 @@ function fillMaterial(lit: boolean): THREE.Material {
   return lit ? new THREE.MeshLambertMaterial(common) : new THREE.MeshBasicMaterial(common);
 }
 
-function loop(color: number): THREE.LineLoop {
-  const line = new THREE.LineLoop(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({ color, depthTest: false }));
-  line.renderOrder = 10;
-  line.visible = false;
-  line.frustumCulled = false;
-  return line;
+/** One polygon made to stand out: filled and outlined, in front of everything. */
+class Mark {
+  readonly group = new THREE.Group();
+  private readonly fill: THREE.Mesh;
+  private readonly line: THREE.LineLoop;
+
+  constructor(color: number, opacity: number) {
+    const over = { color, depthTest: false, transparent: true, side: THREE.DoubleSide };
+    this.fill = new THREE.Mesh(new THREE.BufferGeometry(), new THREE.MeshBasicMaterial({ ...over, opacity }));
+    this.line = new THREE.LineLoop(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({ color: 0x5a2500, depthTest: false }));
+    this.group.add(this.fill, this.line);
+    this.group.visible = false;
+    for (const object of [this.fill, this.line]) {
+      object.renderOrder = 10;
+      object.frustumCulled = false;
+    }
+  }
+
+  show(corners: Float32Array | null): void {
+    this.group.visible = corners !== null;
+    this.fill.geometry.dispose();
+    this.line.geometry.dispose();
+    if (!corners) return;
+    const position = new THREE.BufferAttribute(corners, 3);
+    const data = { points: corners, offsets: Uint32Array.from([0, corners.length / 3]) };
+    this.fill.geometry = new THREE.BufferGeometry().setAttribute("position", position);
+    this.fill.geometry.setIndex(new THREE.BufferAttribute(triangulate(data).corners, 1));
+    this.line.geometry = new THREE.BufferGeometry().setAttribute("position", position);
+  }
 }

@@ -20,7 +20,7 @@ export class View3D {
   readonly controls: OrbitControls;
   private readonly scene = new THREE.Scene();
   private readonly content = new THREE.Group();
-  private readonly headlight = new THREE.DirectionalLight(0xffffff, 1.6);
+  private readonly headlight = new THREE.DirectionalLight(0xffffff, 1.5);
   private readonly section = new THREE.Plane(new THREE.Vector3(0, 0, -1), Infinity);
   private readonly labels: HTMLElement;
   private layer: PolygonLayer | null = null;
@@ -51,7 +51,7 @@ export class View3D {
     this.controls.dampingFactor = 0.12;
     this.controls.zoomToCursor = true;
     this.controls.addEventListener("change", () => this.invalidate());
-    this.scene.add(new THREE.HemisphereLight(0xffffff, 0x8a8f94, 1.7), this.content, this.camera);
+    this.scene.add(new THREE.HemisphereLight(0xffffff, 0x9aa0a4, 2.1), this.content, this.camera);
     this.headlight.position.set(0.5, 0.8, 1);
     this.camera.add(this.headlight);
     new ResizeObserver(() => this.resize()).observe(element);
@@ -107,7 +107,7 @@ export class View3D {
   fit(): void {
     const sphere = this.box.getBoundingSphere(new THREE.Sphere());
     const half = THREE.MathUtils.degToRad(this.camera.fov / 2);
-    const distance = (1.02 * sphere.radius) / Math.sin(Math.min(half, Math.atan(Math.tan(half) * this.camera.aspect)));
+    const distance = (0.93 * sphere.radius) / Math.sin(Math.min(half, Math.atan(Math.tan(half) * this.camera.aspect)));
     const direction = this.camera.position.clone().sub(this.controls.target);
     if (direction.lengthSq() < 1e-12 || !Number.isFinite(direction.x)) direction.set(1, -1.6, 0.7);
     this.controls.target.copy(sphere.center);
@@ -337,13 +337,34 @@ export class View3D {
       seen.push({ x: ((p.x + 1) / 2) * w, y: ((1 - p.y) / 2) * h, rank: p.x * p.x + p.y * p.y, i });
     });
     seen.sort((a, b) => a.rank - b.rank);
-    this.labels.replaceChildren(...seen.slice(0, MAX_LABELS).map(({ x, y, i }) => {
+    this.labels.replaceChildren(...withRoom(seen).map(({ x, y, i }) => {
       const span = document.createElement("span");
       span.textContent = labelText.text[i];
       span.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px) translate(-50%, -50%)`;
       return span;
     }));
   }
+}
+
+/** Those that do not cover an earlier one, at most MAX_LABELS: a grid of label-sized boxes tells which are near. */
+function withRoom<T extends { x: number; y: number }>(places: T[]): T[] {
+  const [width, height] = [58, 16];
+  const taken = new Map<string, T>();
+  const kept: T[] = [];
+  for (const place of places) {
+    if (kept.length >= MAX_LABELS) break;
+    const [column, row] = [Math.floor(place.x / width), Math.floor(place.y / height)];
+    let free = true;
+    for (let i = -1; i <= 1 && free; i++)
+      for (let j = -1; j <= 1 && free; j++) {
+        const other = taken.get(`${column + i},${row + j}`);
+        free = !other || Math.abs(other.x - place.x) >= width || Math.abs(other.y - place.y) >= height;
+      }
+    if (!free) continue;
+    taken.set(`${column},${row}`, place);
+    kept.push(place);
+  }
+  return kept;
 }
 
 function dispose(object: THREE.Object3D): void {
