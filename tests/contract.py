@@ -111,10 +111,7 @@ def check_map(result: Json) -> list[str]:
     for places in where.values():
         if len(places) == 1:
             f, k = places[0]
-            boundary[int(faces[f][k])] = (
-                int(faces[f][(k + 1) % 3]),
-                int(sheet[f][(k + 1) % 3] - sheet[f][k]),
-            )
+            boundary[int(faces[f][k])] = int(sheet[f][(k + 1) % 3] - sheet[f][k])
     turns = [sum(boundary[int(v)] for v in loop) for loop in loops]
     if sorted(turns) != [-1, 1]:
         bad.append(f"the loops turn {turns} times, wanted ±1")

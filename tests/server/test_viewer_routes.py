@@ -1,0 +1,81 @@
+"""What the page asks besides the contract's routes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+from hexwrap_server import samples
+from tests.server.bodies import request, tube
+from tests.server.live import Live, finished, running
+
+
+@pytest.fixture(scope="module")
+def live(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Live]:
+    with running(tmp_path_factory.mktemp("page"), workers=1) as client:
+        yield client
+
+
+def test_the_page_loads_only_what_the_server_serves(live: Live) -> None:
+    page = live.get("/")
+    assert page.status_code == 200
+    assert "default-src 'self'" in page.headers["content-security-policy"]
+    for name in ("app.js", "app.css", "icon.svg"):
+        assert f"/static/{name}" in page.text
+        assert live.get(f"/static/{name}").status_code == 200
+
+
+def test_samples_are_listed_and_complete(live: Live) -> None:
+    listed = [entry["name"] for entry in live.get("/v1/samples").json()["samples"]]
+    assert listed == samples.names()
+    assert live.get("/v1/samples/tower").json() == samples.load("tower")
+
+
+def test_an_unknown_sample_is_a_problem_that_names_those_there_are(live: Live) -> None:
+    answer = live.get("/v1/samples/castle")
+    assert (answer.status_code, answer.headers["content-type"]) == (404, "application/problem+json")
+    assert "tower" in answer.json()["detail"]
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"pattern": None},
+        {"panels": None},
+        {"boundary": {"mode": "isometric", "spread": "optimal"}},
+        {
+            "boundary": {
+                "mode": "angles",
+                "angle_unit": "deg",
+                "angles": [{"vertex": 0, "angle": 240}, {"point": [-3.9, 0, 0], "angle": 120}],
+            }
+        },
+        {"panels": {"sizes": 3, "components": {"depth": 0.1}, "weights": {"surface": 0.5}}, "support": True},
+    ],
+)
+def test_a_recalled_request_leads_to_the_same_work(live: Live, changes: dict[str, object]) -> None:
+    first = live.post("/v1/jobs", json=request(**changes)).json()
+    finished(live, first["id"])
+    recalled = live.get(f"/v1/jobs/{first['id']}/request").json()
+    again = live.post("/v1/jobs", json=recalled).json()
+    assert len({live.service.manager.get(job["id"]).identity for job in (first, again)}) == 1
+
+
+def test_a_preview_shows_a_file_as_it_stands_even_one_that_would_be_refused(live: Live) -> None:
+    mesh = tube(6, 5)
+    del mesh["faces"][8]
+    text = "".join(f"v {x} {y} {z}\n" for x, y, z in mesh["vertices"])
+    text += "".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in mesh["faces"])
+    files = {"file": ("hole.obj", text)}
+    assert live.post("/v1/surfaces", files=files).status_code == 422
+    shown = live.post("/v1/surfaces/preview", files=files).json()
+    assert shown["vertices"] == mesh["vertices"]
+    assert shown["faces"] == mesh["faces"]
+
+
+def test_a_preview_of_nonsense_is_a_problem(live: Live) -> None:
+    answer = live.post("/v1/surfaces/preview", files={"file": ("x.obj", b"\x00\x01garbage")})
+    assert answer.status_code == 422
+    assert answer.json()["type"] == "/problems/unreadable-file"
