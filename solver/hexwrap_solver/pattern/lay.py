@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
@@ -20,8 +22,14 @@ from hexwrap_solver.pattern.nodes import Layout, find_nodes
 from hexwrap_solver.pattern.place import place_lattice
 from hexwrap_solver.pattern.placement import Placement, anchor_vertex
 from hexwrap_solver.pattern.rings import places, rows_from, turns_around, winding
+from hexwrap_solver.pattern.rotation import with_rotation
+from hexwrap_solver.pattern.size import ASKED
+from hexwrap_solver.surface.projection import project, start_parameters
 from hexwrap_solver.pattern.trim import Points, Trimmed, trim
 from hexwrap_solver.pattern.types import Pattern, PatternSettings
+
+#: Relative error of an edge length asked for that calls for a second attempt.
+CLOSE = 0.005
 
 #: Rounding of the layout, relative to its extent; points this near to an edge count as on it.
 REACH = 1e-11
@@ -34,6 +42,23 @@ def lay_pattern(cmap: ConformalMap, settings: PatternSettings, progress: Progres
     cells are too many (``settings.max_cells``) or too large to close up around the surface.
     """
     lattice = LATTICES[settings.kind]
+    settings, notes = with_rotation(cmap, lattice, settings)
+    pattern = _lay(cmap, lattice, settings, progress)
+    wanted = settings.edge_length
+    if wanted is not None and abs(pattern.edge_length / wanted - 1) > CLOSE:
+        corrected = replace(settings, edge_length=wanted**2 / pattern.edge_length)
+        again = _lay(cmap, lattice, corrected, no_progress)
+        if abs(again.edge_length / wanted - 1) < abs(pattern.edge_length / wanted - 1):
+            pattern = again
+        if abs(pattern.edge_length / wanted - 1) > ASKED:
+            notes.append(
+                f"The mean edge length is {pattern.edge_length:.6g} instead of {wanted:.6g}: the nearest at "
+                "which the pattern closes up."
+            )
+    return replace(pattern, notes=(*notes, *pattern.notes))
+
+
+def _lay(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings, progress: Progress) -> Pattern:
     placement = place_lattice(cmap, lattice, settings)
     progress(0.1, "placing the lattice")
     layout = layout_of(cmap, lattice, placement)
@@ -86,7 +111,7 @@ def _finish(
     weights = barycentric(layout.corners[triangle], place)
     uv = (weights * cmap.corners()[triangle]).sum(axis=1)
     on_surface = surface_weights(cmap, triangle, weights)
-    vertices, normals = points_at(cmap, triangle, on_surface)
+    vertices, normals = _on_input_surface(cmap, triangle, on_surface)
     faces, neighbours = Ragged(corner, cells.corner.offsets), cells.neighbours()
     first = _at_first_loop(cmap, faces, neighbours, cells.turns)
     ring = rows_from(neighbours, first)
@@ -129,6 +154,17 @@ def _told(cut: Trimmed, apart: int) -> list[str]:
     if apart:
         notes.append(f"{apart} cells hung on the pattern by no edge and were left out.")
     return notes
+
+
+def _on_input_surface(cmap: ConformalMap, triangle: Ints, weights: Floats) -> tuple[Floats, Floats]:
+    """Points and normals on the mesh, or on the NURBS surface where the mesh was made from one."""
+    points, normals = points_at(cmap, triangle, weights)
+    surface = cmap.surface
+    if surface.nurbs is None:
+        return points, normals
+    start = start_parameters(surface, triangle, weights)
+    points, _, exact = project(surface.nurbs, points, start)
+    return points, exact * np.sign((exact * normals).sum(axis=1, keepdims=True))
 
 
 def mean_edge(vertices: Floats, faces: Ragged) -> float:

@@ -56,4 +56,4 @@ def size_spread(settings: PatternSettings) -> float:
     """Relative freedom of the size: half a cell of a number around, 2 % of a length, else 10 %."""
     if settings.around is not None:
         return 0.5 / settings.around
-    return FREE if settings.edge_length is None else ASKED
+    return FREE if settings.edge_length is None else 0.75 * ASKED

@@ -8,7 +8,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hexwrap_solver.domain import flatten, lift
-from hexwrap_solver.domain.flatten import nearest_on_mesh
 from tests.solver.pattern import annuli
 
 CATENOID = annuli.revolution(np.cosh, np.linspace(-1, 1.5, 25), 40, cut=9, turn=1.7 * np.exp(0.4j))
@@ -59,24 +58,3 @@ def test_places_outside_are_told():
     assert up.inside.tolist() == [False] * len(beyond) + [True] * 3 + [False]
     assert np.isnan(up.points[~up.inside]).all()
     assert np.isfinite(up.points[up.inside]).all()
-
-
-def test_nearest_point_agrees_with_brute_force_on_an_uneven_mesh():
-    rng = np.random.default_rng(1)
-    cmap = annuli.revolution(lambda z: 0.05 + z**4, np.array([0, 0.01, 0.03, 0.3, 1, 1.01, 1.4]), 9)
-    vertices, faces = cmap.surface.vertices, cmap.surface.faces
-    points = rng.uniform(-3, 3, (300, 3))
-    face, weights, distance = nearest_on_mesh(vertices, faces, points)
-    np.testing.assert_allclose(weights.sum(axis=1), 1)
-    assert (weights >= -1e-12).all()
-    grid = np.array([(a, b, 20 - a - b) for a in range(21) for b in range(21 - a)]) / 20
-    samples = np.einsum("gc,fcd->gfd", grid, vertices[faces]).reshape(-1, 3)
-    brute = np.linalg.norm(points[:, None] - samples[None], axis=2).min(axis=1)
-    assert (distance <= brute + 1e-12).all()
-    assert (brute - distance).max() < 0.2
-    found = np.einsum("kc,kcd->kd", weights, vertices[faces[face]])
-    np.testing.assert_allclose(np.linalg.norm(found - points, axis=1), distance, atol=1e-12)
-    # Offsets along the normal from the middle of a face come back to where they started.
-    middle = vertices[faces].mean(axis=1)
-    _, _, near = nearest_on_mesh(vertices, faces, middle)
-    assert near.max() < 1e-12
