@@ -24,9 +24,9 @@ from hexwrap_solver.pattern.placement import Placement, anchor_vertex
 from hexwrap_solver.pattern.rings import places, rows_from, turns_around, winding
 from hexwrap_solver.pattern.rotation import with_rotation
 from hexwrap_solver.pattern.size import ASKED
-from hexwrap_solver.surface.projection import project, start_parameters
 from hexwrap_solver.pattern.trim import Points, Trimmed, trim
 from hexwrap_solver.pattern.types import Pattern, PatternSettings
+from hexwrap_solver.surface.projection import project, start_parameters
 
 #: Relative error of an edge length asked for that calls for a second attempt.
 CLOSE = 0.005

@@ -38,8 +38,8 @@ def with_rotation(
     mean = complex((area * along**lattice.order)[known].sum() / area[known].sum())
     if abs(mean) < AGREEMENT:
         raise PatternError(
-            f"The {settings.rotation} direction of the surface turns too much in the domain to be followed by "
-            f"the pattern (agreement {abs(mean):.2f} of 1): give rotation as edge, vertex or degrees.",
+            f"The {settings.rotation} direction of the surface turns too much in the domain to be followed "
+            f"by the pattern (agreement {abs(mean):.2f} of 1): give rotation as edge, vertex or degrees.",
             field=("pattern", "rotation"),
         )
     followed = np.exp(1j * np.angle(mean) / lattice.order)
@@ -62,10 +62,11 @@ def parameter_directions(cmap: ConformalMap, direction: int) -> Complexes:
     surface = cmap.surface
     if surface.nurbs is None or surface.parameters is None:
         raise PatternError(
-            "Only a NURBS surface has u and v directions to follow: give rotation as edge, vertex or degrees.",
+            "Only a NURBS surface has u and v directions to follow: give rotation as edge, vertex or "
+            "degrees.",
             field=("pattern", "rotation"),
         )
-    parameters = parameter_corners(surface)
+    parameters = parameter_corners(surface, np.arange(len(surface.faces)))
     other, own = parameters[..., 1 - direction], parameters[..., direction]
     z = cmap.corners()
     opposite = np.roll(z, -2, axis=1) - np.roll(z, -1, axis=1)

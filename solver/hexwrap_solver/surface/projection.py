@@ -46,11 +46,18 @@ def start_parameters(surface: Surface, triangle: Ints, barycentric: Floats) -> F
 
     triangle: (k,) faces. barycentric: (k, 3). Corners beyond the seam are taken a period further.
     """
+    if surface.nurbs is None:
+        raise ValueError("the surface was not made from a NURBS surface")
+    corners = parameter_corners(surface, triangle)
+    return wrap(surface.nurbs, np.einsum("kc,kcd->kd", barycentric, corners))
+
+
+def parameter_corners(surface: Surface, triangle: Ints) -> Floats:
+    """(k, 3, 2) parameters at the corners of faces, on one side of the seam."""
     if surface.nurbs is None or surface.parameters is None:
         raise ValueError("the surface was not made from a NURBS surface")
     corners = surface.parameters[surface.faces[triangle]]
-    corners = corners[:, :1] + _shortest(surface.nurbs, corners - corners[:, :1])
-    return wrap(surface.nurbs, np.einsum("kc,kcd->kd", barycentric, corners))
+    return np.asarray(corners[:, :1] + _shortest(surface.nurbs, corners - corners[:, :1]))
 
 
 def chord_heights(nurbs: NurbsSurface, parameters: Floats, points: Floats, faces: Ints) -> Floats:
