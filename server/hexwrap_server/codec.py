@@ -47,7 +47,7 @@ def decode(data: bytes) -> Any:
     try:
         header = json.loads(bytes(body[:length]))
         return _join(header["value"], _arrays(header["arrays"], body, length))
-    except (AttributeError, KeyError, TypeError, ValueError) as error:
+    except (AttributeError, ImportError, KeyError, TypeError, ValueError) as error:
         raise CodecError(f"does not fit this version: {error}") from error
 
 

@@ -56,6 +56,10 @@ class DaskEngine:
 
     async def stop(self) -> None:
         if self._client is not None:
+            for _ in range(20):  # calls that were cancelled are just being killed
+                if not self._listeners:
+                    break
+                await asyncio.sleep(0.1)
             with contextlib.suppress(OSError):
                 await self._client.run(_close_idle, on_error="ignore")
             await self._client.close()

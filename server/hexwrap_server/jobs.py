@@ -92,7 +92,7 @@ class JobManager:
             event.set()
 
     async def stop(self) -> None:
-        """Stop everything; what is unfinished is taken up by the next server."""
+        """Stop everything, the engine too; what is unfinished is taken up by the next server."""
         self.close_waits()
         self._queue.clear()
         tasks = [item.task for item in self._running if item.task]
@@ -100,6 +100,8 @@ class JobManager:
             tasks.append(self._pruning)
         for task in tasks:
             task.cancel()
+        # before the tasks come to know: the engine need not replace the workers that they kill
+        await self._engine.stop()
         await asyncio.gather(*tasks, return_exceptions=True)
 
     # what clients do

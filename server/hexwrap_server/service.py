@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import time
 from collections import OrderedDict
 from dataclasses import replace
@@ -46,9 +47,7 @@ class Service:
         await self.manager.start()
 
     async def stop(self) -> None:
-        await self.manager.stop()
-        await self.engine.stop()
-        await self.errands.stop()
+        await asyncio.gather(self.manager.stop(), self.errands.stop())
         self.store.close()
 
     @property

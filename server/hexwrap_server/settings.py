@@ -87,7 +87,8 @@ class Settings:
         """Raises ValueError where settings contradict each other or make no sense."""
         for item in fields(self):
             value = getattr(self, item.name)
-            if isinstance(value, (int, float)) and (value < 0 or (value == 0 and item.name != "port")):
+            least = 0 if item.name == "port" else 1e-9  # port 0: any free one
+            if isinstance(value, (int, float)) and not value >= least:
                 raise ValueError(f"{flag(item)} must be greater than 0, not {value}.")
         if self.port > 65535:
             raise ValueError(f"--port must be at most 65535, not {self.port}.")

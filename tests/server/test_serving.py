@@ -1,0 +1,104 @@
+"""The server as a process: starting, signals, the port."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import httpx
+import psutil
+import pytest
+
+from tests.server.bodies import request, tube
+
+PROGRAM = """
+import sys
+from hexwrap_server.app import serve
+from hexwrap_server.settings import Settings
+serve(Settings(port=int(sys.argv[1]), data=sys.argv[2], workers=int(sys.argv[3])))
+"""
+
+
+def free_port() -> int:
+    import socket
+
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port: int = taken.getsockname()[1]
+        return port
+
+
+@contextmanager
+def served(data: Path, port: int, workers: int = 2) -> Iterator[subprocess.Popen[bytes]]:
+    """A server process that answers."""
+    paths = os.pathsep.join(os.path.abspath(p or ".") for p in sys.path)
+    command = [sys.executable, "-c", PROGRAM, str(port), str(data), str(workers)]
+    with (data / "log").open("ab") as log:
+        process = subprocess.Popen(command, env=os.environ | {"PYTHONPATH": paths}, stderr=log)
+    try:
+        deadline = time.monotonic() + 60
+        while True:
+            assert process.poll() is None, (data / "log").read_text()
+            assert time.monotonic() < deadline
+            try:
+                httpx.get(f"http://127.0.0.1:{port}/health", trust_env=False)
+                break
+            except httpx.TransportError:
+                time.sleep(0.05)
+        yield process
+    finally:
+        process.kill()
+        process.wait()
+
+
+def children(process: subprocess.Popen[bytes]) -> list[psutil.Process]:
+    return psutil.Process(process.pid).children(recursive=True)
+
+
+def is_gone(process: psutil.Process) -> bool:
+    """A process that init has not collected yet is gone all the same."""
+    try:
+        return not process.is_running() or process.status() == psutil.STATUS_ZOMBIE
+    except psutil.NoSuchProcess:
+        return True
+
+
+def heavy(i: int) -> dict[str, object]:
+    """A job that takes a while."""
+    return request(surface=tube(300, 120, height=10 + i), pattern={"around": 90})
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_signals_end_it_cleanly_while_it_works(tmp_path: Path, number: signal.Signals) -> None:
+    port = free_port()
+    with served(tmp_path, port, workers=1) as process, httpx.Client(trust_env=False) as client:
+        base = f"http://127.0.0.1:{port}"
+        while client.get(f"{base}/ready").status_code != 200:
+            time.sleep(0.05)
+        ids = [client.post(f"{base}/v1/jobs", json=heavy(i)).json()["id"] for i in range(2)]
+        workers = children(process)
+        assert len(workers) == 2
+        start = time.monotonic()
+        process.send_signal(number)
+        assert process.wait(10) == 0
+        assert time.monotonic() - start < 5
+        assert all(is_gone(worker) for worker in workers)
+    log = (tmp_path / "log").read_text()
+    assert "Traceback" not in log
+    assert ids[0] in log
+
+
+def test_taken_port_is_told_clearly(tmp_path: Path) -> None:
+    port = free_port()
+    with served(tmp_path, port, workers=1):
+        (tmp_path / "other").mkdir()
+        command = [sys.executable, "-c", PROGRAM, str(port), str(tmp_path / "other"), "1"]
+        second = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert second.returncode != 0
+    assert f"Cannot listen on 127.0.0.1:{port}" in second.stderr

@@ -1,0 +1,67 @@
+"""Settings are data: flags, environment and README say the same."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import fields
+from pathlib import Path
+
+import pytest
+
+from hexwrap_server.settings import Settings, add_arguments, flag, readme_table, variable
+
+README = Path(__file__).parents[2] / "README.md"
+
+
+def parsed(*words: str) -> Settings:
+    parser = argparse.ArgumentParser()
+    add_arguments(parser)
+    return Settings.from_arguments(parser.parse_args(words))
+
+
+def test_every_setting_is_in_the_readme_as_it_is() -> None:
+    assert readme_table() in README.read_text(encoding="utf-8")
+
+
+def test_every_setting_has_a_flag_a_variable_and_help() -> None:
+    parser = argparse.ArgumentParser()
+    add_arguments(parser)
+    shown = parser.format_help()
+    for item in fields(Settings):
+        assert flag(item) in shown
+        assert variable(item) == "HEXWRAP_" + item.name.upper()
+        assert item.metadata["help"]
+
+
+def test_flags_go_before_variables_before_defaults() -> None:
+    environment = {"HEXWRAP_PORT": "7000", "HEXWRAP_WORKERS": "3"}
+    settings = Settings.from_environment({"port": 8000, "token": None}, environment)
+    assert (settings.port, settings.workers, settings.max_queue) == (8000, 3, 100)
+    assert parsed("--job-seconds", "5.5", "--data", "x").job_seconds == 5.5
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        (("--host", "0.0.0.0"), "--token"),
+        (("--engine", "abacus"), "--engine"),
+        (("--engine", "dask"), "--scheduler"),
+        (("--port", "70000"), "--port"),
+        (("--workers", "0"), "--workers"),
+        (("--job-seconds", "-1"), "--job-seconds"),
+        (("--job-mib", "nan"), "--job-mib"),
+        (("--log-level", "loud"), "--log-level"),
+    ],
+)
+def test_settings_that_make_no_sense_are_refused(words: tuple[str, ...], complaint: str) -> None:
+    with pytest.raises(ValueError, match=complaint):
+        parsed(*words)
+
+
+def test_variable_of_the_wrong_kind_is_refused() -> None:
+    with pytest.raises(ValueError, match="HEXWRAP_PORT must be a whole number"):
+        Settings.from_environment(environment={"HEXWRAP_PORT": "many"})
+
+
+def test_network_address_with_a_token_is_taken() -> None:
+    assert not parsed("--host", "0.0.0.0", "--token", "secret").is_loopback

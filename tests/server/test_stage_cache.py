@@ -1,0 +1,157 @@
+"""Stages on disk and in memory: what was put comes out, what is damaged does not."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+import zlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
+
+from hexwrap_server import codec
+from hexwrap_server.cache import CachingRunner, StageCache, prune, size_of, write_whole
+from hexwrap_server.codec import CodecError, decode, digest, encode
+from hexwrap_solver.arrays import Ragged
+from hexwrap_solver.conformal.types import BoundaryCondition, Deck
+from hexwrap_solver.pattern.types import PatternSettings
+from tests.server.analytic import cylinder
+
+numbers = st.integers() | st.floats(allow_nan=False) | st.complex_numbers(allow_nan=False)
+scalars = st.none() | st.booleans() | st.text() | numbers
+values = st.recursive(
+    scalars, lambda inner: st.lists(inner) | st.tuples(inner, inner) | st.dictionaries(st.text(), inner)
+)
+
+
+@given(values)
+def test_values_come_out_as_they_went_in(value: Any) -> None:
+    assert decode(encode(value)) == value
+
+
+@given(arrays.arrays(st.sampled_from([np.float64, np.int64, np.bool_, np.complex128]), arrays.array_shapes()))
+def test_arrays_come_out_as_they_went_in(array: np.ndarray[Any, Any]) -> None:
+    back = decode(encode(array))
+    assert back.dtype == array.dtype
+    assert np.array_equal(back, array, equal_nan=array.dtype.kind in "fc")
+
+
+def test_solutions_come_out_as_they_went_in() -> None:
+    solution = cylinder()
+    back = decode(encode(solution))
+    assert digest(back) == digest(solution)
+    assert isinstance(back.panels.polygons, Ragged)
+    assert back.map.deck == solution.map.deck
+
+
+def test_digest_depends_on_every_value() -> None:
+    basis = PatternSettings(around=12)
+    assert digest(basis) == digest(PatternSettings(around=12))
+    others = [PatternSettings(around=13), PatternSettings(around=12, kind="quad"), BoundaryCondition(), None]
+    assert len({digest(basis), *map(digest, others)}) == 5
+    assert digest(np.zeros(2)) != digest(np.zeros(3))
+    assert digest(np.arange(6).reshape(2, 3)) != digest(np.arange(6).reshape(3, 2))
+    assert digest(np.arange(6).reshape(2, 3).T) == digest(np.arange(6).reshape(2, 3).T.copy())
+
+
+@pytest.mark.parametrize(
+    "damage", [lambda b: b[:-1], lambda b: b[:20] + b"?" + b[21:], lambda b: b"", lambda b: b"x" * 99]
+)
+def test_damage_is_noticed(damage: Any) -> None:
+    with pytest.raises(CodecError):
+        decode(damage(encode(Deck(0.0, 1 + 2j))))
+
+
+@pytest.mark.parametrize("value", [object(), {1, 2}, np.array(["text"]), Path("/")])
+def test_foreign_things_are_not_stored(value: object) -> None:
+    with pytest.raises(TypeError):
+        encode(value)
+
+
+@pytest.mark.parametrize("place", ["subprocess:Popen", "hexwrap_solver.arrays:np", "hexwrap_solver.gone:X"])
+def test_foreign_classes_do_not_come_out(place: str) -> None:
+    header = json.dumps({"value": {"object": place, "fields": {}}, "arrays": []}).encode()
+    forged = codec._HEAD.pack(codec._MAGIC, len(header), zlib.crc32(header)) + header
+    with pytest.raises(CodecError, match="version"):
+        decode(forged)
+
+
+def runner(folder: Path | None, memory: int = 10**8) -> CachingRunner:
+    return CachingRunner(StageCache(folder, memory), lambda stage, fraction, what: None)
+
+
+def stages(run: CachingRunner, settings: tuple[int, int]) -> int:
+    """Two stages; how many were computed."""
+    computed = []
+
+    def compute(name: str) -> np.ndarray[Any, Any]:
+        computed.append(name)
+        return np.ones(100)
+
+    run("map", settings[0], lambda progress: compute("map"))
+    run("pattern", settings[1], lambda progress: compute("pattern"))
+    return len(computed)
+
+
+def test_stage_is_known_by_its_settings_and_all_before(tmp_path: Path) -> None:
+    assert stages(runner(tmp_path), (1, 1)) == 2
+    assert stages(runner(tmp_path), (1, 1)) == 0
+    assert stages(runner(tmp_path), (1, 2)) == 1
+    assert stages(runner(tmp_path), (2, 1)) == 2
+    assert stages(runner(None), (1, 1)) == 2
+
+
+def test_damaged_stage_is_computed_again(tmp_path: Path) -> None:
+    stages(runner(tmp_path), (1, 1))
+    for path in tmp_path.glob("*.stage"):
+        path.write_bytes(path.read_bytes()[:-3])
+    assert stages(runner(tmp_path), (1, 1)) == 2
+    assert stages(runner(tmp_path), (1, 1)) == 0
+
+
+def test_memory_has_a_limit_and_keeps_the_last_used() -> None:
+    cache = StageCache(None, 3 * 8000)
+    for name in "abc":
+        cache.put(name, np.zeros(1000))
+    assert cache.get("a") is not None
+    cache.put("d", np.zeros(1000))
+    assert [name for name in "abcd" if cache.get(name)] == ["a", "c", "d"]
+    cache.put("large", np.zeros(10_000))
+    assert cache.get("large") is None
+
+
+def test_progress_never_goes_back() -> None:
+    heard: list[float] = []
+    run = CachingRunner(StageCache(None, 0), lambda stage, fraction, what: heard.append(fraction))
+
+    def compute(progress: Any) -> int:
+        for fraction in (-1, 0.2, 0.9, 3):
+            progress(fraction, "")
+        return 1
+
+    for stage in ("surface", "map", "pattern", "fit", "panels", "quality"):
+        run(stage, None, compute)
+    assert heard == sorted(heard)
+    assert (heard[0], heard[-1]) == (0.0, pytest.approx(1.0))
+
+
+def test_pruning_keeps_the_last_used(tmp_path: Path) -> None:
+    for i in range(5):
+        write_whole(tmp_path / f"{i}.stage", bytes(1000))
+        os.utime(tmp_path / f"{i}.stage", (time.time() - 10_000 + i,) * 2)
+    os.utime(tmp_path / "0.stage")
+    prune(tmp_path, 3000, keep=lambda name: name == "1.stage")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["0.stage", "1.stage", "3.stage", "4.stage"]
+    prune(tmp_path, 0)
+    assert [p.name for p in tmp_path.iterdir()] == ["0.stage"]  # young: somebody may be about to name it
+
+
+def test_sizes_count_arrays() -> None:
+    assert size_of(np.zeros(1000)) == 8000
+    assert size_of(Ragged(np.zeros((10, 3)), np.arange(6))) > 240
