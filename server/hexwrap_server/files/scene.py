@@ -13,7 +13,7 @@ from hexwrap_server.files.raster import Camera, Polygons, draw, planes
 from hexwrap_solver.arrays import Bools, Floats, Ints
 
 #: Pixels: the model is fitted into this box, with room around it for its shadow on the ground.
-HEIGHT, WIDTH, MARGIN = 1600, 1760, 110
+HEIGHT, WIDTH, MARGIN = 1600, 1460, 100
 #: Samples per pixel and direction.
 FINE = 3
 #: Degrees: small, so that parallels stay nearly parallel.
@@ -26,7 +26,8 @@ SUN_MAP, TAPS, PENUMBRA, GROUND_BLUR, BIAS = 1200, 24, 5.0, 26.0, 0.012
 SUNLIGHT, SKYLIGHT, GLOSS, GLOSS_EXPONENT = 0.70, 0.52, 0.10, 40.0
 #: Blur radii in pixels, and depths in radii of the model, over which hollows darken.
 HOLLOWS = ((6.0, 0.03), (40.0, 0.25))
-SHELL, BACK = "#4a4f58", "#8d9199"
+#: The backs of the panels keep this much of their colour.
+SHELL, BACK, BACK_COLOUR = "#4a4f58", "#b3b0ab", 0.25
 #: What is left of the light on an outline; the panel width in pixels from which outlines have full strength.
 OUTLINE, OUTLINE_FULL = 0.25, 22.0
 #: Darkest shadow on the ground; it fades towards the rim of the picture over this many pixels.
@@ -122,7 +123,7 @@ class Sun:
 
 
 def _sun(scene: Scene, points: Floats, radius: float) -> Sun:
-    up = np.array([0.0, 0.0, 1.0])
+    up = np.array([0.0, 0.0, 1.0 if scene.view[2] >= 0 else -1.0])
     right = np.cross(up, scene.view)
     right /= np.linalg.norm(right)
     direction = SUN[0] * right + SUN[1] * up + SUN[2] * np.cross(right, up)
@@ -141,7 +142,7 @@ def _light(scene: Scene, drawn: Polygons, camera: Camera, sun: Sun) -> tuple[Flo
     base = np.repeat(linear(from_hex([SHELL])), len(side), axis=0)
     base[:n_panels] = linear(scene.colour)
     backs = np.flatnonzero(side[:n_panels] < 0)
-    base[backs] = 0.35 * base[backs] + 0.45 * linear(from_hex([BACK]))
+    base[backs] = BACK_COLOUR * base[backs] + (1 - BACK_COLOUR) * linear(from_hex([BACK]))
     normal = drawn.normal * side[:, None]
     half = viewer + sun.direction
     half /= np.linalg.norm(half, axis=1, keepdims=True)
