@@ -235,7 +235,7 @@ async def _carry(request: Request, id: str, what: str, dimension: int) -> Respon
     )
     _finished(job)
     path = str(service.store.solution_path(job.identity))
-    data = await service.errand(f"hexwrap_server.carrying:{what}", path, codec.encode(points))
+    data = await service.errand(f"hexwrap_server.placing:{what}", path, codec.encode(points))
     return await packed_response(request, data)
 
 
