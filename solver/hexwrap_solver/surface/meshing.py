@@ -15,7 +15,7 @@ import numpy as np
 from hexwrap_solver.arrays import Floats, Ints
 from hexwrap_solver.surface.errors import NurbsDataError, TooFineError
 from hexwrap_solver.surface.flips import flip_to_delaunay
-from hexwrap_solver.surface.nurbs import Jet, evaluate
+from hexwrap_solver.surface.nurbs import Jet, evaluate, evaluate_points
 from hexwrap_solver.surface.nurbs_checks import checked, spans
 from hexwrap_solver.surface.projection import chord_heights
 from hexwrap_solver.surface.topology import boundary_loops, edge_lengths, twins
@@ -206,7 +206,7 @@ def _around(nurbs: NurbsSurface, sample: _Sample, heights: Floats, spacing: Floa
     """For each row, where its vertices stand: ascending fractions of the period."""
     rows, a = heights.shape
     s = np.tile(np.append(sample.s[:-1], sample.s[0]), rows)
-    points = evaluate(nurbs, _pairs(nurbs, s, heights.ravel())).point.reshape(rows, a, 3)
+    points = evaluate_points(nurbs, _pairs(nurbs, s, heights.ravel())).reshape(rows, a, 3)
     length = np.linalg.norm(np.diff(points, axis=1), axis=2)
     steps = length * 2 / (spacing[:, 1:] + spacing[:, :-1])
     total = np.concatenate([np.zeros((rows, 1)), np.cumsum(steps, axis=1)], axis=1)

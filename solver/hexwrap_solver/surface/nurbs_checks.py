@@ -9,7 +9,7 @@ import numpy as np
 from hexwrap_solver.arrays import Floats
 from hexwrap_solver.surface.checks import check_extent, check_finite
 from hexwrap_solver.surface.errors import NotAnnulusError, NotClosedError, NurbsDataError, PoleError
-from hexwrap_solver.surface.nurbs import domain, evaluate
+from hexwrap_solver.surface.nurbs import domain, evaluate_points
 from hexwrap_solver.surface.types import NurbsSurface
 
 NAMES = "uv"
@@ -121,7 +121,7 @@ def _line(nurbs: NurbsSurface, direction: int, at: float) -> Floats:
     fixed = np.full_like(along, at)
     pair = (fixed, along) if direction == 0 else (along, fixed)
     open_surface = replace(nurbs, closed=(False, False))  # both ends of a period are wanted
-    return evaluate(open_surface, np.stack(pair, axis=1)).point
+    return evaluate_points(open_surface, np.stack(pair, axis=1))
 
 
 def _gap(nurbs: NurbsSurface, direction: int) -> float:
