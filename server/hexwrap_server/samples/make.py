@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import rhino3dm
 
 from hexwrap_solver.arrays import Floats
-from hexwrap_solver.surface.types import NurbsSurface
+from hexwrap_solver.surface import NurbsSurface
+from hexwrap_solver.surface.nurbs import domain, evaluate_points
 
 DEGREE = 3
+#: Coordinates are kept to a tenth of a millimetre, lengths being in metres.
+DIGITS = 4
 
 
 def loft(rings: Floats) -> NurbsSurface:
     """Cubic surface, periodic around and clamped along, from (rings, around, 3) control points."""
     rows, around, _ = rings.shape
-    wrapped = np.concatenate([rings, rings[:, :DEGREE]], axis=1).transpose(1, 0, 2)
+    wrapped = np.concatenate([rings, rings[:, :DEGREE]], axis=1).transpose(1, 0, 2).round(DIGITS)
     net = np.concatenate([wrapped, np.ones((*wrapped.shape[:2], 1))], axis=2)
     periodic = np.arange(-DEGREE, around + DEGREE + 1, dtype=float)
     inner = np.arange(rows - DEGREE + 1, dtype=float)
@@ -25,14 +31,17 @@ def loft(rings: Floats) -> NurbsSurface:
     return NurbsSurface((DEGREE, DEGREE), (periodic, clamped), net, (True, False))
 
 
+def _angles(around: int) -> Floats:
+    return np.arange(around) / around * 2 * np.pi
+
+
 def tower() -> NurbsSurface:
-    """As Figure 1 of the paper: a twisted, waisted tower, 60 m high, whose plan turns from a rounded
-    triangle into an oval."""
-    around = 12
+    """As in Figure 1: 60 m high, its plan turning from a rounded triangle into an oval, its girth halved at
+    the waist, its roof cut aslant."""
     t = np.linspace(0, 1, 8)[:, None]
-    a = np.arange(around) / around * 2 * np.pi
-    radius = np.interp(t, np.linspace(0, 1, 8), [17.0, 15.2, 11.0, 8.0, 7.4, 8.6, 10.6, 12.0])
-    lobes = 1 + 0.22 * (1 - t) ** 2 * np.cos(3 * a) + 0.16 * t**2 * np.cos(2 * a)
+    a = _angles(12)
+    radius = np.array([17.0, 15.6, 12.2, 8.6, 7.2, 7.8, 9.6, 11.2])[:, None]
+    lobes = 1 + 0.2 * (1 - t) ** 2 * np.cos(3 * a) + 0.16 * t**2 * np.cos(2 * a)
     turn = a + 1.25 * t
     x = radius * lobes * np.cos(turn) + 7.0 * t**2
     y = radius * lobes * np.sin(turn) - 3.0 * np.sin(np.pi * t)
@@ -40,33 +49,199 @@ def tower() -> NurbsSurface:
     return loft(np.stack([x, y, z], axis=2))
 
 
+def facade() -> NurbsSurface:
+    """As in the case study: an exhibition hall of 60 m × 40 m × 20 m, nearly an extrusion of a rounded plan,
+    its walls leaning out a little and its eaves rising and falling."""
+    t = np.linspace(0, 1, 6)[:, None]
+    a = _angles(24)
+    power = 2 / 3.4  # superellipse
+    x = 30.6 * np.sign(np.cos(a)) * np.abs(np.cos(a)) ** power
+    y = 20.4 * np.sign(np.sin(a)) * np.abs(np.sin(a)) ** power
+    lean = 1 + 0.05 * np.sin(np.pi * t * 0.75) + 0.02 * t * np.cos(2 * a)
+    z = 20.0 * t + 0.9 * t**2 * np.cos(2 * a)
+    return loft(np.stack([x * lean, y * lean, z + 0 * a], axis=2))
+
+
+def waist() -> NurbsSurface:
+    """A hyperboloid of one sheet with elliptic plan, exact: negatively curved everywhere, 44 m high."""
+    rim = np.arccosh(2.0)  # ends twice as wide as the waist
+    circle = np.array([[1, 0], [1, 1], [0, 1], [-1, 1], [-1, 0], [-1, -1], [0, -1], [1, -1], [1, 0]], dtype=float)
+    weights = np.array([1, np.sqrt(0.5)] * 4 + [1])
+    radius, height = np.array([2.0, 0.5, 2.0]), np.array([-1.0, 0.0, 1.0]) * np.sinh(rim)
+    net = np.zeros((9, 3, 4))
+    net[..., 0] = 9.0 * circle[:, :1] * radius
+    net[..., 1] = 7.5 * circle[:, 1:] * radius
+    net[..., 2] = 22.0 * (1 + height / np.sinh(rim))
+    net[..., 3] = weights[:, None] * np.array([1.0, 2.0, 1.0])
+    net[..., :3] = net[..., :3].round(DIGITS)
+    around = np.array([0, 0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 4], dtype=float)
+    along = np.array([0, 0, 0, 1, 1, 1], dtype=float)
+    return NurbsSurface((2, 2), (around, along), net, (True, False))
+
+
+def pavilion() -> NurbsSurface:
+    """A round hall of 28 m that swells between ground and roof, 13 m high."""
+    t = np.linspace(0, 1, 6)[:, None]
+    a = _angles(16)
+    radius = 13.0 + 2.6 * np.sin(np.pi * (0.15 + 0.7 * t)) + 0.5 * np.cos(2 * a) * t
+    z = 13.0 * t + 0.8 * t**2 * np.cos(a - 0.5)
+    return loft(np.stack([radius * np.cos(a), 0.92 * radius * np.sin(a), z], axis=2))
+
+
+def trunk() -> NurbsSurface:
+    """A column of 24 m that opens like a trumpet towards the roof it carries."""
+    t = np.linspace(0, 1, 8)[:, None]
+    a = _angles(16)
+    radius = np.array([6.4, 5.6, 4.8, 4.4, 4.5, 5.4, 7.4, 9.6])[:, None]
+    radius = radius * (1 + 0.1 * t**2 * np.cos(4 * a))
+    return loft(np.stack([radius * np.cos(a), radius * np.sin(a), 24.0 * t + 0 * a], axis=2))
+
+
+def canopy() -> NurbsSurface:
+    """A ring-shaped roof over a court, 64 m across, gently waved, with the court off its centre."""
+    t = np.linspace(0, 1, 7)[:, None]
+    a = _angles(20)
+    radius = 32.0 - 19.0 * t + 1.2 * (1 - t) * np.cos(3 * a + 0.4)
+    x = radius * np.cos(a) + 4.0 * t
+    y = 0.82 * radius * np.sin(a) + 1.5 * t
+    z = 6.0 + 1.6 * (1 - t) ** 2 * np.cos(3 * a) + 2.4 * np.sin(np.pi * t) * 0.5
+    return loft(np.stack([x, y, z], axis=2))
+
+
+def at(surface: NurbsSurface, end: int, turns: Sequence[float]) -> list[list[float]]:
+    """Points of the first (end 0) or last boundary, at fractions of one turn in the parameter."""
+    (low, high), along = domain(surface, 0), domain(surface, 1)[end]
+    parameters = [[low + (high - low) * turn, along] for turn in turns]
+    points: list[list[float]] = evaluate_points(surface, np.array(parameters)).round(DIGITS).tolist()
+    return points
+
+
+def corners(points: list[list[float]], angle: float) -> list[dict[str, Any]]:
+    """Boundary angles, in multiples of π."""
+    return [{"point": point, "angle": angle} for point in points]
+
+
 def body(name: str, surface: NurbsSurface, **request: Any) -> dict[str, Any]:
-    """A request body with the surface inline; coordinates rounded to a tenth of a millimetre."""
-    return {
-        "name": name,
-        "surface": {
-            "nurbs": {
-                "degree": list(surface.degree),
-                "knots": [k.tolist() for k in surface.knots],
-                "control_points": np.round(surface.control_points, 4).tolist(),
-                "closed": list(surface.closed),
-            },
-        },
-        **request,
+    """A request body with the surface inline."""
+    nurbs = {
+        "degree": list(surface.degree),
+        "knots": [k.tolist() for k in surface.knots],
+        "control_points": surface.control_points.tolist(),
+        "closed": list(surface.closed),
     }
+    return {"name": name, "surface": {"nurbs": nurbs}, **request}
 
 
-def bodies() -> list[dict[str, Any]]:
-    """Every sample."""
-    return [body("tower", tower(), pattern={"kind": "hex", "around": 48})]
+def requests() -> list[tuple[NurbsSurface, dict[str, Any]]]:
+    """Every sample: its surface and its request body."""
+    return [_tower(), _facade(), _waist(), _cone(), _isometric(), _entrance(), _diagrid(), _ring()]
 
 
-def main() -> None:
-    folder = Path(__file__).parent
-    for request in bodies():
+def _tower() -> tuple[NurbsSurface, dict[str, Any]]:
+    """Figures 1 and 5, left: a straight cylinder."""
+    surface = tower()
+    return surface, body("tower", surface, pattern={"kind": "hex", "around": 48})
+
+
+def _facade() -> tuple[NurbsSurface, dict[str, Any]]:
+    """The case study: panels with edges between 1.5 and 2 m."""
+    surface = facade()
+    return surface, body(
+        "facade",
+        surface,
+        pattern={"kind": "hex", "edge_length": 1.78},
+        panels={"sizes": 11, "edge_range": [1.5, 2.0]},
+    )
+
+
+def _waist() -> tuple[NurbsSurface, dict[str, Any]]:
+    surface = waist()
+    return surface, body("waist", surface, pattern={"kind": "hex", "around": 48})
+
+
+def _cone() -> tuple[NurbsSurface, dict[str, Any]]:
+    """Figure 5, middle: three corners of 2π/3 below and three of 4π/3 above, on a cone."""
+    surface = tower()
+    thirds = np.arange(3) / 3
+    angles = corners(at(surface, 0, thirds.tolist()), 2 / 3) + corners(at(surface, 1, (thirds + 1 / 6).tolist()), 4 / 3)
+    return surface, body(
+        "cone",
+        surface,
+        boundary={"mode": "angles", "angles": angles, "angle_unit": "pi"},
+        pattern={"kind": "hex", "around": 48},
+    )
+
+
+def _isometric() -> tuple[NurbsSurface, dict[str, Any]]:
+    """Figure 5, right: boundary lengths kept, on the nearest cone that fits hexagons."""
+    surface = tower()
+    return surface, body(
+        "isometric", surface, boundary={"mode": "isometric"}, pattern={"kind": "hex", "around": 48}
+    )
+
+
+def _entrance() -> tuple[NurbsSurface, dict[str, Any]]:
+    """Figure 7, left: two entrances, each of 4π/3, π/3, 4π/3 on the ground, on a straight cylinder."""
+    surface = pavilion()
+    angles = []
+    for middle in (0.125, 0.625):
+        left, tip, right = at(surface, 0, [middle - 0.05, middle, middle + 0.05])
+        angles += [*corners([left], 4 / 3), *corners([tip], 1 / 3), *corners([right], 4 / 3)]
+    return surface, body(
+        "entrance",
+        surface,
+        boundary={"mode": "angles", "angles": angles, "angle_unit": "pi"},
+        pattern={"kind": "hex", "around": 54},
+    )
+
+
+def _diagrid() -> tuple[NurbsSurface, dict[str, Any]]:
+    """Figure 7, right: a diagrid that thickens towards four feet with small angles on the ground."""
+    surface = trunk()
+    quarters = np.arange(4) / 4
+    angles = corners(at(surface, 0, quarters.tolist()), 2 / 3)
+    angles += corners(at(surface, 0, (quarters + 1 / 8).tolist()), 4 / 3)
+    return surface, body(
+        "diagrid",
+        surface,
+        boundary={"mode": "angles", "angles": angles, "angle_unit": "pi"},
+        pattern={"kind": "triangle", "around": 40},
+    )
+
+
+def _ring() -> tuple[NurbsSurface, dict[str, Any]]:
+    """A flat ring: its cone angle is a full turn, and its deck transformation a translation again."""
+    surface = canopy()
+    return surface, body("ring", surface, boundary={"mode": "isometric"}, pattern={"kind": "hex", "around": 72})
+
+
+def rhino_model(name: str, surface: NurbsSurface) -> rhino3dm.File3dm:
+    """The surface as Rhino keeps it: no first and last knot, control points times their weights."""
+    n, m = surface.control_points.shape[:2]
+    rational = bool(np.ptp(surface.control_points[..., 3]) > 0)
+    out = rhino3dm.NurbsSurface.Create(3, rational, surface.degree[0] + 1, surface.degree[1] + 1, n, m)
+    for knots, place in zip(surface.knots, (out.KnotsU, out.KnotsV), strict=True):
+        for i, knot in enumerate(knots[1:-1].tolist()):
+            place[i] = knot
+    for i, row in enumerate(surface.control_points.tolist()):
+        for j, (x, y, z, w) in enumerate(row):
+            out.Points[i, j] = rhino3dm.Point4d(x * w, y * w, z * w, w)
+    model = rhino3dm.File3dm()
+    model.Settings.ModelUnitSystem = rhino3dm.UnitSystem.Meters
+    attributes = rhino3dm.ObjectAttributes()
+    attributes.Name = name
+    model.Objects.Add(out, attributes)
+    return model
+
+
+def make(folder: Path) -> None:
+    """Writes NAME.json and NAME.3dm of every sample."""
+    for surface, request in requests():
+        name = request["name"]
         text = json.dumps(request, separators=(",", ":")) + "\n"
-        (folder / f"{request['name']}.json").write_text(text, encoding="utf-8", newline="\n")
+        (folder / f"{name}.json").write_text(text, encoding="utf-8", newline="\n")
+        rhino_model(name, surface).Write(str(folder / f"{name}.3dm"), 7)
 
 
 if __name__ == "__main__":
-    main()
+    make(Path(__file__).parent)
