@@ -79,6 +79,18 @@ def waist() -> NurbsSurface:
     return NurbsSurface((2, 2), (around, along), net, (True, False))
 
 
+def tent() -> NurbsSurface:
+    """A hall like a tent, 30 m high, on three rounded feet, rising steeply to an eye in the roof."""
+    t = np.linspace(0, 1, 8)[:, None]
+    a = _angles(18)
+    radius = np.array([24.0, 21.4, 18.4, 15.4, 12.6, 10.2, 8.3, 7.0])[:, None]
+    lobes = 1 + 0.13 * (1 - t) ** 1.5 * np.cos(3 * a)
+    turn = a + 0.7 * t
+    x = radius * lobes * np.cos(turn) + 2.0 * t
+    z = 30.0 * t**0.9 + 1.6 * t**2 * np.cos(turn)
+    return loft(np.stack([x, radius * lobes * np.sin(turn), z], axis=2))
+
+
 def pavilion() -> NurbsSurface:
     """A round hall of 28 m that swells between ground and roof, 13 m high."""
     t = np.linspace(0, 1, 6)[:, None]
@@ -161,7 +173,7 @@ def _waist() -> tuple[NurbsSurface, dict[str, Any]]:
 
 def _cone() -> tuple[NurbsSurface, dict[str, Any]]:
     """Figure 5, middle: three corners of 2π/3 below and three of 4π/3 above, on a cone."""
-    surface = tower()
+    surface = tent()
     thirds = np.arange(3) / 3
     angles = corners(at(surface, 0, thirds.tolist()), 2 / 3) + corners(at(surface, 1, (thirds + 1 / 6).tolist()), 4 / 3)
     return surface, body(
@@ -174,7 +186,7 @@ def _cone() -> tuple[NurbsSurface, dict[str, Any]]:
 
 def _isometric() -> tuple[NurbsSurface, dict[str, Any]]:
     """Figure 5, right: boundary lengths kept, on the nearest cone that fits hexagons."""
-    surface = tower()
+    surface = tent()
     return surface, body(
         "isometric", surface, boundary={"mode": "isometric"}, pattern={"kind": "hex", "around": 48}
     )
@@ -185,27 +197,30 @@ def _entrance() -> tuple[NurbsSurface, dict[str, Any]]:
     surface = pavilion()
     angles = []
     for middle in (0.125, 0.625):
-        left, tip, right = at(surface, 0, [middle - 0.05, middle, middle + 0.05])
+        left, tip, right = at(surface, 0, [middle - 0.06, middle, middle + 0.06])
         angles += [*corners([left], 4 / 3), *corners([tip], 1 / 3), *corners([right], 4 / 3)]
     return surface, body(
         "entrance",
         surface,
         boundary={"mode": "angles", "angles": angles, "angle_unit": "pi"},
-        pattern={"kind": "hex", "around": 54},
+        pattern={"kind": "hex", "around": 84},
     )
 
 
 def _diagrid() -> tuple[NurbsSurface, dict[str, Any]]:
     """Figure 7, right: a diagrid that thickens towards four feet with small angles on the ground."""
     surface = trunk()
-    quarters = np.arange(4) / 4
-    angles = corners(at(surface, 0, quarters.tolist()), 2 / 3)
-    angles += corners(at(surface, 0, (quarters + 1 / 8).tolist()), 4 / 3)
+    angles = []
+    for middle in np.arange(4) / 4 + 0.125:
+        outer, inner = 0.085, 0.025
+        places = at(surface, 0, [middle - outer, middle - inner, middle + inner, middle + outer])
+        for place, angle in zip(places, (4 / 3, 2 / 3, 2 / 3, 4 / 3), strict=True):
+            angles += corners([place], angle)
     return surface, body(
         "diagrid",
         surface,
         boundary={"mode": "angles", "angles": angles, "angle_unit": "pi"},
-        pattern={"kind": "triangle", "around": 40},
+        pattern={"kind": "triangle", "around": 60},
     )
 
 
