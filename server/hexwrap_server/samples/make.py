@@ -65,7 +65,9 @@ def facade() -> NurbsSurface:
 def waist() -> NurbsSurface:
     """A hyperboloid of one sheet with elliptic plan, exact: negatively curved everywhere, 44 m high."""
     rim = np.arccosh(2.0)  # ends twice as wide as the waist
-    circle = np.array([[1, 0], [1, 1], [0, 1], [-1, 1], [-1, 0], [-1, -1], [0, -1], [1, -1], [1, 0]], dtype=float)
+    circle = np.array(
+        [[1, 0], [1, 1], [0, 1], [-1, 1], [-1, 0], [-1, -1], [0, -1], [1, -1], [1, 0]], dtype=float
+    )
     weights = np.array([1, np.sqrt(0.5)] * 4 + [1])
     radius, height = np.array([2.0, 0.5, 2.0]), np.array([-1.0, 0.0, 1.0]) * np.sinh(rim)
     net = np.zeros((9, 3, 4))
@@ -175,7 +177,9 @@ def _cone() -> tuple[NurbsSurface, dict[str, Any]]:
     """Figure 5, middle: three corners of 2π/3 below and three of 4π/3 above, on a cone."""
     surface = tent()
     thirds = np.arange(3) / 3
-    angles = corners(at(surface, 0, thirds.tolist()), 2 / 3) + corners(at(surface, 1, (thirds + 1 / 6).tolist()), 4 / 3)
+    angles = corners(at(surface, 0, thirds.tolist()), 2 / 3) + corners(
+        at(surface, 1, (thirds + 1 / 6).tolist()), 4 / 3
+    )
     return surface, body(
         "cone",
         surface,
@@ -227,7 +231,9 @@ def _diagrid() -> tuple[NurbsSurface, dict[str, Any]]:
 def _ring() -> tuple[NurbsSurface, dict[str, Any]]:
     """A flat ring: its cone angle is a full turn, and its deck transformation a translation again."""
     surface = canopy()
-    return surface, body("ring", surface, boundary={"mode": "isometric"}, pattern={"kind": "hex", "around": 72})
+    return surface, body(
+        "ring", surface, boundary={"mode": "isometric"}, pattern={"kind": "hex", "around": 72}
+    )
 
 
 def rhino_model(name: str, surface: NurbsSurface) -> rhino3dm.File3dm:

@@ -31,6 +31,8 @@ ROW = np.sqrt(3) / 2
 STEP = 1.08
 #: A row may be so much flatter than equilateral where lines along the surface are shorter than elsewhere.
 FLATTEST = 3.0
+#: Edge lengths may change by this much per length, so that neighbouring triangles are of one size.
+GRADE = 0.12
 #: Places around a row are told apart to this part of it: sums with row numbers stay exact.
 PLACES = 2.0**32
 #: Sizes are planned a little below what was asked, and reduced again while the finished mesh exceeds it.
@@ -143,7 +145,35 @@ def _edge_length(sample: _Sample, settings: MeshSettings, shrink: float) -> Floa
     if settings.tolerance is None:
         return np.full_like(sample.speed, longest)
     height = shrink**2 * settings.tolerance
-    return np.minimum(longest, np.sqrt(8 * height / np.maximum(sample.curvature, 8 * height / longest**2)))
+    return _graded(
+        sample,
+        np.minimum(longest, np.sqrt(8 * height / np.maximum(sample.curvature, 8 * height / longest**2))),
+    )
+
+
+def _graded(sample: _Sample, h: Floats) -> Floats:
+    """(b, a) sizes lowered where they would change faster than GRADE per length, around and along."""
+    a = h.shape[1] - 1
+    around = _cumulated(np.tile(sample.speed[:, :-1], 2), np.tile(np.diff(sample.s), 2)[:-1])
+    along = _cumulated(sample.rise.T, np.diff(sample.t))
+    for _ in range(2):
+        turn = _limited(np.tile(h[:, :-1], 2), around)
+        h = np.minimum(turn[:, :a], turn[:, a:])[:, np.r_[:a, 0]]
+        h = _limited(h.T, along).T
+    return h
+
+
+def _cumulated(speed: Floats, steps: Floats) -> Floats:
+    """(k, n) lengths from the beginning of each row, by the trapezoidal rule."""
+    length = (speed[:, 1:] + speed[:, :-1]) / 2 * steps
+    return np.concatenate([np.zeros((len(speed), 1)), np.cumsum(length, axis=1)], axis=1)
+
+
+def _limited(h: Floats, x: Floats) -> Floats:
+    """The greatest function below h along each row, at places x, that changes nowhere faster than GRADE."""
+    rising = np.minimum.accumulate(h - GRADE * x, axis=1) + GRADE * x
+    falling = np.minimum.accumulate((h + GRADE * x)[:, ::-1], axis=1)[:, ::-1] - GRADE * x
+    return np.minimum(rising, falling)
 
 
 def _default_size(nurbs: NurbsSurface, sample: _Sample) -> float:
