@@ -1,11 +1,14 @@
 """The built components, unpacked once; interpreters that run them."""
 
+import http.client
 import json
 import os
 import shutil
+import socket
 import subprocess
 import sys
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -36,6 +39,49 @@ def unpacked(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+SERVE = (
+    "from hexwrap_server.app import serve; from hexwrap_server.settings import Settings; "
+    "serve(Settings.from_environment())"
+)
+
+
+@pytest.fixture(scope="session")
+def server_port(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]:
+    """Port of a live server process with a data folder of its own."""
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        port = int(listener.getsockname()[1])
+    settings = {"HEXWRAP_PORT": str(port), "HEXWRAP_DATA": str(tmp_path_factory.mktemp("data"))}
+    process = subprocess.Popen(
+        [sys.executable, "-c", SERVE],
+        env=os.environ | settings,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    try:
+        deadline = time.monotonic() + 60
+        while not is_ready(port):
+            assert process.poll() is None, "the server did not start"
+            assert time.monotonic() < deadline, "the server did not come up"
+            time.sleep(0.1)
+        yield port
+    finally:
+        process.terminate()
+        process.wait(20)
+
+
+def is_ready(port: int) -> bool:
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=5)
+    try:
+        connection.request("GET", "/ready")
+        return connection.getresponse().status == 200
+    except OSError:
+        return False
+    finally:
+        connection.close()
+
+
 @pytest.fixture(params=["cpython", "jython"])
 def run_scenarios(request: pytest.FixtureRequest, unpacked: Path) -> Runner:
     """Runs a file of scenarios in another interpreter; its failures are this test's."""
@@ -50,12 +96,9 @@ def run_scenarios(request: pytest.FixtureRequest, unpacked: Path) -> Runner:
         command = [found]
 
     def run(name: str, environment: dict[str, str]) -> None:
-        paths = os.pathsep.join(str(ROOT / part) for part in ("solver", "server"))
         done = subprocess.run(
             [*command, str(HEADLESS / f"{name}.py")],
-            env=os.environ
-            | {"HEXWRAP_BUILT": str(unpacked), "HEXWRAP_PYTHON": sys.executable, "HEXWRAP_PATHS": paths}
-            | environment,
+            env=os.environ | {"HEXWRAP_BUILT": str(unpacked), "HEXWRAP_PYTHON": sys.executable} | environment,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,

@@ -1,5 +1,6 @@
 """Sources, metadata and built files say the same, and the files are what the sources make now."""
 
+import ast
 import io
 import json
 import re
@@ -147,6 +148,19 @@ def test_code_reads_its_inputs_and_sets_its_outputs(component: Component) -> Non
         assert re.search(rf"^(?:.*, )?{spec['name']}\b.* = ", code, re.MULTILINE), (
             f"{spec['name']} is never set"
         )
+
+
+def test_code_does_not_overwrite_its_inputs(component: Component) -> None:
+    bound = set()
+    for node in ast.walk(ast.parse(component.code)):
+        match node:
+            case ast.FunctionDef(name=name) | ast.ClassDef(name=name):
+                bound.add(name)
+            case ast.Name(id=name, ctx=ast.Store()):
+                bound.add(name)
+            case ast.Import(names=names) | ast.ImportFrom(names=names):
+                bound |= {alias.asname or alias.name for alias in names}
+    assert not bound & {spec["name"] for spec in component.inputs}
 
 
 def test_code_is_whole_and_plain(component: Component) -> None:

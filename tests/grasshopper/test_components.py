@@ -10,3 +10,11 @@ Runner = Callable[[str, dict[str, str]], None]
 
 def test_settings(run_scenarios: Runner) -> None:
     run_scenarios("scenarios_settings", {})
+
+
+def test_against_a_live_server(run_scenarios: Runner, server_port: int) -> None:
+    run_scenarios("scenarios_solve", {"HEXWRAP_PORT": str(server_port)})
+
+
+def test_servers_in_trouble(run_scenarios: Runner, server_port: int) -> None:
+    run_scenarios("scenarios_trouble", {"HEXWRAP_PORT": str(server_port)})

@@ -62,7 +62,7 @@ def post(token, slot, server, key, geometry, body):
     try:
         return call_json(server, "POST", "/v1/jobs", request, timeout=SLOW)["id"]
     except Refusal as refused:
-        if refused.problem.get("status") != 404:
+        if not any(fault.get("pointer") == "/surface/id" for fault in refused.problem.get("errors") or []):
             raise
     slot["surface"] = None
     request["surface"] = {"id": surface_id(token, slot, server, key, geometry)}

@@ -41,9 +41,9 @@ def launch(program, port):
     except ImportError:
         import subprocess
 
-        with open(os.devnull, "r+b") as nothing:
+        with open(os.devnull, "rb") as silence, open(os.devnull, "wb") as nothing:
             subprocess.Popen(
-                [program, "serve", "--port", str(port)], stdin=nothing, stdout=nothing, stderr=nothing
+                [program, "serve", "--port", str(port)], stdin=silence, stdout=nothing, stderr=nothing
             )
         return
     start = ProcessStartInfo(program, "serve --port %d" % port)

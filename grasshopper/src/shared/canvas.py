@@ -6,7 +6,7 @@ import Rhino
 import System
 
 
-class Token(object):
+class Task(object):
     """One piece of background work, seen by the work itself: is it still wanted, and what is it doing?"""
 
     def __init__(self, slot, component):
@@ -99,7 +99,7 @@ def in_background(component, slot, wanted, work):
     slot["busy"] = True
     slot["error"] = None
     slot["cancelled"] = False
-    token = Token(slot, component)
+    token = Task(slot, component)
 
     def run():
         result, error = None, None

@@ -20,7 +20,7 @@ def as_mesh(geometry):
         joined.Append(part)
     if joined.Faces.Count == 0:
         raise Refusal("Rhino could not mesh this surface. Repair it, or mesh it yourself and wire the mesh.")
-    return joined, joined.Normals
+    return joined, joined.Normals if joined.Normals.Count == joined.Vertices.Count else None
 
 
 def mesh_arrays(mesh):

@@ -36,7 +36,7 @@ SERVE = (
 # --- meshes ----------------------------------------------------------------------------------------------
 
 
-def tube(around=24, high=10, waist=0.75, height=6.0):
+def tube(around=24, high=10, waist=0.75, height=6.0, normals=False):
     """A waisted tube of quads with an unwelded seam, as Rhino meshes a surface of revolution."""
     points, faces = [], []
     for row in range(high + 1):
@@ -49,7 +49,7 @@ def tube(around=24, high=10, waist=0.75, height=6.0):
         for k in range(around):
             a = row * (around + 1) + k
             faces.append((a, a + 1, a + around + 2, a + around + 1))
-    return Mesh(points, faces)
+    return Mesh(points, faces, [(p[0], p[1], 0.0) for p in points] if normals else ())
 
 
 def with_lid(mesh):
@@ -107,9 +107,9 @@ class Server(object):
         environment = dict(os.environ)
         environment.update({"HEXWRAP_PORT": str(port), "HEXWRAP_DATA": data, "HEXWRAP_WORKERS": "1"})
         self.port = port
-        with open(os.devnull, "r+b") as nothing:
+        with open(os.devnull, "rb") as silence, open(os.devnull, "wb") as nothing:
             self.process = subprocess.Popen(
-                [PYTHON, "-c", SERVE], stdin=nothing, stdout=nothing, stderr=nothing, env=environment
+                [PYTHON, "-c", SERVE], stdin=silence, stdout=nothing, stderr=nothing, env=environment
             )
         end = time.time() + 30
         while not answers(port):

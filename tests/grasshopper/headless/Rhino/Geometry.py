@@ -80,6 +80,12 @@ class _Faces(object):
         return MeshFace(self.rows[i])
 
 
+class _Normals(list):
+    @property
+    def Count(self):
+        return len(self)
+
+
 class GeometryBase(object):
     pass
 
@@ -88,7 +94,7 @@ class Mesh(GeometryBase):
     def __init__(self, points=(), faces=(), normals=()):
         self.Vertices = _Vertices([tuple(float(c) for c in p) for p in points])
         self.Faces = _Faces([tuple(f) for f in faces])
-        self.Normals = [Vector3d(*n) for n in normals]
+        self.Normals = _Normals(Vector3d(*n) for n in normals)
 
     def DataCRC(self, start):
         return zlib.crc32(repr((self.Vertices.points, self.Faces.rows)).encode("ascii")) & 0xFFFFFFFF

@@ -1,0 +1,470 @@
+"""Send and everything after it, against a live server."""
+
+from __future__ import print_function
+
+import json
+import math
+import os
+import random
+import time
+
+import Grasshopper
+import Rhino
+import world
+from canvas import Component, pump, settle
+from Rhino.Geometry import Brep, CircleCurve, Point3d, PolylineCurve, Surface
+from System import Array
+
+PORT = int(os.environ["HEXWRAP_PORT"])
+SMALL = json.dumps({"pattern": {"around": 16}})
+LARGE = json.dumps({"pattern": {"around": 320}})  # keeps the server busy for seconds
+
+
+def array(points):
+    return PolylineCurve(Array[Point3d]([Point3d(*p) for p in points]))
+
+
+def sender(**values):
+    settings = dict(Mesh=world.tube(), Pattern=SMALL, Run=True, Port=PORT, Name="scenario")
+    settings.update(values)
+    return Component("Send").set(**settings)
+
+
+def busy_sender(pattern=LARGE, **values):
+    """A component Send with work that this server has never done before."""
+    return sender(Mesh=world.tube(waist=0.6 + 0.1 * random.random()), Pattern=pattern, **values)
+
+
+def done(**values):
+    """A component Send whose job is finished."""
+    send = settle(sender(**values), 2)
+    assert send.Job and not send.messages, (send.Job, send.messages)
+    return send
+
+
+def collected(name, **values):
+    return settle(Component(name).set(**values), 2)
+
+
+def job_of(send):
+    return send.scope["slot"]
+
+
+def running(port=PORT):
+    return [job for job in world.ask(port, "GET", "/v1/jobs")[1]["jobs"] if job["status"] == "running"]
+
+
+def until_running(send):
+    pump([send], lambda: any(job["stage"] for job in running()))
+
+
+def mean(values):
+    return sum(values) / len(values)
+
+
+# --- the plain way ---------------------------------------------------------------------------------------
+
+
+def send_and_collect():
+    send = sender()
+    assert send.Job is None and "Run" not in send.Message
+    settle(send, 2)
+    assert send.solved == 2 and send.Message == "done", "one re-trigger per finished job"
+    assert send.Job.startswith("http://127.0.0.1:%d/v1/jobs/" % PORT)
+    assert "done in" in send.Status and "repair" in send.Status  # the unwelded seam
+    collect = collected("Collect", Job=send.Job)
+    assert collect.solved == 2 and collect.Message == "collected" and not collect.messages
+    check_panels(collect)
+    # whatever else makes the canvas solve again: nothing is fetched or sent anew
+    panels = collect.Panels
+    assert collect.solve().Panels is panels and not collect.document.scheduled
+    assert send.solve().Message == "done" and not send.document.scheduled
+
+
+def check_panels(collect):
+    panels = collect.Panels.flat()
+    rings = sorted(collect.Panels.branches)
+    assert len(panels) > 50 and len(rings) > 3
+    for name in (
+        "Labels",
+        "Sizes",
+        "Colours",
+        "Planes",
+        "Outlines",
+        "Planarity",
+        "Gaps",
+        "Convex",
+        "Neighbours",
+    ):
+        tree = getattr(collect, name)
+        assert sorted(tree.branches) == rings, name
+        assert [len(tree.branches[p]) for p in rings] == [len(collect.Panels.branches[p]) for p in rings], (
+            name
+        )
+    labels = collect.Labels.flat()
+    assert len(set(labels)) == len(labels)
+    for path in rings:
+        assert all(int(label[1:3]) == path[0] for label in collect.Labels.branches[path])
+    for panel, flat, plane in zip(panels, collect.Outlines.flat(), collect.Planes.flat()):
+        assert panel.IsClosed and len(panel.points) == 7
+        edges = [a.DistanceTo(b) for a, b in zip(panel.points, panel.points[1:])]
+        assert max(edges) - min(edges) < 1e-9 * max(edges), "panels are equilateral"
+        flat_edges = [a.DistanceTo(b) for a, b in zip(flat.points, flat.points[1:])]
+        assert max(abs(a - b) for a, b in zip(edges, flat_edges)) < 1e-9
+        assert all(p.Z == 0.0 for p in flat.points) and flat.points[0].xyz() == [0.0, 0.0, 0.0]
+        x, y = plane.XAxis.xyz(), plane.YAxis.xyz()
+        assert abs(sum(a * b for a, b in zip(x, y))) < 1e-12
+        first = [(b - a) / edges[0] for a, b in zip(panel.points[0].xyz(), panel.points[1].xyz())]
+        assert max(abs(a - b) for a, b in zip(first, x)) < 1e-9, "x runs along the first edge"
+        outward = [x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2]]
+        assert outward[0] * plane.Origin.X + outward[1] * plane.Origin.Y > 0, "z points outward"
+    assert max(collect.Planarity.flat()) < 1e-9 and all(collect.Convex.flat())
+    assert min(collect.Sizes.flat()) == 0 and max(collect.Sizes.flat()) < 11
+    for words in collect.Neighbours.flat():
+        assert len(words.split()) == 6
+        assert all(word == "-" or word in labels for word in words.split())
+    assert "%d panels" % len(panels) in collect.Report and "overlaps: 0" in collect.Report
+
+
+def surfaces_are_meshed_as_rhino_does():
+    spy = world.Spy(PORT)
+    for geometry in (Brep([world.tube(normals=True)]), Surface([world.tube(normals=True)])):
+        assert "done" in settle(sender(Mesh=geometry, Port=spy.port), 2).Status
+    sent = json.loads(spy.bodies("POST", "/v1/surfaces")[0].decode("utf-8"))
+    assert len(sent["normals"]) == len(sent["vertices"])
+    spy.close()
+    refused = settle(sender(Mesh=_Point()), 2)
+    assert "must be a mesh or a surface" in refused.said("error")[0]
+
+
+class _Point(Rhino.Geometry.GeometryBase):
+    def DataCRC(self, start):
+        return 1
+
+    def Duplicate(self):
+        return self
+
+
+def sliders_send_settings_only():
+    spy = world.Spy(PORT)
+    send = sender(Port=spy.port, Mesh=world.tube(waist=0.5))
+    settle(send, 2)
+    first = send.Job
+    send.set(Panels=json.dumps({"panels": {"sizes": 3}, "support": False}))
+    assert send.Job == first, "the last good job is held while a new one runs"
+    settle(send, 4)
+    assert send.Job != first and send.solved == 4
+    send.set(Pattern=json.dumps({"pattern": {"around": 18}}))
+    settle(send, 6)
+    assert spy.count("POST", "/v1/surfaces") == 1, "the mesh was sent again"
+    bodies = spy.bodies("POST", "/v1/jobs")
+    assert len(bodies) == 3 and max(len(body) for body in bodies) < 400
+    assert json.loads(bodies[1].decode("utf-8"))["panels"] == {"sizes": 3}
+    moved = world.tube(waist=0.45)
+    send.set(Mesh=moved)
+    settle(send, 8)
+    assert spy.count("POST", "/v1/surfaces") == 2
+    spy.close()
+
+
+def modes_reach_the_server():
+    spy = world.Spy(PORT)
+    for mode, expected in (
+        ("straight", {"mode": "straight"}),
+        ("isometric", {"mode": "isometric"}),
+        ("isometric optimal", {"mode": "isometric", "spread": "optimal"}),
+    ):
+        settle(sender(Port=spy.port, Mode=mode), 2)
+        assert json.loads(spy.bodies("POST", "/v1/jobs")[-1].decode("utf-8"))["boundary"] == expected
+    spy.close()
+    assert "no angles came" in sender(Mode="angles").said("error")[0]
+    assert "straight, angles" in sender(Mode="bent").said("error")[0]
+    assert "of that name" in sender(Angles="60").said("error")[0]
+    assert "of that name" in sender(Pattern=json.dumps({"panels": {}})).said("error")[0]
+
+
+def a_list_of_meshes_runs_side_by_side():
+    send = Component("Send")
+    jobs = []
+    for number, waist in ((1, 0.3), (2, 0.6)):
+        send.RunCount = number
+        send.set(Mesh=world.tube(waist=waist), Pattern=SMALL, Run=True, Port=PORT)
+    slots = [send.scope["scriptcontext"].sticky["hexwrap/%s/%d" % (send.InstanceGuid, n)] for n in (1, 2)]
+    pump([send], lambda: all(slot["result"] for slot in slots))
+    for number, waist in ((1, 0.3), (2, 0.6)):
+        send.RunCount = number
+        jobs.append(send.set(Mesh=world.tube(waist=waist)).Job)
+    assert jobs[0] and jobs[1] and jobs[0] != jobs[1]
+    assert not any(slot["busy"] for slot in slots)
+
+
+# --- stopping --------------------------------------------------------------------------------------------
+
+
+def newer_sliders_cancel_older_requests():
+    send = busy_sender()
+    until_running(send)
+    old = running()[0]["id"]
+    for kind in ("hex", "quad", "triangle"):
+        send.set(Pattern=json.dumps({"pattern": {"around": 17, "kind": kind}}))
+    solved = send.solved
+    settle(send, solved + 1)
+    pump([send], lambda: world.ask(PORT, "GET", "/v1/jobs/" + old)[1].get("status") in ("cancelled", 404))
+    assert send.solved == solved + 1, "superseded requests must not make the canvas solve"
+    collect = collected("Collect", Job=send.Job)
+    assert set(len(panel.points) for panel in collect.Panels.flat()) == set([4]), "not the newest request"
+
+
+def run_off_cancels_on_the_server():
+    send = done()
+    good = send.Job
+    send.set(Pattern=LARGE)
+    until_running(send)
+    job = running()[0]["id"]
+    start = time.time()
+    send.set(Run=False)
+    assert send.Message == "Run is off" and send.Job == good
+    pump([send], lambda: not running(), 5)
+    assert time.time() - start < 4
+    assert world.ask(PORT, "GET", "/v1/jobs/" + job)[1]["status"] in ("cancelled", 404)
+    solved = send.solved
+    linger(send)
+    assert send.solved == solved
+
+
+def linger(component, seconds=0.7):
+    end = time.time() + seconds
+    pump([component], lambda: time.time() > end)
+
+
+def escape_cancels_on_the_server():
+    for press in (hold_escape, tap_escape):
+        send = busy_sender()
+        until_running(send)
+        press(send)
+        pump([send], lambda: not running(), 5)
+        assert send.Message == "cancelled"
+        send.solve()  # something else on the canvas: the same request does not start again by itself
+        linger(send)
+        assert not running() and send.Message == "cancelled"
+        assert "Toggle Run" in send.said("remark")[0]
+        send.set(Run=False)
+        send.set(Run=True, Pattern=SMALL)
+        settle(send, send.solved + 1)
+        assert send.Job and send.Message == "done"
+
+
+def hold_escape(send):
+    Grasshopper.GH_Document.escape_is_down = True
+    pump([send], lambda: send.Message == "cancelled", 5)
+    Grasshopper.GH_Document.escape_is_down = False
+
+
+def tap_escape(send):
+    Rhino.RhinoApp.EscapeKeyPressed.fire()
+
+
+def deleted_components_cancel_their_job():
+    send = busy_sender()
+    until_running(send)
+    send.document = None
+    pump([send], lambda: not running(), 5)
+    assert send.solved == 1
+
+
+def time_out():
+    send = settle(busy_sender(TimeOut=0.5), 2)
+    assert "TimeOut" in send.said("error")[0] and send.Job is None
+    pump([send], lambda: not running(), 5)
+
+
+def slow_jobs_do_not_freeze_the_canvas():
+    messages = set()
+    send = sender(
+        Pattern=json.dumps({"pattern": {"around": 150}}), Panels=json.dumps({"panels": {"sizes": 7}})
+    )
+
+    def finished():
+        messages.add(send.Message)
+        return send.solved == 2
+
+    pump([send], finished, 60)  # pump refuses whatever holds the canvas for half a second
+    assert send.Job and any("%" in text for text in messages), messages
+    assert send.longest < 0.5
+
+
+# --- refusals --------------------------------------------------------------------------------------------
+
+
+def wrong_meshes_come_with_their_faults():
+    good = world.tube()
+    cup = settle(sender(Mesh=world.with_lid(good)), 2)
+    assert len(cup.said("error")) == 1 and "loop" in cup.said("error")[0], cup.messages
+    assert cup.Job is None and cup.Message == "failed"
+    fin, edge = world.with_fin(good)
+    send = settle(sender(Mesh=fin), 2)
+    assert len(send.said("error")) == 1
+    ends = [sorted((line.From.xyz(), line.To.xyz())) for line in send.FaultEdges]
+    assert sorted(list(p) for p in edge) in ends, (edge, ends, send.messages)
+    settle(send.set(Mesh=good), 4)  # repaired: everything is well again
+    assert send.Job and send.FaultEdges == [] and send.Faults == [] and not send.messages
+
+
+def refusals_keep_the_last_good_result():
+    send = done()
+    good = send.Job
+    settle(send.set(Pattern=json.dumps({"pattern": {"around": 1000000}})), 4)
+    assert len(send.said("error")) == 1 and send.Job == good
+    settle(send.set(Pattern=json.dumps({"pattern": {"sides": 7}})), 6)
+    assert "sides" in send.said("error")[0]
+
+
+def unbalanced_angles_are_refused_with_figures():
+    corner = [[2.75, 0.0, 0.0]]
+    angles = {"mode": "angles", "angle_unit": "deg", "angles": [{"point": p, "angle": 240.0} for p in corner]}
+    send = settle(sender(Angles=json.dumps({"boundary": angles})), 2)
+    assert len(send.said("error")) == 1
+    assert send.scope["slot"]["error"].problem["type"].endswith("gauss-bonnet")
+
+
+def wrong_jobs_are_refused():
+    for name in ("Collect", "Domain", "Support"):
+        made = settle(Component(name).set(Job="tower"), 2)
+        assert "output Job of the component Send" in made.said("error")[0]
+        made = settle(Component(name).set(Job="http://127.0.0.1:%d/v1/jobs/unheard" % PORT), 2)
+        assert len(made.said("error")) == 1 and "unheard" in made.said("error")[0]
+
+
+def jobs_without_panels_are_told():
+    send = done(Panels=json.dumps({"panels": None}))
+    collect = collected("Collect", Job=send.Job)
+    assert "no panels" in collect.said("error")[0] and collect.Panels is None
+    support = collected("Support", Job=send.Job)
+    assert "BeamDepth" in support.said("error")[0]
+
+
+# --- looking ---------------------------------------------------------------------------------------------
+
+
+def domain_of_a_cylinder():
+    send = done()
+    domain = collected("Domain", Job=send.Job)
+    assert domain.Summary.startswith("cylinder") and domain.Message == "unrolled"
+    assert domain.Corners == [] and domain.CornerAngles == []
+    around = float(domain.Summary.split()[-1])
+    for loop in domain.Boundary:
+        points = loop.xyz()
+        assert len(points) == 25, "24 edges once around"
+        assert abs(points[0][0] - points[-1][0]) - around < 1e-5 * around
+        assert max(p[1] for p in points) - min(p[1] for p in points) < 1e-8 * around, "straight boundaries"
+    assert len(domain.Pattern.flat()) == len(collected("Collect", Job=send.Job).Panels.flat())
+    for cell in domain.Pattern.flat():
+        width = max(p.X for p in cell.points) - min(p.X for p in cell.points)
+        assert cell.IsClosed and width < 0.2 * around, "a cell across the cut stays in one piece"
+    assert domain.Cut and all(len(line.points) == 2 for line in domain.Cut)
+
+
+def domain_with_corners():
+    rim = [Point3d(2.75, 0.0, 0.0), Point3d(-2.75, 0.0, 0.0)]
+    angles = Component("BoundaryAngles").set(Points=rim, Angle=[240.0, 120.0], Mesh=world.tube())
+    send = done(Angles=angles.Angles, Pattern=None)
+    domain = collected("Domain", Job=send.Job)
+    assert sorted(round(a, 6) for a in domain.CornerAngles) == [120.0, 240.0]
+    assert len(domain.Corners) == 2 and all(p.Z == 0.0 for p in domain.Corners)
+
+
+def curves_are_lifted_across_the_cut():
+    send = done()
+    domain = collected("Domain", Job=send.Job)
+    low, high = domain.Boundary
+    y = 0.5 * (low.points[0].Y + high.points[0].Y)
+    around = float(domain.Summary.split()[-1])
+    left = min(p.X for p in low.points)
+    ring = array([(left - 0.4 * around, y, 0.0), (left + 0.6 * around, y, 0.0)])
+    circle = CircleCurve(left + 0.3 * around, y, 0.02 * around)
+    outside = array([(left + 0.5 * around, y, 0.0), (left + 0.5 * around, y + 10 * around, 0.0)])
+    lift = collected("Lift", Job=send.Job, Curves=[ring, circle, outside], Steps=60)
+    (once,) = lift.Lifted.branches[(0,)]
+    assert len(once.points) == 61
+    assert once.points[0].DistanceTo(once.points[-1]) < 1e-6, "a full turn closes up on the surface"
+    for p in once.points:
+        assert 1.0 < math.hypot(p.X, p.Y) < 3.0
+    (loop,) = lift.Lifted.branches[(1,)]
+    assert loop.IsClosed and len(loop.points) == 61
+    assert len(lift.Outside) > 0 and "outside" in lift.said("warning")[0]
+    assert lift.Normals.flat()[0].X != 0.0
+    assert lift.solve().Lifted.branches and not lift.document.scheduled
+
+
+def a_decimal_comma_changes_nothing():
+    set_german()
+    try:
+        assert abs(float("0.5") - 0.5) == 0
+        spy = world.Spy(PORT)
+        panels = Component("Panels").set(Joint=0.015, Increment=0.0005)
+        angles = Component("BoundaryAngles").set(Points=[Point3d(0.125, -2.5, 0.0)], Angle=[0.5], Unit="60")
+        assert json.loads(angles.Angles)["boundary"]["angles"][0] == {
+            "point": [0.125, -2.5, 0.0],
+            "angle": 30.0,
+        }
+        send = settle(sender(Port=spy.port, Panels=panels.Panels, Mesh=world.tube(waist=0.62)), 2)
+        assert send.Job and not send.messages, send.messages
+        surface = json.loads(spy.bodies("POST", "/v1/surfaces")[0].decode("utf-8"))
+        assert [tuple(p) for p in surface["vertices"]] == world.tube(waist=0.62).Vertices.points
+        assert json.loads(spy.bodies("POST", "/v1/jobs")[0].decode("utf-8"))["panels"]["joint"] == 0.015
+        collect = collected("Collect", Job=send.Job)
+        assert "." in collect.Report and "," not in collect.Report.splitlines()[1].replace(", ", " ")
+        spy.close()
+    finally:
+        set_plain()
+
+
+def set_german():
+    try:
+        from java.util import Locale
+
+        Locale.setDefault(Locale.GERMANY)
+    except ImportError:
+        import locale
+
+        for name in ("de_DE.UTF-8", "de_DE.utf8", "German_Germany.1252"):
+            try:
+                locale.setlocale(locale.LC_ALL, name)
+                return
+            except locale.Error:
+                pass
+
+
+def set_plain():
+    try:
+        from java.util import Locale
+
+        Locale.setDefault(Locale.ROOT)
+    except ImportError:
+        import locale
+
+        locale.setlocale(locale.LC_ALL, "C")
+
+
+world.run([
+    send_and_collect,
+    surfaces_are_meshed_as_rhino_does,
+    sliders_send_settings_only,
+    modes_reach_the_server,
+    a_list_of_meshes_runs_side_by_side,
+    newer_sliders_cancel_older_requests,
+    run_off_cancels_on_the_server,
+    escape_cancels_on_the_server,
+    deleted_components_cancel_their_job,
+    time_out,
+    slow_jobs_do_not_freeze_the_canvas,
+    wrong_meshes_come_with_their_faults,
+    refusals_keep_the_last_good_result,
+    unbalanced_angles_are_refused_with_figures,
+    wrong_jobs_are_refused,
+    jobs_without_panels_are_told,
+    domain_of_a_cylinder,
+    domain_with_corners,
+    curves_are_lifted_across_the_cut,
+    a_decimal_comma_changes_nothing,
+])  # fmt: skip
