@@ -8,8 +8,10 @@ import scriptcontext
 
 try:
     import urllib2 as url_library  # novermin
+    from httplib import HTTPException  # novermin
 except ImportError:
     import urllib.request as url_library
+    from http.client import HTTPException
 
 TEXT = type(u"")
 QUICK = 5.0  # seconds for calls that only ask
@@ -52,8 +54,9 @@ def call(server, method, path, body=None, kind="application/json", timeout=QUICK
     if body is not None:
         headers["Content-Type"] = kind
     if TOKENS.get(server):
-        headers["Authorization"] = "Bearer " + TOKENS[server]
-    request = url_library.Request(server + path, body, headers)
+        headers["Authorization"] = str("Bearer " + TOKENS[server])
+    # Python 2 must not mix its two kinds of text here, or it cannot join the head with the bytes of the body.
+    request = url_library.Request(str(server + path), body, headers)
     request.get_method = lambda: method
     # The server is on this machine or named by its number: a proxy could only be in the way.
     opener = url_library.build_opener(url_library.ProxyHandler({}))
@@ -69,7 +72,7 @@ def call(server, method, path, body=None, kind="application/json", timeout=QUICK
         finally:
             error.close()
         raise refusal(error.code, content)
-    except Exception as error:  # refused, reset, timed out, cut short: each Python names them differently
+    except (EnvironmentError, socket.error, HTTPException) as error:  # refused, reset, timed out, cut short
         if isinstance(error, socket.timeout) or "timed out" in TEXT(error):
             raise Offline("The server at %s did not answer within %g seconds." % (server, timeout))
         raise offline(server)

@@ -85,7 +85,7 @@ def ask(port, method, path, body=None):
     """(status, document) straight from a server, past the components."""
     connection = HTTPConnection("127.0.0.1", port, timeout=20)
     try:
-        connection.request(method, path, body)
+        connection.request(method, str(path), body)
         answer = connection.getresponse()
         content = answer.read()
         return answer.status, json.loads(content.decode("utf-8")) if content else None
