@@ -378,7 +378,7 @@ def curves_are_lifted_across_the_cut():
     domain = collected("Domain", Job=send.Job)
     low, high = domain.Boundary
     y = 0.5 * (low.points[0].Y + high.points[0].Y)
-    around = float(domain.Summary.split()[-1])
+    around = low.points[-1].X - low.points[0].X
     left = min(p.X for p in low.points)
     ring = array([(left - 0.4 * around, y, 0.0), (left + 0.6 * around, y, 0.0)])
     circle = CircleCurve(left + 0.3 * around, y, 0.02 * around)
