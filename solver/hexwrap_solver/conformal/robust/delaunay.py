@@ -22,50 +22,53 @@ from hexwrap_solver.arrays import Complexes, Floats, Ints
 from hexwrap_solver.conformal.robust.mirror import MirrorMesh
 from hexwrap_solver.errors import ConvergenceError
 
-#: An edge whose cosines add up to more than −TOLERANCE passes: rounding must not flip to and fro.
-TOLERANCE = 1e-11
+#: An edge passes whose cosines add up to more than −TOLERANCE times the terms that they are made of: rounding
+#: must not flip it to and fro.
+TOLERANCE = 2e-14
 #: Rounds of independent flips before something must be wrong; meshes seen so far need some dozens.
-MAX_ROUNDS = 20_000
+MAX_ROUNDS = 4_000
 
 
-def cosine_sums(mesh: MirrorMesh, edges: Ints, length: Floats) -> Floats:
-    """(k,) sum of the cosines of the two angles opposite to each edge, in log-lengths ``length`` (e,)."""
+def cosine_sums(mesh: MirrorMesh, edges: Ints, length: Floats) -> tuple[Floats, Floats]:
+    """(k,) sum of the cosines of the two angles opposite to each edge, in log-lengths ``length`` (e,), and
+    (k,) the sum of the absolute values of all terms that it was computed from."""
     crossing = mesh.crossing[edges]
-    total = np.zeros(len(edges))
+    plus, minus = np.zeros(len(edges)), np.zeros(len(edges))
     plain = edges[~crossing]
-    total[~crossing] = _opposite_cosine(mesh, 2 * plain, length) + _opposite_cosine(
-        mesh, 2 * plain + 1, length
-    )
+    one, other = _opposite_cosine(mesh, 2 * plain, length), _opposite_cosine(mesh, 2 * plain + 1, length)
+    plus[~crossing], minus[~crossing] = one[0] + other[0], one[1] + other[1]
     right = mesh.next[2 * edges[crossing]]
     left = mesh.prev[right]
     middle = length[edges[crossing]]
-    total[crossing] = _cell_cosine(length[left >> 1], middle, mesh.cross_length(left, length)) + _cell_cosine(
-        length[right >> 1], middle, mesh.cross_length(mesh.next[right], length)
-    )
-    return total
+    one = _cell_cosine(length[left >> 1], middle, mesh.cross_length(left, length))
+    other = _cell_cosine(length[right >> 1], middle, mesh.cross_length(mesh.next[right], length))
+    plus[crossing], minus[crossing] = one[0] + other[0], one[1] + other[1]
+    return plus - minus, plus + minus
 
 
-def _opposite_cosine(mesh: MirrorMesh, h: Ints, length: Floats) -> Floats:
-    """Cosine of the angle that half-edges are seen under, in their triangle or cell."""
-    result = np.zeros(len(h))
+def _opposite_cosine(mesh: MirrorMesh, h: Ints, length: Floats) -> tuple[Floats, Floats]:
+    """Cosine of the angle that half-edges are seen under in their triangle or cell, as minuend and
+    subtrahend."""
+    plus, minus = np.zeros(len(h)), np.zeros(len(h))
     outer = mesh.outer[h]
     inner = h[~outer]
     e, a, b = length[inner >> 1], length[mesh.next[inner] >> 1], length[mesh.prev[inner] >> 1]
-    result[~outer] = np.cosh(a - b) - 0.5 * np.exp(2 * e - a - b)
+    plus[~outer], minus[~outer] = np.cosh(a - b), 0.5 * np.exp(2 * e - a - b)
     cells = h[outer]
     m, n = mesh.cross_length(cells, length), mesh.cross_length(mesh.next[cells], length)
     diagonal = 0.5 * np.logaddexp(2 * length[cells >> 1], m + n)
-    result[outer] = 0.5 * (np.exp(m - diagonal) + np.exp(n - diagonal))
-    return result
+    plus[outer] = 0.5 * (np.exp(m - diagonal) + np.exp(n - diagonal))
+    return plus, minus
 
 
-def _cell_cosine(side: Floats, middle: Floats, far: Floats) -> Floats:
-    """Cosine of the angle that a crossing edge is seen under from across a cell: ``side`` is the cell's front
-    edge, ``far`` its other crossing edge."""
+def _cell_cosine(side: Floats, middle: Floats, far: Floats) -> tuple[Floats, Floats]:
+    """Cosine of the angle that a crossing edge is seen under from across a cell, as minuend and subtrahend.
+
+    side: the cell's front edge. far: its other crossing edge.
+    """
     diagonal = 0.5 * np.logaddexp(2 * side, middle + far)
-    return np.exp(side - diagonal) + 0.5 * (np.exp(middle + far) - np.exp(2 * middle)) * np.exp(
-        -side - diagonal
-    )
+    both = side + diagonal
+    return np.exp(side - diagonal) + 0.5 * np.exp(middle + far - both), 0.5 * np.exp(2 * middle - both)
 
 
 def make_delaunay(mesh: MirrorMesh, u: Floats, *, euclidean: bool = False) -> int:
@@ -79,7 +82,8 @@ def make_delaunay(mesh: MirrorMesh, u: Floats, *, euclidean: bool = False) -> in
     edges = np.arange(len(length))
     total = 0
     for _ in range(MAX_ROUNDS):
-        bad = edges[cosine_sums(mesh, edges, length) < -TOLERANCE]
+        cosines, terms = cosine_sums(mesh, edges, length)
+        bad = edges[cosines < -TOLERANCE * (1 + terms)]
         if not len(bad):
             return total
         now, claims = _independent(mesh, bad)
@@ -173,7 +177,7 @@ def _flip_down(mesh: MirrorMesh, edges: Ints, length: Floats, euclidean: bool) -
     e, b, a = length[edges], length[h1 >> 1], length[h2 >> 1]
     if euclidean:
         slope = (np.exp(m_j - e) - np.exp(m_i - e)) / 2
-        along = np.sqrt((1 - slope) * (1 + slope))
+        along = _along(slope)
         apex = _apex(e, a, b)
         length[edges] = e + np.log(np.exp(m_i - e) + 2 * (apex.real * slope + apex.imag * along))
     else:
@@ -202,7 +206,7 @@ def _flip_up(mesh: MirrorMesh, edges: Ints, length: Floats, euclidean: bool) -> 
     a, b = length[left >> 1], length[right >> 1]
     if euclidean:
         fall, rise = (np.exp(m - a) - np.exp(m_i - a)) / 2, (np.exp(m_j - b) - np.exp(m - b)) / 2
-        along = np.sqrt((1 - fall) * (1 + fall)) + np.exp(b - a) * np.sqrt((1 - rise) * (1 + rise))
+        along = _along(fall) + np.exp(b - a) * _along(rise)
         length[edges] = a + np.log(np.hypot(along, fall - np.exp(b - a) * rise))
     else:
         length[edges] = (
@@ -228,3 +232,8 @@ def _apex(base: Floats, left: Floats, right: Floats) -> Complexes:
     small, mid, big = np.sort(np.stack([one, a, b]), axis=0)  # Kahan: subtract close lengths first
     square = (big + (mid + small)) * (small - (big - mid)) * (small + (big - mid)) * (big + (mid - small))
     return np.asarray(x + 0.5j * np.sqrt(np.maximum(square, 0.0)))
+
+
+def _along(slope: Floats) -> Floats:
+    """The part of a unit edge that runs along the mirror line, from the part that runs away from it."""
+    return np.asarray(np.sqrt(np.maximum((1 - slope) * (1 + slope), 0.0)))

@@ -25,9 +25,14 @@ class Development:
     gap: float
 
 
-def develop(mesh: MirrorMesh, metric: Metric, cone_angle: float, root: int) -> Development:
-    """Directions over a tree of half-edges, then positions over a tree of vertices from ``root``."""
+def develop(mesh: MirrorMesh, metric: Metric, cone_angle: float) -> Development:
+    """Directions over a tree of half-edges, then positions over a tree of vertices.
+
+    The tree starts where edges are shortest: the rounding of a place is then in proportion to its distance
+    from there, and tiny triangles keep their digits.
+    """
     live = np.flatnonzero(~np.repeat(mesh.crossing, 2))
+    root = int(mesh.origin[live[np.argmin(metric.length[live >> 1])]])
     step = _directions(mesh, metric, cone_angle, live) * np.exp(metric.length[live >> 1])
     tail, head = mesh.origin[live], mesh.origin[live ^ 1]
     turn = mesh.turn[live]
@@ -44,15 +49,25 @@ def develop(mesh: MirrorMesh, metric: Metric, cone_angle: float, root: int) -> D
     uv = _accumulate(uv, up, root)
 
     power = lift[tail] + turn - lift[head]
-    once = power == 1
     rotation = np.exp(1j * cone_angle)
-    translation = complex((uv[tail[once]] + step[once] - rotation * uv[head[once]]).mean())
+    translation = _translation(uv, step, tail, head, power, rotation)
     near = np.flatnonzero(np.abs(power) <= 1)
     forward = power[near] >= 0  # compare with g or with nothing; backward edges are the twins of forward ones
     near = near[forward]
     copy = np.where(power[near] == 1, rotation * uv[head[near]] + translation, uv[head[near]])
     gap = float(np.abs(uv[tail[near]] + step[near] - copy).max())
     return Development(uv, lift, translation, gap)
+
+
+def _translation(
+    uv: Complexes, step: Complexes, tail: Ints, head: Ints, power: Ints, rotation: complex
+) -> complex:
+    """What closes the edges that go around once, weighted by the digits that each of them has for it."""
+    once = power == 1
+    one, other = uv[tail[once]] + step[once], rotation * uv[head[once]]
+    size = np.abs(uv[tail[once]]) + np.abs(step[once]) + np.abs(other)
+    weight = (size.min() / size) ** 2
+    return complex((weight * (one - other)).sum() / weight.sum())
 
 
 def _directions(mesh: MirrorMesh, metric: Metric, cone_angle: float, live: Ints) -> Complexes:

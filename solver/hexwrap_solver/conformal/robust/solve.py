@@ -18,7 +18,13 @@ from hexwrap_solver.conformal.robust.descent import ACCEPTED, FlipEnergy, descen
 from hexwrap_solver.conformal.robust.develop import develop
 from hexwrap_solver.conformal.robust.metric import angle_sums
 from hexwrap_solver.conformal.robust.mirror import mirror_mesh
-from hexwrap_solver.conformal.robust.refine import Problem, collapsing, split_edges, split_places
+from hexwrap_solver.conformal.robust.refine import (
+    Problem,
+    collapsing,
+    split_edges,
+    split_places,
+    with_neighbours,
+)
 from hexwrap_solver.conformal.robust.straight import straighten
 from hexwrap_solver.conformal.types import ConformalMap, Deck, Targets
 from hexwrap_solver.errors import ConvergenceError
@@ -81,8 +87,9 @@ def _attempt(problem: Problem, progress: Progress) -> ConformalMap:
     """The map of the vertices, with the triangles as they are, whether they turn over or not."""
     surface, targets = problem.surface, problem.targets
     turn = _turns(surface)
-    lengths = opposite_lengths(surface.vertices, surface.faces)
-    mesh = mirror_mesh(surface, np.log(lengths)[[2, 0, 1]].T.ravel(), turn.ravel())
+    log_length = np.log(opposite_lengths(surface.vertices, surface.faces))[[2, 0, 1]].T.ravel()
+    unit = float(np.median(log_length))  # logarithms near 0 have the most digits behind the point
+    mesh = mirror_mesh(surface, log_length - unit, turn.ravel())
     flips = make_delaunay(mesh, np.zeros(mesh.n), euclidean=True)
     descent = descend(FlipEnergy(Energy(surface, targets), mesh), problem.u, progress)
     if not descent.residual <= ACCEPTED:
@@ -95,8 +102,10 @@ def _attempt(problem: Problem, progress: Progress) -> ConformalMap:
     known = sums if (targets.tie == 0).any() else targets.angle
     angle = cone_angle_of(targets, known, surface)
     foot = int(surface.loops[0][0])
-    laid = develop(mesh, descent.metric, angle, foot)
-    uv, deck, circumference = normalise(laid.uv, Deck(angle, laid.translation), foot, surface.loops)
+    laid = develop(mesh, descent.metric, angle)
+    uv, deck, circumference = normalise(
+        laid.uv * np.exp(unit), Deck(angle, laid.translation * np.exp(unit)), foot, surface.loops
+    )
     lift = laid.lift[surface.faces]
     sheet = lift[:, :1] - lift
     sheet[:, 1] += turn[:, 0]
@@ -112,7 +121,7 @@ def _attempt(problem: Problem, progress: Progress) -> ConformalMap:
         iterations=descent.iterations,
         residual=descent.residual,
         flips=flips + descent.flips,
-        closing_error=laid.gap / circumference,
+        closing_error=laid.gap * float(np.exp(unit)) / circumference,
     )
 
 
