@@ -23,7 +23,6 @@ from hexwrap_solver.conformal.robust.refine import (
     collapsing,
     split_edges,
     split_places,
-    with_neighbours,
 )
 from hexwrap_solver.conformal.robust.straight import straighten
 from hexwrap_solver.conformal.types import ConformalMap, Deck, Targets
