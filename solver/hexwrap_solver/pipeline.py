@@ -14,7 +14,7 @@ from typing import Any, Protocol, TypeVar
 from hexwrap_solver.arrays import Progress, no_progress
 from hexwrap_solver.conformal import conformal_map
 from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap
-from hexwrap_solver.panels import fit_panels, measure, quantize
+from hexwrap_solver.panels import fit_panels, make_components, measure, quantize, support
 from hexwrap_solver.panels.fit import FitKey
 from hexwrap_solver.panels.types import Components, Panels, PanelSettings, Quality, Support
 from hexwrap_solver.pattern import lay_pattern
@@ -81,4 +81,10 @@ def solve(
     # Two stages, so that a change of the size classes alone reuses the poses and limits.
     fitted = run("fit", FitKey.of(panels), lambda progress: fit_panels(cmap, laid, panels, progress))
     made = run("panels", panels, lambda progress: quantize(fitted, panels))
-    return Solution(cmap, run("quality", None, lambda progress: measure(cmap, laid, made)), laid, made)
+    quality = run("quality", None, lambda progress: measure(cmap, laid, made, progress))
+    wanted = panels.components
+    if wanted is None:
+        return Solution(cmap, quality, laid, made)
+    parts = run("components", wanted, lambda progress: make_components(made, wanted))
+    frame = run("support", wanted.depth, lambda progress: support(laid, wanted.depth, progress))
+    return Solution(cmap, quality, laid, made, parts, frame)

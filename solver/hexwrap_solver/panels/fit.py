@@ -10,6 +10,7 @@ from hexwrap_solver.arrays import Bools, Floats, Ints, Progress, Ragged, no_prog
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.errors import PanelsError
 from hexwrap_solver.panels import limits
+from hexwrap_solver.panels.best import jointly_largest
 from hexwrap_solver.panels.halfedges import HalfEdges, half_edges
 from hexwrap_solver.panels.polygons import fan_areas, mean_edges
 from hexwrap_solver.panels.regular import Poses, nearest_regular, nearest_regular_in_plane
@@ -67,7 +68,7 @@ def fit_panels(
     normal[regular] = poses.normal
     planes = separating_planes(pattern, edges, normal, settings.joint)
     progress(0.4, "limiting sizes")
-    length, center = _limits(poses, points, planes, regular, pattern, settings)
+    length, center = _limits(poses, points, planes, regular, pattern, edges, settings, progress)
     _require_room(length, np.flatnonzero(regular), settings.joint)
     shapes, shape_center, kept = _trimmed(cells, normal, planes, edges, ~regular)
     face = np.flatnonzero(regular | kept)
@@ -113,7 +114,9 @@ def _limits(
     planes: Separation,
     regular: Bools,
     pattern: Pattern,
+    edges: HalfEdges,
     settings: PanelSettings,
+    progress: Progress,
 ) -> tuple[Floats, Floats]:
     """Greatest length of each regular panel, and its centre."""
     p = points.shape[1]
@@ -124,7 +127,19 @@ def _limits(
         return edge.mean(axis=1), poses.center
     if settings.target == "shortest":
         return limits.shortest_edge(poses, points, direction, offset)
+    if settings.target == "best":
+        partner = _partners(at.ravel(), edges)
+        return jointly_largest(poses, direction, offset, partner, settings.joint, progress)
     return limits.inscribed(poses, direction, offset)
+
+
+def _partners(at: Ints, edges: HalfEdges) -> Ints:
+    """Positions of the twins among the half-edges ``at`` of the regular cells, −1 where they are not among
+    them."""
+    position = np.full(len(edges.twin), -1, dtype=np.int64)
+    position[at] = np.arange(len(at))
+    twin = edges.twin[at]
+    return np.where(twin >= 0, position[twin], -1)
 
 
 def _require_room(length: Floats, cell: Ints, joint: float) -> None:

@@ -17,6 +17,9 @@ from hexwrap_solver.panels.regular import Poses
 #: Multipliers of a dual vertex count as non-negative down to this (their sum is of order 1).
 DUAL_TOLERANCE = 1e-12
 
+#: A panel found this much shorter (relatively) than the programme allows is looked for again.
+SHORTFALL = 1e-9
+
 
 def reach(poses: Poses, direction: Floats) -> Floats:
     """(q, k) farthest extent, along each direction (q, k, 3), of the polygons of edge 1 around 0; k =
@@ -45,9 +48,27 @@ def inscribed(poses: Poses, direction: Floats, offset: Floats) -> tuple[Floats, 
         best = np.where(better, value, best)
         chosen[better] = triple
     shift = _touching_centre(flat, h, room, chosen)
+    short = np.flatnonzero(_room_length(shift, flat, h, room) < best - SHORTFALL * np.abs(best))
+    shift[short] = _best_vertex(flat[short], h[short], room[short], shift[short])
     center = poses.center + np.einsum("qe,qed->qd", shift, axes)
     # The length is taken from the centre found, so that rounding in the centre cannot break a constraint.
     return length_at(center, direction, offset, h), center
+
+
+def _best_vertex(flat: Floats, h: Floats, room: Floats, shift: Floats) -> Floats:
+    """The same optimum by trying every triple's touching point: for cells with nearly parallel sides, whose
+    dual vertices rounding cannot tell apart."""
+    length = _room_length(shift, flat, h, room)
+    for triple in combinations(range(flat.shape[1]), 3):
+        tried = _touching_centre(flat, h, room, np.tile(triple, (len(flat), 1)))
+        reached = _room_length(tried, flat, h, room)
+        better = reached > length
+        shift[better], length[better] = tried[better], reached[better]
+    return shift
+
+
+def _room_length(shift: Floats, flat: Floats, h: Floats, room: Floats) -> Floats:
+    return np.asarray(((room - np.einsum("qke,qe->qk", flat, shift)) / h).min(axis=1))
 
 
 def _dual_value(s: Floats, h: Floats, room: Floats) -> Floats:

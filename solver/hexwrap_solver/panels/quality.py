@@ -8,6 +8,7 @@ import numpy as np
 
 from hexwrap_solver.arrays import Floats, Progress, Ragged, no_progress
 from hexwrap_solver.conformal.types import ConformalMap
+from hexwrap_solver.panels.congruence import congruence_classes
 from hexwrap_solver.panels.gaps import gaps
 from hexwrap_solver.panels.halfedges import HalfEdges, half_edges
 from hexwrap_solver.panels.overlap import overlapping_pairs
@@ -58,6 +59,7 @@ def measure(
         gap_normal=between.normal,
         kink=between.kink,
         convex=row_maxima(angle, polygons.offsets) <= np.pi + 1e-9,
+        congruence=congruence_classes(polygons, panels.normal),
         overlaps=_count_overlaps(pattern, edges, panels),
         coverage=_coverage(pattern, panels),
     )

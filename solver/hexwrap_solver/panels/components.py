@@ -1,0 +1,94 @@
+"""What each panel is built from (paper, Figure 9): inset outline, plane with axes, closed solid."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hexwrap_solver.arrays import Floats, Ints, Ragged
+from hexwrap_solver.errors import PanelsError
+from hexwrap_solver.panels.polygons import edge_vectors, interior_angles, row_minima
+from hexwrap_solver.panels.types import Components, ComponentSettings, Panels
+
+
+def make_components(panels: Panels, settings: ComponentSettings) -> Components:
+    """One component per panel. Raises PanelsError where the inset leaves nothing of a whole panel.
+
+    Trimmed panels too thin for the inset get half of what they have room for.
+    """
+    outline = _inset(panels, settings.inset)
+    z_axis = panels.normal
+    first = edge_vectors(panels.polygons)[panels.polygons.offsets[:-1]]
+    x_axis = first - np.einsum("qd,qd->q", first, z_axis)[:, None] * z_axis
+    x_axis /= np.linalg.norm(x_axis, axis=1)[:, None]
+    solid = _solids(outline, z_axis, settings.thickness) if settings.thickness > 0 else (None, None)
+    return Components(outline, panels.center, x_axis, np.cross(z_axis, x_axis), z_axis, *solid)
+
+
+def _inset(panels: Panels, inset: float) -> Ragged:
+    """Outlines moved inwards by the same width on every edge (mitred corners)."""
+    polygons = panels.polygons
+    row, points = polygons.row, np.asarray(polygons.values, dtype=np.float64)
+    inward = np.cross(panels.normal[row], edge_vectors(polygons))
+    length = np.linalg.norm(inward, axis=1)
+    inward /= np.where(length > 0, length, 1.0)[:, None]
+    before = np.zeros_like(inward)
+    before[polygons.next()] = inward
+    room = row_minima(np.einsum("hd,hd->h", panels.center[row] - points, inward), polygons.offsets)
+    thin = room <= inset
+    _require_room(panels, thin, inset, room)
+    width = np.where(thin, np.maximum(room, 0.0) / 2, inset)[row, None]
+    # The mitred corner lies at distance ``width`` from both edges' lines: the bisector, scaled.
+    bend = 1 + np.einsum("hd,hd->h", before, inward)[:, None]
+    moved = points + width * (before + inward) / np.maximum(bend, 1e-9)
+    folded = row_minima(
+        np.einsum("hd,hd->h", moved[polygons.next()] - moved, edge_vectors(polygons)), polygons.offsets
+    )
+    # Where a short edge would turn round, the outline shrinks about the centre instead.
+    factor = 1 - width / np.where(room > 0, room, np.inf)[row, None]
+    center = panels.center[row]
+    shrunk = center + factor * (points - center)
+    return Ragged(np.where((folded > 0)[row, None], moved, shrunk), polygons.offsets)
+
+
+def _require_room(panels: Panels, thin: np.ndarray, inset: float, room: Floats) -> None:
+    empty = np.flatnonzero(thin & panels.whole)
+    if len(empty):
+        raise PanelsError(
+            f"An inset of {inset:g} leaves nothing of {len(empty)} panels (the smallest reaches"
+            f" {room[empty].min():g} from its centre); ask for a smaller inset.",
+            field=("panels", "components", "inset"),
+            data={"panels": empty[:100].tolist()},
+        )
+
+
+def _solids(outline: Ragged, normal: Floats, thickness: float) -> tuple[Ragged, Ragged]:
+    """Prisms from the outline outwards: n lower corners, then n upper ones; 4n − 4 triangles each."""
+    count, offsets = outline.lengths, outline.offsets
+    local = np.arange(len(outline.values)) - np.repeat(offsets[:-1], count)
+    n = np.repeat(count, count)
+    at = local + 2 * np.repeat(offsets[:-1], count)
+    vertices = np.zeros((2 * len(outline.values), 3))
+    vertices[at] = outline.values
+    vertices[at + n] = outline.values + thickness * normal[outline.row]
+    following = np.where(local + 1 < n, local + 1, 0)
+    sides = np.stack([local, following, following + n, local, following + n, local + n], axis=1).reshape(
+        -1, 2, 3
+    )
+    apex = _fan_corner(outline, normal)[outline.row]
+    inner = (local != apex) & (following != apex)
+    lower = np.stack([apex, following, local], axis=1)[inner]
+    upper = np.stack([apex + n, local + n, following + n], axis=1)[inner]
+    row = outline.row
+    owner = np.concatenate([np.repeat(row, 2), row[inner], row[inner]])
+    triangles = np.concatenate([sides.reshape(-1, 3), lower, upper])
+    order = np.argsort(owner, kind="stable")
+    face_offsets = np.concatenate([[0], np.cumsum(3 * (4 * count - 4))]).astype(np.int64)
+    return Ragged(vertices, 2 * offsets), Ragged(triangles[order].ravel(), face_offsets)
+
+
+def _fan_corner(outline: Ragged, normal: Floats) -> Ints:
+    """(q,) corner from which the polygon is cut into triangles: the one with the greatest interior angle,
+    so that polygons with one reflex corner are cut rightly, too."""
+    angle = interior_angles(outline, normal)
+    order = np.lexsort((np.arange(len(angle)), -np.round(angle, 9), outline.row))
+    return np.asarray(order[outline.offsets[:-1]] - outline.offsets[:-1])

@@ -1,0 +1,64 @@
+"""Which panels have the same shape: congruent up to rotation, mirror images told apart."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hexwrap_solver.arrays import Floats, Ints, Ragged
+from hexwrap_solver.panels.polygons import edge_lengths, edge_vectors, interior_angles
+
+#: Figures (relative to the mean edge, or radians) that differ by less are the same.
+TOLERANCE = 1e-7
+
+
+def congruence_classes(polygons: Ragged, normal: Floats) -> Ints:
+    """(q,) class of each polygon, numbered by first appearance; normal: (q, 3).
+
+    Edge length, interior angle and twist (signed volume of four successive corners) at every corner, read
+    around the polygon, determine it up to a motion. They are made integers by merging figures closer than the
+    tolerance, and read from the corner at which the sequence is lexicographically least.
+    """
+    unit = float(edge_lengths(polygons).mean()) if len(polygons.values) else 1.0
+    letter = _letters(polygons, normal, unit)
+    key = np.full(polygons.n_rows, -1, dtype=np.int64)
+    used = 0
+    for n in np.unique(polygons.lengths):
+        rows = np.flatnonzero(polygons.lengths == n)
+        words = _least_rotation(letter[polygons.offsets[rows][:, None] + np.arange(n)])
+        _, member = np.unique(words, axis=0, return_inverse=True)
+        key[rows] = used + member.ravel()
+        used = int(key.max()) + 1
+    _, first, member = np.unique(key, return_index=True, return_inverse=True)
+    rank = np.zeros(len(first), dtype=np.int64)
+    rank[np.argsort(first)] = np.arange(len(first))
+    return np.asarray(rank[member])
+
+
+def _letters(polygons: Ragged, normal: Floats, unit: float) -> Ints:
+    """(·,) one integer per corner for its edge length, angle and twist."""
+    following = polygons.next()
+    edge = edge_vectors(polygons) / unit
+    ahead = edge[following]
+    twist = np.einsum("hd,hd->h", np.cross(edge, ahead), ahead[following])
+    figures = [np.linalg.norm(edge, axis=1), interior_angles(polygons, normal), twist]
+    merged = np.stack([_merge(figure) for figure in figures], axis=1)
+    return np.asarray(np.unique(merged, axis=0, return_inverse=True)[1]).ravel().astype(np.int64)
+
+
+def _merge(values: Floats) -> Ints:
+    """Integers in the order of the values; neighbours in that order closer than the tolerance share one."""
+    order = np.argsort(values, kind="stable")
+    label = np.zeros(len(values), dtype=np.int64)
+    label[order[1:]] = np.cumsum(np.diff(values[order]) > TOLERANCE)
+    return label
+
+
+def _least_rotation(words: Ints) -> Ints:
+    """(q, n) words turned to begin where they are lexicographically least."""
+    q, n = words.shape
+    possible = np.ones((q, n), dtype=bool)
+    for step in range(n):
+        letter = np.where(possible, np.roll(words, -step, axis=1), np.iinfo(np.int64).max)
+        possible &= letter == letter.min(axis=1, keepdims=True)
+    start = possible.argmax(axis=1)
+    return np.asarray(words[np.arange(q)[:, None], (start[:, None] + np.arange(n)) % n])

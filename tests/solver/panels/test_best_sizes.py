@@ -1,0 +1,58 @@
+"""All sizes in one programme: an optimum that a general solver confirms, and no overlap."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+from scipy.sparse import csr_array, random_array
+
+from hexwrap_solver.errors import ConvergenceError
+from hexwrap_solver.panels import fit_panels, measure, quantize
+from hexwrap_solver.panels import linear_programme as lp
+from hexwrap_solver.panels.types import PanelSettings
+from tests.solver.panels.cells import catenoid, grid_map, hex_pattern, inverted, quad_pattern, sphere, torus
+
+CHARTS = {
+    "torus": torus,
+    "inverted catenoid": inverted(catenoid, (0.4, 0.2, 4.0)),
+    "inverted sphere": inverted(sphere, (1.8, 0.2, 1.5)),
+}
+
+
+def bounded_programme(seed, rows=80, columns=30):
+    rng = np.random.default_rng(seed)
+    a = random_array((rows, columns), density=0.2, rng=rng, data_sampler=rng.standard_normal).toarray()
+    a = np.concatenate([a, np.eye(columns), -np.eye(columns)])
+    return rng.normal(size=columns), a, rng.uniform(0.5, 2.0, len(a))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_interior_point_agrees_with_a_general_solver(seed):
+    weight, a, b = bounded_programme(seed)
+    points = np.random.default_rng(seed).normal(size=(len(weight), 3))
+    x = lp.maximise(weight, np.zeros(len(weight)), csr_array(a), b, np.zeros(len(weight)), points)
+    reference = linprog(-weight, A_ub=a, b_ub=b, bounds=(None, None))
+    assert weight @ x == pytest.approx(-reference.fun, abs=1e-5)
+    assert (a @ x <= b + 1e-6).all()
+
+
+def test_an_unbounded_programme_is_refused():
+    with pytest.raises(ConvergenceError, match="target inscribed"):
+        lp.maximise(np.ones(3), np.zeros(3), csr_array(-np.eye(3)), np.ones(3), np.zeros(3), np.eye(3))
+
+
+@pytest.mark.parametrize("chart", CHARTS.values(), ids=CHARTS)
+@pytest.mark.parametrize("make", [hex_pattern, quad_pattern])
+@pytest.mark.parametrize("joint", [0.0, 0.002])
+def test_best_sizes_gain_on_the_inscribed_ones_without_overlap(chart, make, joint):
+    pattern, cmap = make(chart, 24, 8, -0.6), grid_map(chart, 60, 40, -0.7, 1.8)
+    wanted = PanelSettings(target="best", sizes=None, joint=joint)
+    fitted = fit_panels(cmap, pattern, wanted)
+    quality = measure(cmap, pattern, quantize(fitted, wanted))
+    inscribed = fit_panels(cmap, pattern, PanelSettings(target="inscribed", joint=joint)).limit
+    assert quality.overlaps == 0
+    assert np.nanmin(quality.gap_tangential) >= joint - 1e-12
+    # The inscribed panels are feasible for the programme, whose weights they are.
+    assert inscribed @ fitted.limit >= inscribed @ inscribed * (1 - 1e-6)
+    assert (fitted.limit >= inscribed * (1 - 2e-3)).all()
