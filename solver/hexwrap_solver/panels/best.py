@@ -10,8 +10,8 @@ from hexwrap_solver.panels.limits import inscribed, length_at, reach
 from hexwrap_solver.panels.linear_programme import maximise
 from hexwrap_solver.panels.regular import Poses
 
-#: A centre may move this far (in edge lengths) from its inscribed panel's. Rows speak of next neighbours only; without a
-#: bound whole rings of panels would slide away.
+#: A centre may move this far (in edge lengths) from its inscribed panel's. Rows speak of next neighbours
+#: only; without a bound whole rings of panels would slide away.
 FARTHEST_SHIFT = 0.25
 
 #: No panel may become smaller than its inscribed size by more than this fraction. (With none at all the
@@ -63,9 +63,10 @@ def jointly_largest(
 
 
 def _rows(flat: Floats, h: Floats, room: Floats, partner: Ints, least: Floats) -> tuple[csr_array, Floats]:
-    """Unknowns: in-plane shifts (r, 2), lengths (r,), in units of the median length; least: sizes kept.
+    """Unknowns: in-plane shifts (r, 2), lengths (r,), in units of the median length. least: lengths kept.
 
-    ``room`` of a shared plane is that to the unmoved plane less joint/2; both sides add up to that of the row.
+    ``room`` of a shared plane is that to the unmoved plane less joint/2; both sides add up to that of the
+    row.
     """
     edge = np.arange(len(room))
     r = len(least)
