@@ -19,8 +19,9 @@ from hexwrap_server.settings import Settings
 
 LOOPBACK_NAMES = frozenset({"127.0.0.1", "localhost", "[::1]"})
 SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
-#: Probes that a load balancer makes without a token.
-OPEN_PATHS = frozenset({"/health", "/ready"})
+#: Probes that a load balancer makes without a token, and the page, which asks its reader for one.
+OPEN_PATHS = frozenset({"/health", "/ready", "/"})
+OPEN_FOLDER = "/static/"
 
 
 class Doorkeeper:
@@ -58,7 +59,8 @@ class Doorkeeper:
                 "Requests from other sites are refused",
                 "The browser says that this request comes from a page of another site.",
             )
-        if self._token and path not in OPEN_PATHS and not self._knows_token(headers):
+        is_open = path in OPEN_PATHS or path.startswith(OPEN_FOLDER)
+        if self._token and not is_open and not self._knows_token(headers):
             return HttpError(
                 401,
                 "token",

@@ -152,3 +152,5 @@ def test_token_is_asked_of_everybody(tmp_path_factory: pytest.TempPathFactory) -
             answer = client.get("/v1/jobs", headers=wrong)
             assert (answer.status_code, answer.headers["www-authenticate"]) == (401, "Bearer")
         assert client.get("/v1/jobs", headers={"Authorization": "Bearer secret"}).status_code == 200
+        # the page must load to be able to ask for the token; it holds no secrets
+        assert client.get("/").status_code == client.get("/static/app.js").status_code == 200

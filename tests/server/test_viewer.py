@@ -311,6 +311,16 @@ def test_the_page_outlives_a_restart_of_the_server(browser, server: Server) -> N
         assert len(fetched(server, f"/v1/jobs/{job}/result?include=sizes")["sizes"]) == 4
 
 
+def test_files_are_downloaded(browser, server: Server) -> None:
+    with opened(browser, server) as page:
+        page.select_option("#sample", "tower")
+        shown(page)
+        with page.expect_download() as download:
+            page.click("#files a[download='panels.csv']")
+        lines = Path(download.value.path()).read_text(encoding="utf-8-sig").splitlines()
+        assert len(lines) == 1 + len(page.evaluate(f"() => {{ {INSIDE} return state.result.panels.label }}"))
+
+
 def test_copied_curl_request_is_the_request(browser, server: Server) -> None:
     with opened(browser, server) as page:
         page.context.grant_permissions(["clipboard-read", "clipboard-write"])

@@ -104,20 +104,35 @@ export class ProblemError extends Error {
 /** The server did not answer at all (stopped, restarting). */
 export class UnreachableError extends Error {}
 
-async function call(path: string, init?: RequestInit): Promise<Response> {
+/** Secret of a server that was started with --token; kept for the visit only. */
+let token = sessionStorage.getItem("hexwrap-token") ?? "";
+
+async function call(path: string, init: RequestInit = {}): Promise<Response> {
   let response: Response;
   try {
-    response = await fetch(path, init);
-  } catch (cause) {
-    if (init?.signal?.aborted) throw cause;
+    const headers = new Headers(init.headers);
+    if (token) headers.set("Authorization", `Bearer ${token}`);
+    response = await fetch(path, { ...init, headers });
+  } catch {
     throw new UnreachableError("The server does not answer. Is hexwrap serve running?");
   }
   if (response.ok) return response;
+  if (response.status === 401 && askForToken()) return call(path, init);
   const kind = response.headers.get("content-type") ?? "";
   const problem: Problem = kind.includes("json")
     ? await response.json()
     : { type: "about:blank", title: response.statusText, status: response.status, detail: `The server answered ${response.status}.` };
   throw new ProblemError(problem);
+}
+
+let asked = false;
+/** Asks once per visit; the answer is tried for everything that follows. */
+function askForToken(): boolean {
+  if (asked) return false;
+  asked = true;
+  token = prompt("This server asks for its token (the one it was started with):") ?? "";
+  sessionStorage.setItem("hexwrap-token", token);
+  return token !== "";
 }
 
 const json = async <T>(path: string, init?: RequestInit): Promise<T> => (await call(path, init)).json() as Promise<T>;
@@ -133,6 +148,8 @@ export const api = {
   jobs: () => json<{ jobs: Job[] }>("/v1/jobs?limit=50").then((answer) => answer.jobs),
   job: (id: string, wait = 0) => json<Job>(`/v1/jobs/${id}${wait ? `?wait=${wait}` : ""}`),
   submit: (request: Request) => json<Job>("/v1/jobs", post(request)),
+  /** The finished work as a file, through the token where there is one. */
+  file: (id: string, name: string) => call(`/v1/jobs/${id}/files/${name}`).then((answer) => answer.blob()),
   cancel: (id: string) => call(`/v1/jobs/${id}`, { method: "DELETE" }),
   result: (id: string) => json<Result>(`/v1/jobs/${id}/result`),
   request: (id: string) => json<Request>(`/v1/jobs/${id}/request`),

@@ -443,8 +443,26 @@ function hover(i: number | null): void {
 
 function drawFiles(): void {
   const { job } = state;
-  $("files").replaceChildren(...(job ? FILES.map((name) =>
-    element("a", { href: `/v1/jobs/${job.id}/files/${name}`, download: name }, name)) : []));
+  $("files").replaceChildren(...(job ? FILES.map((name) => {
+    const link = element("a", { href: `/v1/jobs/${job.id}/files/${name}`, download: name }, name);
+    link.addEventListener("click", (event) => {
+      event.preventDefault();
+      void download(job.id, name);
+    });
+    return link;
+  }) : []));
+}
+
+/** Fetched first, so that a refusal becomes a sentence on this page and not a file full of JSON. */
+async function download(id: string, name: string): Promise<void> {
+  try {
+    const url = URL.createObjectURL(await api.file(id, name));
+    const link = element("a", { href: url, download: name }) as HTMLAnchorElement;
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(url), 10_000);
+  } catch (error) {
+    report(error);
+  }
 }
 
 async function copy(text: string, what: string): Promise<void> {
