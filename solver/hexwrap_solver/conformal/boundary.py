@@ -10,7 +10,7 @@ from hexwrap_solver.surface.types import Surface
 
 #: A cone angle this near to a multiple of π/6 (that holds all quanta) is that multiple: sums of many angles
 #: carry rounding, and g must be an exact symmetry of the pattern. Near 0 the domain is a cylinder.
-SNAP = 1e-10
+SNAP = 1e-9
 
 
 def straight(surface: Surface) -> Targets:

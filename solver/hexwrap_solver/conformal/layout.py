@@ -14,6 +14,9 @@ from hexwrap_solver.conformal.types import Deck
 
 #: Cone angles nearer than this to a multiple of 2π count as one: g is a translation (see Deck).
 FULL_TURN = 1e-9
+#: An apex further away than this many times the size of the domain is not made the origin: coordinates would
+#: lose the digits in which they agree.
+FAR = 100.0
 #: A translation shorter than this, relative to the domain, is none (flat rings that close up by themselves).
 NO_TRANSLATION = 1e-10
 
@@ -39,7 +42,8 @@ def lay_out(
     cone_angle: K. g is one turn around the surface in the direction of loop 0 (surface on its left).
 
     Cylinder: g moves along +x, loop 0 lies around y = 0 with the surface above. Cone: the apex is the
-    origin, and the sheet is symmetric to the positive y axis. K = 2πm, m ≠ 0: loop 0 is centred at 0.
+    origin, and the sheet is symmetric to the positive y axis; where the apex is FAR away, the cut starts at 0
+    and g moves it along +x. K = 2πm, m ≠ 0: loop 0 is centred at 0.
     """
     cut = cut_open(faces, loops, n)
     corners = _develop(cut.twin, lengths, angles, faces)
@@ -138,23 +142,33 @@ def normalise(
 ) -> tuple[Complexes, Deck, float]:
     """Moves the sheet, whose cut starts at ``foot_vertex`` on loop 0, into its standard place (see lay_out).
     Also gives the circumference."""
-    foot = uv[foot_vertex]
-    if abs(deck.angle) < FULL_TURN:
-        turn = abs(deck.translation) / deck.translation
-        moved = (uv - foot) * turn
-        moved -= 1j * moved[loops[0]].imag.mean()
-        length = abs(deck.translation)
-        return moved, Deck(deck.angle, complex(length)), length
-    if deck.is_translation:
-        moved = uv - uv[loops[0]].mean()
-        radii = [float(np.abs(moved[loop] - moved[loop].mean()).mean()) for loop in loops]
-        length = abs(deck.angle) * float(np.sqrt(radii[0] * radii[1]))
-        short = abs(deck.translation) <= NO_TRANSLATION * length
-        return moved, Deck(deck.angle, 0j if short else deck.translation), length
+    foot = complex(uv[foot_vertex])
     apex = deck.apex
-    assert apex is not None  # no translation: g has a fixed point
-    moved = uv - apex
-    turn = np.exp(1j * (np.pi - deck.angle) / 2) * np.conj(foot - apex) / abs(foot - apex)
-    moved = moved * turn
-    radii = [float(np.abs(moved[loop]).mean()) for loop in loops]
-    return moved, Deck(deck.angle, 0j), abs(deck.angle) * float(np.sqrt(radii[0] * radii[1]))
+    if apex is not None:
+        distance = np.abs(uv - apex)
+        radius = float(np.sqrt(distance[loops[0]].mean() * distance[loops[1]].mean()))
+        far = distance.min() > FAR * np.abs(uv - foot).max()
+        moved, deck = _upright(uv, deck, foot) if far else _about(apex, uv, deck, foot)
+        return moved, deck, abs(deck.angle) * radius
+    if abs(deck.angle) < FULL_TURN:
+        moved, deck = _upright(uv, deck, foot)
+        moved -= 1j * moved[loops[0]].imag.mean()
+        return moved, Deck(deck.angle, complex(deck.translation.real)), abs(deck.translation)
+    moved = uv - uv[loops[0]].mean()
+    radii = [float(np.abs(moved[loop] - moved[loop].mean()).mean()) for loop in loops]
+    length = abs(deck.angle) * float(np.sqrt(radii[0] * radii[1]))
+    short = abs(deck.translation) <= NO_TRANSLATION * length
+    return moved, Deck(deck.angle, 0j if short else deck.translation), length
+
+
+def _upright(uv: Complexes, deck: Deck, foot: complex) -> tuple[Complexes, Deck]:
+    """The foot of the cut at 0, its image under g on the positive real axis."""
+    chord = complex(deck.apply(np.array([foot]))[0]) - foot
+    turn = abs(chord) / chord
+    return (uv - foot) * turn, Deck(deck.angle, chord * turn)
+
+
+def _about(apex: complex, uv: Complexes, deck: Deck, foot: complex) -> tuple[Complexes, Deck]:
+    """The apex at 0, the sheet symmetric to the positive imaginary axis."""
+    turn = np.exp(1j * (np.pi - deck.angle) / 2) * abs(foot - apex) / (foot - apex)
+    return (uv - apex) * turn, Deck(deck.angle, 0j)

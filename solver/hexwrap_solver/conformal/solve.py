@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,7 +15,11 @@ from hexwrap_solver.conformal.newton import Minimum, minimise
 from hexwrap_solver.conformal.orientation import positive
 from hexwrap_solver.conformal.robust import solve_with_flips, with_inserted
 from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap, Deck, Targets
+from hexwrap_solver.errors import ConvergenceError
 from hexwrap_solver.surface.types import Surface
+
+#: The largest difference of u that a layout in double precision can show: e^36 is 4e15.
+MAX_SPAN = 36.0
 
 
 def conformal_map(
@@ -37,34 +41,77 @@ def conformal_map(
 
 def _isometric(surface: Surface, condition: BoundaryCondition, progress: Progress) -> ConformalMap:
     """The paper's two steps: u = 0 on the boundary, then again with the cone angle rounded to the quantum."""
-    first = _map(surface, boundary.isometric(surface), None, progress)
+    targets = boundary.isometric(surface)
     if condition.quantum is None:
-        return first
-    surface = first.surface  # refined where that was needed
-    rounded = boundary.nearest_multiple(first.deck.angle, condition.quantum)
+        return _map(surface, targets, None, progress)
+    first = _metric(surface, targets, None, _part(progress, 0.0))
+    if isinstance(first, ConformalMap):
+        surface, u, angles = first.surface, first.log_scale, first.boundary_angles
+    else:
+        sums = first.energy.angle_sums(first.minimum.corners)
+        u, angles = first.minimum.u, (sums[surface.loops[0]], sums[surface.loops[1]])
+    found = (boundary.cone_angle(angles[0]) - boundary.cone_angle(angles[1])) / 2
+    rounded = boundary.nearest_multiple(found, condition.quantum)
     if condition.spread == "optimal":
         targets = boundary.constant_on_loops(surface, rounded)
     else:
-        angles = [
-            boundary.spread_evenly(sums, wanted)
-            for sums, wanted in zip(first.boundary_angles, (rounded, -rounded), strict=True)
-        ]
-        targets = boundary.prescribed(surface, (angles[0], angles[1]))
-    second = _map(surface, targets, first.log_scale, progress, keep_boundary=True)
-    return second if not first.inserted else with_inserted(second, first.inserted)
+        spread = boundary.spread_evenly
+        targets = boundary.prescribed(surface, (spread(angles[0], rounded), spread(angles[1], -rounded)))
+    second = _map(surface, targets, u, _part(progress, 0.5), keep_boundary=True)
+    if isinstance(first, ConformalMap):
+        second = with_inserted(second, first.inserted)
+    return replace(second, notes=(_rounding_note(found, rounded), *second.notes))
+
+
+def _part(progress: Progress, begin: float) -> Progress:
+    """One half of the progress."""
+    return lambda fraction, what: progress(begin + fraction / 2, what)
+
+
+def _rounding_note(found: float, rounded: float) -> str:
+    shape = "a cylinder" if rounded == 0 else f"a cone angle of {np.degrees(rounded):.6g}°"
+    return (
+        f"The isometric boundary has a cone angle of {np.degrees(found):.4g}°; the domain was given {shape}."
+    )
+
+
+@dataclass(frozen=True)
+class _Plain:
+    """A flat metric on the triangles as they are."""
+
+    energy: Energy
+    minimum: Minimum
+
+
+def _metric(
+    surface: Surface, targets: Targets, start: Floats | None, progress: Progress
+) -> _Plain | ConformalMap:
+    """On the triangles as they are where that works, otherwise with flips (which lay the map out at once)."""
+    energy = Energy(surface, targets)
+    minimum = minimise(energy, start, progress)
+    if not minimum.converged or minimum.broken:
+        return solve_with_flips(surface, targets, progress, start)
+    span = float(np.ptp(minimum.u))
+    if span > MAX_SPAN:
+        angle = boundary.cone_angle_of(targets, energy.angle_sums(minimum.corners), surface)
+        raise ConvergenceError(
+            f"Under this boundary condition (cone angle {np.degrees(angle):.4g}°) the map would shrink some "
+            f"parts of the surface 10^{span / np.log(10):.0f} times as much as others, more than the 16 digits "
+            "of a coordinate can tell apart; ask for a smaller cone angle, or cut the surface where it is long "
+            "and thin."
+        )
+    return _Plain(energy, minimum)
 
 
 def _map(
     surface: Surface, targets: Targets, start: Floats | None, progress: Progress, keep_boundary: bool = False
 ) -> ConformalMap:
-    """On the triangles as they are where that works, otherwise with flips."""
-    energy = Energy(surface, targets)
-    minimum = minimise(energy, start, progress)
-    found = None
-    if minimum.converged and not minimum.broken:
-        found = _finish(surface, energy, minimum)
-    if found is None or not positive(found.corners()).all():
-        found = solve_with_flips(surface, targets, progress, start)
+    """Metric, layout, and with flips where triangles turn over in the layout, be it by rounding."""
+    found = _metric(surface, targets, start, progress)
+    if isinstance(found, _Plain):
+        found = _finish(surface, found.energy, found.minimum)
+        if not positive(found.corners()).all():
+            found = solve_with_flips(surface, targets, progress, start)
     if (targets.tie == 0).any():
         return found
     u = found.log_scale

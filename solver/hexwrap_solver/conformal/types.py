@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -61,20 +62,33 @@ class Deck:
     @property
     def is_translation(self) -> bool:
         """K a multiple of 2π (cylinders, and flat rings): g has no fixed point."""
-        return bool(abs(np.exp(1j * self.angle) - 1) < 1e-9)
+        return abs(self._reduced) < 1e-9
+
+    @property
+    def _reduced(self) -> float:
+        """K modulo 2π, in [−π, π]."""
+        return math.remainder(self.angle, 2 * math.pi)
 
     @property
     def apex(self) -> complex | None:
-        """The fixed point of g, or None where g is a translation."""
-        return None if self.is_translation else complex(self.translation / (1 - np.exp(1j * self.angle)))
+        """The fixed point t / (1 − e^{iK}) of g, or None where g is a translation."""
+        if self.is_translation:
+            return None
+        half = self._reduced / 2  # 1 − e^{iK} = −2i sin(K/2) e^{iK/2} does not cancel where K is small
+        return complex(self.translation * 0.5j / (math.sin(half) * np.exp(1j * half)))
 
     def power(self, s: Ints) -> tuple[Complexes, Complexes]:
-        """(rotation, translation) of g^s for integer arrays s: g^s(z) = rotation·z + translation."""
-        rotation = np.exp(1j * self.angle * s)
-        apex = self.apex
-        if apex is None:
-            return np.ones(np.shape(s), dtype=complex), self.translation * np.asarray(s, dtype=complex)
-        return rotation, (1 - rotation) * apex
+        """(rotation, translation) of g^s for integer arrays s: g^s(z) = rotation·z + translation.
+
+        The translation t (1 − e^{iKs}) / (1 − e^{iK}) is written with sines, so that it keeps all its digits
+        on cones that are nearly cylinders.
+        """
+        s = np.asarray(s)
+        if self.is_translation:
+            return np.ones(s.shape, dtype=complex), self.translation * s.astype(complex)
+        half = self._reduced / 2
+        share = np.sin(half * s) / math.sin(half) * np.exp(1j * half * (s - 1))
+        return np.exp(2j * half * s), np.asarray(self.translation * share)
 
     def apply(self, z: Complexes, s: Ints | int = 1) -> Complexes:
         """g^s(z)."""

@@ -7,7 +7,8 @@ import pytest
 
 from hexwrap_solver.conformal import conformal_map
 from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap
-from tests.solver.conformal.annuli import bump, catenoid, flat_cone
+from hexwrap_solver.errors import ConvergenceError
+from tests.solver.conformal.annuli import bump, catenoid, flat_cone, grid, revolution
 
 CONDITIONS = [
     BoundaryCondition(),
@@ -101,3 +102,25 @@ def test_a_flat_cone_maps_to_itself() -> None:
     assert cmap.deck.angle == pytest.approx(48 * 2 * np.arcsin(np.sin(np.pi / 48) / 6), rel=1e-12)
     assert np.abs(cmap.uv[cone.loops[0]]) == pytest.approx(2.0, rel=1e-12)
     assert cmap.deck.apex == 0
+
+
+def test_a_rounded_cone_angle_is_told() -> None:
+    cmap = conformal_map(bump(40, 20), BoundaryCondition("isometric", quantum=np.pi / 3))
+    [note] = cmap.notes
+    assert "-60°" in note
+    cylinder = conformal_map(bump(40, 20), BoundaryCondition("isometric", quantum=2 * np.pi))
+    assert cylinder.kind == "cylinder"
+    assert "a cylinder" in cylinder.notes[0]
+
+
+def test_a_domain_beyond_the_digits_of_a_double_is_refused_at_once() -> None:
+    """A tube 160 times as long as around, on a cone: one end would be e^167 times as large as the other."""
+    tube = grid(8, 200, revolution(lambda s: 0.02 + 0 * s, lambda s: 20 * s))
+    corners = BoundaryCondition(
+        "angles",
+        vertices=np.array([0, int(tube.loops[1][0])]),
+        angles=np.array([2 * np.pi / 3, 4 * np.pi / 3]),
+    )
+    with pytest.raises(ConvergenceError, match=r"10\^7"):
+        conformal_map(tube, corners)
+    assert_honest(conformal_map(tube, BoundaryCondition()))

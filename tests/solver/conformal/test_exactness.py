@@ -248,7 +248,7 @@ def test_gauss_bonnet_holds_for_every_metric(seed: int, size: float) -> None:
 
 @settings(max_examples=50, deadline=None)
 @given(
-    st.sampled_from([0.0, np.pi / 3, -np.pi / 3, 2 * np.pi, -4 * np.pi, 1.0]),
+    st.sampled_from([0.0, np.pi / 3, -np.pi / 3, 2 * np.pi, -4 * np.pi, 1.0, 1e-8, -7.0, 2 * np.pi + 1e-4]),
     st.complex_numbers(max_magnitude=10),
     st.lists(st.complex_numbers(max_magnitude=10), min_size=1, max_size=5),
     st.integers(-5, 5),
@@ -262,7 +262,23 @@ def test_powers_of_g_form_a_group(
     np.testing.assert_allclose(g.apply(z, 0), z, atol=1e-12)
     np.testing.assert_allclose(g.apply(g.apply(z, b), a), g.apply(z, a + b), atol=1e-11)
     if g.apex is not None:
-        np.testing.assert_allclose(g.apply(np.array([g.apex]), a), g.apex, atol=1e-11)
+        np.testing.assert_allclose(g.apply(np.array([g.apex]), a), g.apex, rtol=1e-11, atol=1e-11)
+
+
+@pytest.mark.parametrize("angle", [1e-2, 1e-5, 1e-8, -1e-8])
+def test_cones_that_are_nearly_cylinders_keep_their_digits(angle: float) -> None:
+    """The apex is far away; neither uv nor g may lose digits to it."""
+    condition = BoundaryCondition(
+        "angles",
+        vertices=np.array([3, int(TOWER.loops[1][5])]),
+        angles=np.array([np.pi - angle, np.pi + angle]),
+    )
+    cmap = conformal_map(TOWER, condition)
+    assert_honest(cmap)
+    assert cmap.deck.angle == pytest.approx(angle, rel=1e-6)
+    assert np.abs(cmap.uv).max() < 1e3
+    cylinder = conformal_map(TOWER, BoundaryCondition())
+    assert cmap.circumference == pytest.approx(cylinder.circumference, rel=10 * abs(angle))
 
 
 def test_optimal_spreading_has_less_dirichlet_energy_than_the_even_one() -> None:
