@@ -11,13 +11,13 @@ import argparse
 import time
 
 import numpy as np
-from tests.solver.conformal.checks import asked_angles, faults
-from tests.solver.conformal.shared import MESHES, load
-from tests.solver.conformal.torture import MODES, TORTURE
 
 from hexwrap_solver.conformal import conformal_map
 from hexwrap_solver.errors import HexwrapError
 from hexwrap_solver.surface.types import Surface
+from tests.solver.conformal.checks import asked_angles, faults
+from tests.solver.conformal.shared import MESHES, load
+from tests.solver.conformal.torture import MODES, TORTURE
 
 
 def main() -> None:

@@ -44,7 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):  # consoles that lack a character show a stand-in
             stream.reconfigure(errors="replace")
-    parser = _parser()
+    parser = make_parser()
     asked = parser.parse_args(arguments)
     try:
         return int(asked.command(asked))
@@ -65,7 +65,7 @@ def _refuse(status: int, *sentences: str) -> int:
     return status
 
 
-def _parser() -> argparse.ArgumentParser:
+def make_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="hexwrap", description="Seamless hexagonal, quad and triangle panels on tube-like surfaces."
     )

@@ -80,6 +80,11 @@ MESHING = (
 )
 ANGLES: Path = ("boundary", "angles")
 SUPPORT: Path = ("support",)
+ANGLE_HELP = (
+    "target angle at a boundary vertex, for --boundary angles; PLACE is an index of the sent mesh or X,Y,Z "
+    "(any number of times)"
+)
+SUPPORT_HELP = "add the torsion-free support structure"
 #: Sections of which 'none' makes null.
 SECTIONS = (("pattern", "kind"), ("panels", "mode"))
 
@@ -98,15 +103,9 @@ def add_request_options(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=argparse.SUPPRESS,
         metavar="PLACE=ANGLE",
-        help="target angle at a boundary vertex, for --boundary angles; PLACE is an index of the sent mesh "
-        "or X,Y,Z (may be given several times)",
+        help=ANGLE_HELP,
     )
-    group.add_argument(
-        "--support",
-        action="store_true",
-        default=argparse.SUPPRESS,
-        help="add the torsion-free support structure",
-    )
+    group.add_argument("--support", action="store_true", default=argparse.SUPPRESS, help=SUPPORT_HELP)
     for option in MESHING:
         _add(group, option, Meshing)
 
@@ -137,6 +136,22 @@ def is_option_at_fault(arguments: argparse.Namespace, pointers: Iterable[str]) -
     given += ["/surface/mesh/" + o.path[0] for o in MESHING if hasattr(arguments, _name(o))]
     given += ["/boundary/angles"] if hasattr(arguments, "angles") else []
     return any(_within(at, place) or (at and _within(place, at)) for at in pointers for place in given)
+
+
+def readme_rows() -> str:
+    """The options as rows of the README's table."""
+    rows = [(o.flag, ".".join(o.path), _help(o, Body)) for o in OPTIONS]
+    rows.append(("--angle", ".".join(ANGLES), ANGLE_HELP))
+    rows.append(("--support", ".".join(SUPPORT), SUPPORT_HELP))
+    rows += [(o.flag, f"surface.mesh.{o.path[0]}", _help(o, Meshing)) for o in MESHING]
+    return "\n".join(f"| `{flag}` | `{path}` | {words} |" for flag, path, words in rows)
+
+
+def _help(option: Option, model: type[BaseModel]) -> str:
+    """What an option does, with choices and default."""
+    choices, default = _field(model, option.path)
+    words = f": {', '.join(choices)}" if choices else ""
+    return option.help + words + ("" if default in (None, "") else f" (default: {_shown(default)})")
 
 
 def _within(pointer: str, section: str) -> bool:

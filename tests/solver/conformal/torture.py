@@ -6,12 +6,12 @@ from collections.abc import Callable
 
 import numpy as np
 from scipy.spatial import Delaunay
-from tests.solver.conformal.annuli import bump, grid, revolution
 
 from hexwrap_solver.arrays import Floats, Ints, Ragged
 from hexwrap_solver.conformal.types import BoundaryCondition
 from hexwrap_solver.surface import SentMesh, surface_from_mesh
 from hexwrap_solver.surface.types import Surface
+from tests.solver.conformal.annuli import bump, grid, revolution
 
 Random = np.random.Generator
 

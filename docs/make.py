@@ -1,0 +1,93 @@
+"""Makes the pictures of the README: python docs/make.py"""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.figure import Figure
+from PIL import Image
+
+from hexwrap_server import samples
+from hexwrap_server.files import Meta, write
+from hexwrap_server.files.colours import panel_colours
+from hexwrap_server.files.picture import panels_scene
+from hexwrap_server.files.scene import render
+from hexwrap_server.schemas import parse_request
+from hexwrap_server.work import run_stages
+from hexwrap_solver.pipeline import PlainRunner, Solution
+
+HERE = Path(__file__).parent
+#: Pixels of the front picture.
+WIDTH = 900
+#: Sample → what its picture shows.
+CASES = {
+    "tower": "straight cylinder (Figures 1 and 5, left)",
+    "cone": "corners on a cone (Figures 5 and 6, middle)",
+    "isometric": "isometric boundary (Figures 5 and 6, right)",
+    "entrance": "entrances (Figure 7, left)",
+    "diagrid": "concentration (Figure 7, right)",
+    "ring": "a flat ring, cone angle 2π",
+}
+
+
+def solved(name: str) -> Solution:
+    """A bundled sample, panelized."""
+    request = parse_request(samples.load(name), 10**7, 10**6)
+    assert not isinstance(request.surface, str)
+    return run_stages(request.surface, request.wanted, PlainRunner())
+
+
+def draw_domain(axes: Axes, solution: Solution) -> None:
+    """The cells in the colours of their sizes, and the boundary of the unrolled domain."""
+    cmap, pattern, panels = solution.map, solution.pattern, solution.panels
+    assert pattern is not None
+    assert panels is not None
+    z = cmap.deck.apply(pattern.uv[np.asarray(pattern.faces.values)], pattern.sheet)
+    cells = np.split(np.stack([z.real, z.imag], axis=1), pattern.faces.offsets[1:-1])
+    size = np.full(pattern.n_cells, -1)
+    size[panels.face] = panels.size
+    colours = panel_colours(size, len(panels.class_length))
+    axes.add_collection(PolyCollection(cells, facecolors=colours, edgecolors="#2a2e35", linewidths=0.25))
+    at, faces = cmap.corners(), cmap.surface.faces
+    tail, head = faces.ravel(), faces[:, [1, 2, 0]].ravel()
+    key = np.minimum(tail, head) * len(cmap.surface.vertices) + np.maximum(tail, head)
+    _, index, count = np.unique(key, return_index=True, return_counts=True)
+    rim = index[count == 1]
+    ends = np.stack([at.ravel()[rim], at[:, [1, 2, 0]].ravel()[rim]], axis=1)
+    axes.add_collection(
+        LineCollection(np.stack([ends.real, ends.imag], -1), colors="#16202e", linewidths=1.1)
+    )
+    axes.autoscale_view()
+    axes.set_aspect("equal")
+    axes.set_axis_off()
+
+
+def cases() -> None:
+    """Domain and surface side by side, for every boundary condition."""
+    rows = (len(CASES) + 1) // 2
+    figure = Figure(figsize=(16, 3.9 * rows), dpi=100, facecolor="white")
+    space = {"left": 0.01, "right": 0.99, "bottom": 0.01, "top": 0.95, "wspace": 0.05, "hspace": 0.14}
+    grid = figure.subplots(rows, 4, gridspec_kw=space)
+    for place, (name, title) in enumerate(CASES.items()):
+        domain, surface = grid.reshape(-1, 2)[place]
+        solution = solved(name)
+        draw_domain(domain, solution)
+        domain.set_title(title, fontsize=13, color="#23262b", loc="left", pad=10)
+        surface.imshow(np.clip(render(panels_scene(solution)), 0, 1), interpolation="lanczos")
+        surface.set_axis_off()
+    figure.savefig(HERE / "cases.png")
+
+
+def main() -> None:
+    picture = Image.open(io.BytesIO(write("panels.png", solved("tower"), Meta("tower"))))
+    size = (WIDTH, round(picture.height * WIDTH / picture.width))
+    picture.convert("RGB").resize(size, Image.Resampling.LANCZOS).save(HERE / "tower.png", optimize=True)
+    cases()
+
+
+if __name__ == "__main__":
+    main()
