@@ -96,9 +96,9 @@ def _metric(
         angle = boundary.cone_angle_of(targets, energy.angle_sums(minimum.corners), surface)
         raise ConvergenceError(
             f"Under this boundary condition (cone angle {np.degrees(angle):.4g}°) the map would shrink some "
-            f"parts of the surface 10^{span / np.log(10):.0f} times as much as others, more than the 16 digits "
-            "of a coordinate can tell apart; ask for a smaller cone angle, or cut the surface where it is long "
-            "and thin."
+            f"parts of the surface 10^{span / np.log(10):.0f} times as much as others, more than the 16 "
+            "digits of a coordinate can tell apart; ask for a smaller cone angle, or cut the surface where "
+            "it is long and thin."
         )
     return _Plain(energy, minimum)
 
