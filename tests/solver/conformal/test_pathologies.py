@@ -1,0 +1,88 @@
+"""Awkward annuli under awkward boundary conditions: all of them have a map, and it is the right one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hexwrap_solver.conformal import conformal_map
+from hexwrap_solver.conformal.types import BoundaryCondition
+from hexwrap_solver.surface.types import Surface
+from tests.solver.conformal.annuli import annulus, grid, irregular, revolution, ring, uneven
+from tests.solver.conformal.checks import faults
+
+CONE = revolution(lambda s: 1 + 2 * s, lambda s: s)
+
+
+def with_ears(around: int) -> Surface:
+    """Two rows of a cone with a further triangle, an ear, on every second edge of loop 0; around is even."""
+    body = grid(around, 2, CONE)
+    loop, n = body.loops[0], len(body.vertices)
+    tail, head = loop[::2], np.roll(loop, -1)[::2]
+    tip = n + np.arange(len(tail))
+    place = 0.8 * (body.vertices[tail] + body.vertices[head]) / 2 - [0, 0, 0.3]
+    ears = np.stack([tail, tip, head], axis=1)
+    outline = ears.ravel()
+    return annulus(
+        np.concatenate([body.vertices, place]), np.concatenate([body.faces, ears]), (outline, body.loops[1])
+    )
+
+
+SURFACES = {
+    "loops of three vertices": grid(3, 4, CONE),
+    "loops of three vertices, one triangle wide": grid(3, 1, CONE),
+    "one triangle wide": grid(12, 1, CONE, False),
+    "one triangle wide, uneven": grid(60, 1, uneven),
+    "ears": with_ears(16),
+    "scattered ring": irregular(30, 6, ring()),
+    "very wide": grid(40, 3, revolution(lambda s: 1 + 50 * s, lambda s: 0.1 * s)),
+    "1:160 tube": grid(8, 200, revolution(lambda s: 0.02 + 0 * s, lambda s: 20 * s)),
+}
+
+
+def corners(surface: Surface, kind: str) -> BoundaryCondition:
+    first, second = surface.loops
+    k, pi = len(first), np.pi
+    vertices, angles = {
+        "adjacent corners": (first[:2], [2 * pi / 3, 4 * pi / 3]),
+        "adjacent entrance": (first[:3], [4 * pi / 3, pi / 3, 4 * pi / 3]),
+        "corners on both loops": ([first[0], second[0]], [pi - 0.01, pi + 0.01]),
+        "sharp corners": (first[:3], [pi / 6, 2 * pi - pi / 3, pi + pi / 6]),
+        "full turn": (
+            np.concatenate([first, second]),
+            [pi - 2 * pi / k] * k + [pi + 2 * pi / len(second)] * len(second),
+        ),
+    }[kind]
+    return BoundaryCondition("angles", vertices=np.asarray(vertices), angles=np.array(angles))
+
+
+@pytest.mark.parametrize("name", SURFACES)
+@pytest.mark.parametrize(
+    "condition",
+    [
+        BoundaryCondition(),
+        BoundaryCondition("isometric"),
+        BoundaryCondition("isometric", quantum=np.pi / 3),
+        BoundaryCondition("isometric", quantum=np.pi / 3, spread="optimal"),
+    ],
+    ids=["straight", "isometric", "even", "optimal"],
+)
+def test_every_mode(name: str, condition: BoundaryCondition) -> None:
+    assert faults(conformal_map(SURFACES[name], condition)) == []
+
+
+@pytest.mark.parametrize("name", [name for name in SURFACES if name != "1:160 tube"])
+@pytest.mark.parametrize(
+    "kind", ["adjacent corners", "adjacent entrance", "corners on both loops", "sharp corners", "full turn"]
+)
+def test_corners_wherever_they_are(name: str, kind: str) -> None:
+    surface = SURFACES[name]
+    condition = corners(surface, kind)
+    found = conformal_map(surface, condition)
+    assert faults(found) == []
+    wanted = np.full(len(surface.vertices), np.pi)
+    wanted[condition.vertices] = condition.angles
+    for loop, angles in zip(found.surface.loops, found.boundary_angles, strict=True):
+        sent = loop < len(wanted)  # the rest was inserted on straight sides
+        np.testing.assert_allclose(angles[sent], wanted[loop[sent]], atol=1e-9)
+        np.testing.assert_allclose(angles[~sent], np.pi, atol=1e-9)
