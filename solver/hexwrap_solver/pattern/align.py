@@ -26,7 +26,7 @@ COST_OF_SIZE, COST_OF_CORNERS = 0.002, 0.02
 
 @dataclass(frozen=True)
 class _Trial:
-    """W = scale·z + origin before the deformation, what g becomes, and the line of each side."""
+    """W = scale·(z − apex) + origin before the deformation, what g becomes, and the line of each side."""
 
     cost: float
     scale: complex
@@ -42,28 +42,23 @@ def place_by_sides(
     angle = edge_angle(lattice, settings)
     sides = sides_of(cmap, lattice, loops)
     rows = rows_along(lattice, angle, settings.boundary)
-    unit = complex(np.exp(-1j * angle)) * complex(lattice.position(lattice.steps[0])) / lattice.edge
-    mean = complex((sides.length * sides.direction**lattice.order).sum())
-    unit /= complex(np.exp(1j * np.angle(mean) / lattice.order))
+    zero = complex(lattice.position(lattice.steps[0])) / lattice.edge * np.exp(-1j * angle)
+    turn = _turns(cmap, lattice, sides, zero)
     # Directions are exact up to rounding of the boundary angles; from here on they are exact.
-    direction = sides.direction * unit
-    zero = lattice.position(lattice.steps[0]) / lattice.edge * np.exp(-1j * angle)
-    steps = np.rint(np.angle(direction / zero) / lattice.quantum)
+    steps = np.rint(np.angle(sides.direction * turn / zero) / lattice.quantum)
     normal = 1j * zero * np.exp(1j * lattice.quantum * steps)
+    depth = _mean_depth(cmap, sides, normal, turn)
+    unit = complex(turn.mean() / abs(turn.mean()))
     size = lattice.edge / wanted_edge(cmap, lattice, settings, angle)
     spread = size_spread(settings)
     trials = [
-        _best_at(cmap, lattice, sides, rows, normal, turns, size * (1 + spread * x) * unit, abs(x))
+        _best_at(cmap, lattice, sides, rows, normal, depth, turns, size * (1 + spread * x) * unit, abs(x))
         for x in np.linspace(-1, 1, SCALES)
     ]
     best = min(trials, key=lambda trial: trial.cost)
-    place = deform(
-        cmap,
-        best.motion,
-        best.scale,
-        best.scale * cmap.uv + best.origin,
-        *_lines(cmap, lattice, sides, normal, best),
-    )
+    rest = best.scale * (cmap.uv - (cmap.deck.apex or 0)) + best.origin
+    lines = _lines(cmap, lattice, sides, normal, best)
+    place = deform(cmap, best.motion, best.scale, rest, *lines)
     width = width_per_cell(lattice, angle) * lattice.edge
     around = round(cmap.circumference * abs(best.scale) / width)
     if turns == 0:
@@ -77,12 +72,13 @@ def _best_at(
     sides: Sides,
     rows: Rows,
     normal: Complexes,
+    unit_depth: Floats,
     turns: int,
     scale: complex,
     off: float,
 ) -> _Trial:
     """The best centre and lines at one scale."""
-    mean_depth = _mean_depth(sides, normal, scale)
+    mean_depth = unit_depth * abs(scale)
     length = sides.length * abs(scale)
     trials = []
     for motion, origin in _origins(cmap, lattice, sides, rows, normal, turns, scale, mean_depth):
@@ -98,9 +94,38 @@ def _best_at(
     return min(trials, key=lambda trial: trial.cost)
 
 
-def _mean_depth(sides: Sides, normal: Complexes, scale: complex) -> Floats:
-    """(s,) depth of each side's line, with the origin of the layout at the lattice point 0."""
-    value = (normal[sides.side].conj() * sides.place * scale).real
+def _turns(cmap: ConformalMap, lattice: Lattice, sides: Sides, zero: complex) -> Complexes:
+    """(s,) rotations after which the sides have lattice directions, one for each loop on a cone.
+
+    The sides of one loop differ by multiples of the quantum. Those of the other may be turned against them
+    about the apex by any angle, which the deformation then has to make up for; the least one is taken. For
+    a translation, no loop can turn by itself: one rotation for all.
+    """
+    loops = sides.loop if cmap.deck.apex is not None else np.zeros(sides.n, dtype=np.int64)
+    turn = np.ones(sides.n, dtype=complex)
+    before: complex | None = None
+    for loop in np.unique(loops):
+        on = loops == loop
+        mean = complex((sides.length[on] * sides.direction[on] ** lattice.order).sum())
+        unit = zero / complex(np.exp(1j * np.angle(mean) / lattice.order))
+        if before is not None:
+            steps = round(float(np.angle(before / unit)) / lattice.quantum)
+            unit *= complex(np.exp(1j * lattice.quantum * steps))
+        before = unit
+        turn[on] = unit
+    return turn
+
+
+def turn_between_loops(cmap: ConformalMap, lattice: Lattice, loops: list[int]) -> float:
+    """Angle about the apex between the sides of the two loops, modulo the quantum, 0 for one loop; rad."""
+    turn = _turns(cmap, lattice, sides_of(cmap, lattice, loops), 1.0)
+    return float(np.angle(turn[-1] / turn[0]))
+
+
+def _mean_depth(cmap: ConformalMap, sides: Sides, normal: Complexes, turn: Complexes) -> Floats:
+    """(s,) depth of each side's line at scale 1, measured from the apex, or from the layout's origin."""
+    place = (sides.place - (cmap.deck.apex or 0)) * turn[sides.side]
+    value = (normal[sides.side].conj() * place).real
     return np.asarray(np.bincount(sides.side, weights=value) / np.bincount(sides.side))
 
 
@@ -114,11 +139,11 @@ def _origins(
     scale: complex,
     depth: Floats,
 ) -> list[tuple[Motion, complex]]:
-    """Every way in which g can be a motion of the lattice: on a cone the kinds of symmetry centres at which
-    the apex may stand; for a translation the lines on which two sides may lie."""
+    """Every way in which g can be a motion of the lattice, and where the apex, or the layout's origin, stands
+    then: on a cone at the kinds of symmetry centres; for a translation as two sides may lie on lines."""
     apex = cmap.deck.apex
     if apex is not None:
-        return [(motion, centre - scale * apex) for motion, centre in symmetry_centres(lattice, turns)]
+        return symmetry_centres(lattice, turns)
     shift = lattice.translation_near(scale * cmap.deck.translation)
     motion = Motion(lattice, turns, (int(shift[0]), int(shift[1])))
     across = np.flatnonzero(abs((normal.conj() * normal[0]).imag) > 1e-6)

@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import connected_components
 
 from hexwrap_solver.arrays import Bools, Floats, Ints, Progress, Ragged, no_progress
 from hexwrap_solver.conformal.types import ConformalMap
-from hexwrap_solver.domain.cover import cover_of
+from hexwrap_solver.domain.cover import Cover, cover_of
 from hexwrap_solver.domain.interpolate import surface_weights
 from hexwrap_solver.domain.lift import points_at
 from hexwrap_solver.domain.locate import barycentric
@@ -24,7 +24,7 @@ from hexwrap_solver.pattern.placement import Placement, anchor_vertex
 from hexwrap_solver.pattern.rings import places, rows_from, turns_around, winding
 from hexwrap_solver.pattern.rotation import with_rotation
 from hexwrap_solver.pattern.size import ASKED
-from hexwrap_solver.pattern.trim import Points, Trimmed, trim
+from hexwrap_solver.pattern.trim import Points, TooCoarse, Trimmed, trim
 from hexwrap_solver.pattern.types import Pattern, PatternSettings
 from hexwrap_solver.surface.projection import project, start_parameters
 
@@ -64,11 +64,16 @@ def _lay(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings, progre
     layout = layout_of(cmap, lattice, placement)
     _check_count(layout, settings)
     nodes = find_nodes(layout)
+    if not nodes.n:
+        raise _too_coarse(placement)
     progress(0.3, f"{nodes.n} nodes")
     links = link_nodes(layout, nodes)
     progress(0.6, "edges")
     if settings.boundary == "trim":
-        trimmed = trim(cmap, layout, nodes, links)
+        try:
+            trimmed = trim(cmap, layout, nodes, links)
+        except TooCoarse:
+            raise _too_coarse(placement) from None
     else:
         cells = only_whole_cells(lattice, layout.motion, links)
         points = Points(nodes.face[nodes.own], lattice.position(nodes.point[nodes.own]))
@@ -102,9 +107,7 @@ def _finish(
 ) -> Pattern:
     keep = largest_part(cut.cells) if cut.cells.n else np.zeros(0, dtype=bool)
     if not keep.any():
-        raise PatternError(
-            f"No whole cell fits on the surface at {placement.around} cells around: ask for smaller cells."
-        )
+        raise _too_coarse(placement)
     cells = cut.cells.part(keep)
     corner, point = manifold_corners(cells)
     triangle, place = cut.points.face[point], cut.points.place[point]
@@ -113,7 +116,7 @@ def _finish(
     on_surface = surface_weights(cmap, triangle, weights)
     vertices, normals = _on_input_surface(cmap, triangle, on_surface)
     faces, neighbours = Ragged(corner, cells.corner.offsets), cells.neighbours()
-    first = _at_first_loop(cmap, faces, neighbours, cells.turns)
+    first = _at_first_loop(cmap, layout.cover, placement, faces, neighbours, cells.turns)
     ring = rows_from(neighbours, first)
     if settings.kind == "triangle":
         ring = ring // 2  # a row of triangles: those that stand and those that hang
@@ -177,7 +180,16 @@ def mean_edge(vertices: Floats, faces: Ragged) -> float:
     return float(length @ area / area.sum())
 
 
-def _at_first_loop(cmap: ConformalMap, faces: Ragged, neighbours: Ragged, sheet: Ints) -> Bools:
+def _too_coarse(placement: Placement) -> PatternError:
+    return PatternError(
+        f"With {placement.around} cells around, the cells do not close up to a ring around the surface, "
+        "since they are too large for its narrowest place: ask for more cells around, or a shorter edge."
+    )
+
+
+def _at_first_loop(
+    cmap: ConformalMap, cover: Cover, placement: Placement, faces: Ragged, neighbours: Ragged, sheet: Ints
+) -> Bools:
     """(c,) cells with an edge on the loop of the pattern that faces the surface's loop 0.
 
     Raises PatternError unless the pattern is an annulus: two boundary loops, one each way around.
@@ -193,11 +205,8 @@ def _at_first_loop(cmap: ConformalMap, faces: Ragged, neighbours: Ragged, sheet:
     gained = np.bincount(which, weights=sheet[following[edge]] - sheet[edge])
     euler = n - (len(faces.values) + len(edge)) // 2 + faces.n_rows
     if len(loops) != 2 or sorted(np.rint(gained)) != [-1, 1] or euler != 0:
-        raise PatternError(
-            "The whole cells do not close up to a ring around the surface, since the cells are too large for "
-            "its narrowest place: ask for more cells around, or a shorter edge length."
-        )
-    side = int(np.argmax(gained * winding(cmap)))
+        raise _too_coarse(placement)
+    side = int(np.argmax(gained * winding(cmap, cover)))
     first = np.zeros(faces.n_rows, dtype=bool)
     first[faces.row[edge[which == side]]] = True
     return first

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from hexwrap_solver.conformal.types import ConformalMap
-from hexwrap_solver.pattern.align import place_by_sides
+from hexwrap_solver.pattern.align import place_by_sides, turn_between_loops
 from hexwrap_solver.pattern.cone import place_on_cone, place_on_flat_ring
 from hexwrap_solver.pattern.cylinder import place_on_cylinder
 from hexwrap_solver.pattern.lattice import Lattice
@@ -52,6 +52,9 @@ def _place_by_sides(
         f"To align loop {' and loop '.join(map(str, loops))} at this size would distort cells by "
         f"{tried.distortion:.2f}, more than {BEARABLE}: smaller cells, or corners elsewhere, fit better."
     )
+    turned = abs(np.rad2deg(turn_between_loops(cmap, lattice, loops)))
+    if turned > 1:
+        told += f" The sides of the two loops stand at {turned:.1f}° to each other about the apex."
     fewer = [place_by_sides(cmap, lattice, settings, turns, [loop]) for loop in loops if len(loops) == 2]
     best = min(fewer, key=lambda placement: placement.distortion, default=tried)
     if best.distortion > BEARABLE:

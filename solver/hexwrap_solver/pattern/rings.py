@@ -8,6 +8,7 @@ from scipy.sparse.csgraph import breadth_first_order
 
 from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged
 from hexwrap_solver.conformal.types import ConformalMap
+from hexwrap_solver.domain.cover import Cover
 
 
 def turns_around(cmap: ConformalMap) -> Floats:
@@ -41,15 +42,12 @@ def turns_around(cmap: ConformalMap) -> Floats:
     return np.asarray((angle + np.angle(cmap.uv[0] - apex)) / deck.angle)
 
 
-def winding(cmap: ConformalMap) -> int:
+def winding(cmap: ConformalMap, cover: Cover) -> int:
     """+1 or −1: the sheets gained by following loop 0 once."""
-    loop = cmap.surface.loops[0]
-    faces = cmap.surface.faces
-    n = len(cmap.uv)
-    tail, head = faces, np.roll(faces, -1, axis=1)
-    gained = np.roll(cmap.sheet, -1, axis=1) - cmap.sheet
-    wanted = loop * n + np.roll(loop, -1)
-    return int(gained[np.isin(tail * n + head, wanted)].sum())
+    face, edge = np.nonzero(cover.across < 0)
+    tail = cmap.surface.faces[face, edge]
+    gained = cmap.sheet[face, (edge + 1) % 3] - cmap.sheet[face, edge]
+    return int(gained[np.isin(tail, cmap.surface.loops[0])].sum())
 
 
 def rows_from(neighbours: Ragged, first: Bools) -> Ints:

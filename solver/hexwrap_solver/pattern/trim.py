@@ -37,6 +37,10 @@ NOTHING = 1e-7
 ALONG, BACK = -1.0, 100.0
 
 
+class TooCoarse(Exception):
+    """A face of the arrangement goes around the surface: no link separates it from itself."""
+
+
 @dataclass(frozen=True)
 class Points:
     """Points of the arrangement: nodes first. face: triangle of the map; place: complex in its coordinates,
@@ -100,7 +104,7 @@ def trim(cmap: ConformalMap, layout: Layout, nodes: Nodes, links: Links) -> Trim
     points, edges = _arrangement(cmap, layout, nodes, links, used)
     faces = _trace(edges, used)
     area = _areas(layout, points, faces)
-    gone = _slivers(edges, faces, area, lattice.cell_area)
+    gone = _slivers(edges, faces, area, lattice.cell_area, _lengths(layout, points, edges))
     joined = 0
     if gone.any():
         joined = int(((area > NOTHING * lattice.cell_area) & (area < SLIVER * lattice.cell_area)).sum())
@@ -151,7 +155,9 @@ def _trace(edges: _HalfEdges, used: Bools) -> _Faces:
         at = following[at]
         step += 1
         done = at == start[walker]
-        finished[walker[done]] = turns[done] == 0
+        finished[walker[done]] = True
+        if (turns[done] != 0).any():
+            raise TooCoarse
         going = ~done & (at > start[walker])  # each cycle is walked to its end from its lowest half-edge
         walker, at, turns = walker[going], at[going], turns[going]
     all_who = np.concatenate(who) if who else start
@@ -175,8 +181,18 @@ def _areas(layout: Layout, points: Points, faces: _Faces) -> Floats:
     return np.asarray(np.add.reduceat(cross, faces.half_edge.offsets[:-1]))
 
 
-def _slivers(edges: _HalfEdges, faces: _Faces, area: Floats, cell_area: float) -> Bools:
-    """Half-edges to take away, so that each small piece joins the cut neighbour with most edges in common."""
+def _lengths(layout: Layout, points: Points, edges: _HalfEdges) -> Floats:
+    """(h,) lengths of half-edges in lattice units."""
+    return np.asarray(
+        abs(layout.motion.carry(points.place[edges.head], edges.sheet) - points.place[edges.tail])
+    )
+
+
+def _slivers(edges: _HalfEdges, faces: _Faces, area: Floats, cell_area: float, length: Floats) -> Bools:
+    """Half-edges to take away, so that each small piece joins the cut neighbour with the longest border.
+
+    Of equal ones, the neighbour that follows along the boundary, so that nothing depends on numbering.
+    """
     gone = np.zeros(len(edges.tail), dtype=bool)
     face_of = np.full(len(edges.tail), -1, dtype=np.int64)
     face_of[faces.half_edge.values] = faces.half_edge.row
@@ -186,9 +202,15 @@ def _slivers(edges: _HalfEdges, faces: _Faces, area: Floats, cell_area: float) -
     mine, other = faces.half_edge.row[entry], face_of[edges.twin[half_edge]]
     fits = other >= 0
     fits &= np.where(fits, area[other] >= SLIVER * cell_area, False)
+    after_rim = np.zeros(len(edges.tail), dtype=bool)
+    on_rim = edges.outer[edges.twin[faces.half_edge.values]]
+    after_rim[faces.half_edge.values[faces.half_edge.next()]] = on_rim
     mine, other, half_edge = mine[fits], other[fits], half_edge[fits]
-    pair, index, count = np.unique(np.stack([mine, other]), axis=1, return_inverse=True, return_counts=True)
-    order = np.lexsort((pair[1], -count, pair[0]))
+    pair, index = np.unique(np.stack([mine, other]), axis=1, return_inverse=True)
+    border, follows = (
+        np.bincount(index.ravel(), weights=w[half_edge], minlength=pair.shape[1]) for w in (length, after_rim)
+    )
+    order = np.lexsort((-follows, -np.round(border, 7), pair[0]))
     best = order[np.unique(pair[0][order], return_index=True)[1]]
     away = half_edge[np.isin(index.ravel(), best)]
     gone[away] = True

@@ -1,0 +1,115 @@
+"""Corners in the boundary: every straight side lies on a lattice line, and the pattern still closes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hexwrap_solver.conformal import conformal_map
+from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap
+from hexwrap_solver.errors import PatternError
+from hexwrap_solver.pattern import lay_pattern
+from hexwrap_solver.pattern.deform import distortion_of
+from hexwrap_solver.pattern.lattice import LATTICES
+from hexwrap_solver.pattern.place import loops_to_align, place_lattice
+from hexwrap_solver.pattern.rows import rows_along
+from hexwrap_solver.pattern.sides import sides_of
+from hexwrap_solver.pattern.types import PatternSettings
+from tests.solver.pattern import annuli
+from tests.solver.pattern.test_lay import check_closed
+from tests.solver.pattern.test_trim import cell_areas, euler
+
+#: Boundary vertices of a grid with 48 columns and 16 rows, and their angles in units of π.
+CASES = {
+    "cone": ([0, 16, 32], [0, 16, 32], [4 / 3] * 3, [2 / 3] * 3, -np.pi),
+    "entrance": ([10, 14, 18], [], [4 / 3, 1 / 3, 4 / 3], [], 0.0),
+    "two entrances": ([2, 5, 8, 25, 29, 33], [], [4 / 3, 1 / 3, 4 / 3] * 2, [], 0.0),
+}
+
+
+def bell(case: str) -> ConformalMap:
+    """A bell, not of revolution, with corners in its boundary."""
+    n, rows = 48, 16
+    low, high, low_angles, high_angles, _ = CASES[case]
+    base = annuli.revolution(lambda z: 1 + 0.5 * z + 0.1 * z**2, np.linspace(0, 1.6, rows + 1), n)
+    points = base.surface.vertices.copy()
+    points[:, 0] *= 1.2 + 0.1 * np.sin(points[:, 2])
+    points[:, 1] += 0.2 * points[:, 2]
+    cmap = annuli.make_map(points, base.surface.faces, base.sheet, base.uv, base.deck, n)
+    vertices = np.array(low + [n * rows + i for i in high])
+    angles = np.pi * np.array(low_angles + high_angles)
+    return conformal_map(cmap.surface, BoundaryCondition(mode="angles", vertices=vertices, angles=angles))
+
+
+MAPS = {case: bell(case) for case in CASES}
+
+
+@pytest.mark.parametrize("case", list(CASES))
+@pytest.mark.parametrize("align", ["first", "both"])
+@pytest.mark.parametrize("rotation", ["edge", "vertex"])
+@pytest.mark.parametrize("kind", ["hex", "triangle"])
+def test_every_side_lies_on_a_lattice_line(case, align, rotation, kind):
+    cmap = MAPS[case]
+    assert cmap.deck.angle == pytest.approx(CASES[case][4], abs=1e-9)
+    lattice = LATTICES[kind]
+    request = PatternSettings(kind=kind, rotation=rotation, align=align, around=96)
+    placed = place_lattice(cmap, lattice, request)
+    assert not placed.notes
+    loops, _ = loops_to_align(cmap, lattice, request)
+    assert loops == {"first": [0], "both": [0, 1]}[align]
+    sides = sides_of(cmap, lattice, loops)
+    rows = rows_along(lattice, 0.0 if rotation == "edge" else lattice.quantum / 2, "whole")
+    place = placed.motion.carry(placed.place[sides.vertex], sides.sheet)
+    for side in range(sides.n):
+        z = place[sides.side == side]
+        along = (z[-1] - z[0]) / abs(z[-1] - z[0])
+        depth = (z * np.conj(1j * along)).real
+        assert np.ptp(depth) < 1e-9
+        steps = (depth.mean() - rows.first) / rows.period
+        assert steps == pytest.approx(round(steps), abs=1e-9)
+    assert placed.distortion == pytest.approx(distortion_of(cmap, placed.motion, placed.place), rel=1e-6)
+    assert placed.distortion < 0.3
+
+
+@pytest.mark.parametrize("case", list(CASES))
+def test_patterns_with_corners_close_and_fill_the_deformed_domain(case):
+    cmap = MAPS[case]
+    check_closed(lay_pattern(cmap, PatternSettings(around=60)))
+    pattern = lay_pattern(cmap, PatternSettings(around=60, boundary="trim"))
+    assert euler(pattern) == 0
+    assert 0 < pattern.distortion < 0.3
+    # Every cell away from the corners is whole, or an exact half: a trapezoid of four corners.
+    lengths = pattern.faces.lengths[~pattern.whole]
+    assert np.count_nonzero(lengths != 4) <= 2 * sum(len(x) for x in CASES[case][:2])
+    assert (pattern.faces.lengths[pattern.whole] == 6).all()
+    assert (cell_areas(cmap, pattern) > 0).all()
+
+
+def test_distortion_falls_with_the_size_of_the_cells():
+    def worst(counts: list[int]) -> float:
+        requests = [PatternSettings(around=n, align="first") for n in counts]
+        return max(place_lattice(MAPS["entrance"], LATTICES["hex"], r).distortion for r in requests)
+
+    assert worst([320, 352, 384]) < worst([40, 44, 48]) / 2
+
+
+def test_alignment_that_cannot_be_is_told():
+    cone = annuli.flat_cone(np.pi, 1.0, 2.0, 60, 12)
+    assert any("not aligned" in note for note in lay_pattern(cone, PatternSettings()).notes)
+    tube = annuli.revolution(np.cosh, np.linspace(-1, 1, 15), 40)
+    assert any("not aligned" in note for note in lay_pattern(tube, PatternSettings(rotation=10.0)).notes)
+
+
+def test_loops_turned_against_each_other_are_not_both_aligned():
+    """Sides of one loop stand at multiples of the quantum, those of two loops at any angle to each other."""
+    low, _, angles, other, K = CASES["cone"]
+    CASES["turned"] = (low, [8, 24, 40], angles, other, K)
+    pattern = lay_pattern(bell("turned"), PatternSettings(around=60))
+    assert any("about the apex" in note for note in pattern.notes)
+    assert pattern.distortion < 0.2
+    check_closed(pattern)
+
+
+def test_cells_larger_than_the_narrowest_place_are_refused():
+    with pytest.raises(PatternError, match="close up"):
+        lay_pattern(MAPS["cone"], PatternSettings(around=3))
