@@ -21,6 +21,7 @@ from starlette.responses import Response
 from hexwrap_server import __version__
 from hexwrap_server.answers import WORTH_PACKING, problem_response
 from hexwrap_server.engine import Engine
+from hexwrap_server.hops import hops_router
 from hexwrap_server.observe import Observer, set_up_logging
 from hexwrap_server.problems import HttpError
 from hexwrap_server.routes import JobFailedError, router
@@ -65,6 +66,7 @@ def create_app(settings: Settings | None = None, engine: Engine | None = None) -
     )
     app.state.service = service
     app.include_router(router)
+    app.include_router(hops_router())
     add_viewer(app)
     app.add_exception_handler(HexwrapError, _on_error)
     app.add_exception_handler(HTTPException, _on_http_exception)

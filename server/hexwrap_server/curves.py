@@ -141,9 +141,14 @@ def _read_3dm(data: bytes) -> list[Curve]:
         if isinstance(geometry, rhino3dm.Point):
             curves.append(_curve([_xyz(geometry.Location)]))
         elif isinstance(geometry, rhino3dm.Curve):
-            points = _curve_points(geometry)
-            curves.append(_curve(points[:-1] if geometry.IsClosed else points, bool(geometry.IsClosed)))
+            curves.append(rhino_curve(geometry))
     return curves
+
+
+def rhino_curve(geometry: Any) -> Curve:
+    """A curve of rhino3dm."""
+    points = _curve_points(geometry)
+    return _curve(points[:-1] if geometry.IsClosed else points, bool(geometry.IsClosed))
 
 
 def _curve_points(curve: Any) -> list[list[float]]:

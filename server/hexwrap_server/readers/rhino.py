@@ -36,14 +36,15 @@ def read_3dm(data: bytes) -> SentMesh | NurbsSurface:
             "panelized alone, or join them into one mesh.",
             data={"objects": named[:100]},
         )
-    return _convert(found[0].Geometry)
+    return convert(found[0].Geometry)
 
 
 def _name(item: Any) -> str:
     return f"'{item.Attributes.Name}'" if item.Attributes.Name else str(item.Attributes.Id)
 
 
-def _convert(geometry: Any) -> SentMesh | NurbsSurface:
+def convert(geometry: Any) -> SentMesh | NurbsSurface:
+    """One mesh, polysurface or surface of rhino3dm. Raises UnreadableFileError."""
     if isinstance(geometry, rhino3dm.Mesh):
         return _mesh(geometry)
     if isinstance(geometry, rhino3dm.Brep):
