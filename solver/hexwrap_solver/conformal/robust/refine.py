@@ -10,21 +10,30 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hexwrap_solver.arrays import Bools, Floats, Ints
+from hexwrap_solver.conformal.robust.retriangulate import angle_sums_opposite, flatten_out
 from hexwrap_solver.conformal.types import Targets
 from hexwrap_solver.surface.topology import half_edges, twins
 from hexwrap_solver.surface.types import Surface
 
 #: A boundary vertex with target angle Θ gets at least Θ / FULLEST triangles.
 FULLEST = 0.95 * np.pi
+#: Edges are split between these places of their length.
+WITHIN = (0.02, 0.98)
+#: Opposite angles that add up to more than this call for a split, radians.
+FLAT = np.deg2rad(210.0)
+#: Rounds of it between two solutions.
+SPREAD = 12
 
 
 @dataclass(frozen=True)
 class Problem:
-    """A surface with targets for its vertices. u: (n,) logarithmic factors to start from."""
+    """A surface with targets for its vertices. u: (n,) logarithmic factors to start from.
+    parent: (m,) the face of the unrefined mesh that each face is a part of."""
 
     surface: Surface
     targets: Targets
     u: Floats
+    parent: Ints
 
 
 def split_edges(problem: Problem, marked: Ints, place: Floats) -> Problem:
@@ -54,10 +63,13 @@ def split_edges(problem: Problem, marked: Ints, place: Floats) -> Problem:
 
     normals = blend(surface.normals)
     normals[n:] /= np.maximum(np.linalg.norm(normals[n:], axis=1, keepdims=True), 1e-300)
+    vertices = blend(surface.vertices)
+    parts, source = _subdivide(faces, point.reshape(-1, 3), vertices)
+    parent = problem.parent[source]
     refined = replace(
         surface,
-        vertices=blend(surface.vertices),
-        faces=_subdivide(faces, point.reshape(-1, 3), blend(surface.vertices)),
+        vertices=vertices,
+        faces=flatten_out(vertices, parts, parent),
         loops=(
             _extend(surface.loops[0], h, new, tail, inner),
             _extend(surface.loops[1], h, new, tail, inner),
@@ -73,10 +85,10 @@ def split_edges(problem: Problem, marked: Ints, place: Floats) -> Problem:
         np.concatenate([targets.tie, tie]),
         targets.tie_angle + np.pi * counts,
     )
-    return Problem(refined, grown, blend(problem.u))
+    return Problem(refined, grown, blend(problem.u), parent)
 
 
-def _subdivide(faces: Ints, point: Ints, vertices: Floats) -> Ints:
+def _subdivide(faces: Ints, point: Ints, vertices: Floats) -> tuple[Ints, Ints]:
     """Faces with 0 to 3 split edges become 1 to 4 faces. point: (m, 3) new vertex on the edge from corner
     c."""
     count = (point >= 0).sum(axis=1)
@@ -85,10 +97,11 @@ def _subdivide(faces: Ints, point: Ints, vertices: Floats) -> Ints:
     )
     turned = (lead[:, None] + np.arange(3)) % 3
     (a, b, c), (p, q, r) = np.take_along_axis(faces, turned, 1).T, np.take_along_axis(point, turned, 1).T
-    parts = [faces[count == 0]]
+    parts, source = [faces[count == 0]], [np.flatnonzero(count == 0)]
 
     def add(which: Bools, *triangles: tuple[Ints, Ints, Ints]) -> None:
         parts.extend(np.stack([x[which] for x in triangle], axis=1) for triangle in triangles)
+        source.extend([np.flatnonzero(which)] * len(triangles))
 
     add(count == 1, (a, p, c), (p, b, c))
     two = count == 2  # p on ab, q on bc: the quad a p q c by its shorter diagonal
@@ -100,7 +113,7 @@ def _subdivide(faces: Ints, point: Ints, vertices: Floats) -> Ints:
     add(two & reach, (a, p, q), (a, q, c))
     add(two & ~reach, (a, p, c), (p, q, c))
     add(count == 3, (a, p, r), (p, b, q), (q, c, r), (p, q, r))
-    return np.concatenate(parts)
+    return np.concatenate(parts), np.concatenate(source)
 
 
 def _extend(loop: Ints, h: Ints, new: Ints, tail: Ints, inner: Bools) -> Ints:
@@ -128,6 +141,40 @@ def _blend_parameters(surface: Surface, i: Ints, j: Ints, s: Floats) -> Floats |
         else:
             blended[:, k] = one[:, k] + s * step
     return np.concatenate([surface.parameters, blended])
+
+
+def spread(problem: Problem, first_new: int) -> Problem:
+    """Splits edges between parents near vertices from ``first_new`` on, where these have made them far from
+    Delaunay: an inserted vertex pulls on the triangles behind it, round after round through a fan."""
+    for _ in range(SPREAD):
+        surface = problem.surface
+        faces, n = surface.faces, len(surface.vertices)
+        near = np.flatnonzero((faces >= first_new).any(axis=1))
+        twin = twins(faces, n)
+        h = (3 * near[:, None] + np.arange(3)).ravel()
+        h = h[(twin[h] >= 0)]
+        h = h[problem.parent[h // 3] != problem.parent[twin[h] // 3]]
+        h = np.unique(np.minimum(h, twin[h]))
+        bad = h[angle_sums_opposite(surface.vertices, faces, h, twin[h]) > FLAT]
+        if not len(bad):
+            break
+        first_new = n
+        problem = split_edges(problem, bad, _feet(surface, faces, bad, twin[bad]))
+    return problem
+
+
+def _feet(surface: Surface, faces: Ints, h: Ints, t: Ints) -> Floats:
+    """(k,) where to split edges: at the foot of the nearer of the two apexes."""
+    tail, head = half_edges(faces)
+    start, edge = surface.vertices[tail[h]], surface.vertices[head[h]] - surface.vertices[tail[h]]
+    length = np.einsum("kd,kd->k", edge, edge)
+    best, nearest = np.full(len(h), 0.5), np.full(len(h), np.inf)
+    for side in (h, t):
+        apex = surface.vertices[faces[side // 3, (side % 3 + 2) % 3]] - start
+        s = np.clip(np.einsum("kd,kd->k", apex, edge) / length, *WITHIN)
+        away = np.linalg.norm(apex - s[:, None] * edge, axis=1)
+        best, nearest = np.where(away < nearest, s, best), np.minimum(away, nearest)
+    return best
 
 
 def collapsing(surface: Surface, targets: Targets, turn: Ints) -> Ints:
@@ -185,4 +232,4 @@ def split_places(surface: Surface, wrong: Ints) -> tuple[Ints, Floats]:
     edge = along[rows, longest]
     apex = corner[rows, (longest + 2) % 3] - corner[rows, longest]
     foot = np.einsum("kd,kd->k", apex, edge) / length[rows, longest] ** 2
-    return 3 * wrong + longest, np.clip(foot, 0.02, 0.98)
+    return 3 * wrong + longest, np.clip(foot, *WITHIN)

@@ -23,6 +23,7 @@ from hexwrap_solver.conformal.robust.refine import (
     collapsing,
     split_edges,
     split_places,
+    spread,
 )
 from hexwrap_solver.conformal.robust.straight import straighten
 from hexwrap_solver.conformal.types import ConformalMap, Deck, Targets
@@ -46,8 +47,13 @@ def solve_with_flips(
     Sources: Gu, Luo, Sun, Wu 2018 (existence); Springborn 2020; Gillespie, Springborn, Crane 2021 (flips).
     Raises ConvergenceError where double precision does not suffice.
     """
-    problem = Problem(surface, targets, np.zeros(len(surface.vertices)) if start is None else start)
-    iterations = 0
+    problem = Problem(
+        surface,
+        targets,
+        np.zeros(len(surface.vertices)) if start is None else start,
+        np.arange(len(surface.faces)),
+    )
+    iterations, fewest = 0, len(surface.faces)
     for _ in range(MAX_ROUNDS):
         problem = _uncollapse(problem)
         found = _attempt(problem, progress)
@@ -56,7 +62,11 @@ def solve_with_flips(
         if not len(wrong):
             return _told(found, surface, iterations)
         problem = replace(problem, u=found.log_scale)
+        before = len(problem.surface.vertices)
         problem = split_edges(problem, *split_places(problem.surface, wrong))
+        if len(wrong) >= fewest:
+            problem = spread(problem, before)
+        fewest = min(fewest, len(wrong))
     inserted = len(problem.surface.vertices) - len(surface.vertices)
     raise ConvergenceError(
         f"After {MAX_ROUNDS} rounds of refinement with {inserted} new vertices {len(wrong)} triangles still "
