@@ -1,13 +1,16 @@
-"""Which triangles of an unrolled map are positively oriented, beyond the rounding of their corners."""
+"""Whether an unrolled map, as drawn, is what its metric says, beyond the rounding of its corners."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from hexwrap_solver.arrays import Bools, Complexes
+from hexwrap_solver.conformal.types import ConformalMap
 
 #: Corners are good to a few roundings of their distance from the origin.
 ROUNDINGS = 32 * np.finfo(np.float64).eps
+#: Boundary angles are promised to 1e-9.
+ANGLE = 5e-10
 
 
 def positive(corners: Complexes) -> Bools:
@@ -16,3 +19,20 @@ def positive(corners: Complexes) -> Bools:
     area = (np.conj(a) * b).imag
     longest = np.maximum(np.maximum(np.abs(a), np.abs(b)), np.abs(b - a))
     return np.asarray(area > ROUNDINGS * np.abs(corners).max(axis=1) * longest)
+
+
+def faithful(found: ConformalMap) -> bool:
+    """Whether the angles drawn at the boundary add up to ``boundary_angles``."""
+    faces = found.surface.faces
+    inner = np.ones(len(found.surface.vertices), dtype=bool)
+    inner[np.concatenate(found.surface.loops)] = False
+    face, c = np.nonzero(~inner[faces])
+    corners = found.corners()[face]
+    k = np.arange(len(face))
+    here = corners[k, c]
+    a, b = corners[k, (c + 1) % 3] - here, corners[k, (c + 2) % 3] - here
+    sums = np.bincount(faces[face, c], np.angle(np.conj(a) * b), len(inner))
+    return all(
+        bool((np.abs(sums[loop] - told) <= ANGLE).all())
+        for loop, told in zip(found.surface.loops, found.boundary_angles, strict=True)
+    )

@@ -12,7 +12,7 @@ from hexwrap_solver.conformal.corners import boundary_angles
 from hexwrap_solver.conformal.energy import Energy
 from hexwrap_solver.conformal.layout import lay_out
 from hexwrap_solver.conformal.newton import Minimum, minimise
-from hexwrap_solver.conformal.orientation import positive
+from hexwrap_solver.conformal.orientation import faithful, positive
 from hexwrap_solver.conformal.robust import solve_with_flips, with_inserted
 from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap, Deck, Targets
 from hexwrap_solver.errors import ConvergenceError
@@ -110,7 +110,7 @@ def _map(
     found = _metric(surface, targets, start, progress)
     if isinstance(found, _Plain):
         found = _finish(surface, found.energy, found.minimum)
-        if not positive(found.corners()).all():
+        if not (positive(found.corners()).all() and faithful(found)):
             found = solve_with_flips(surface, targets, progress, start)
     if (targets.tie == 0).any():
         return found

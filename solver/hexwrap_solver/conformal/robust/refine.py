@@ -17,6 +17,8 @@ from hexwrap_solver.surface.types import Surface
 
 #: A boundary vertex with target angle Θ gets at least Θ / FULLEST triangles.
 FULLEST = 0.95 * np.pi
+#: Where triangles have turned over, boundary vertices get so many that their mean angle is below this.
+WIDE = 0.45 * np.pi
 #: Edges are split between these places of their length.
 WITHIN = (0.02, 0.98)
 #: Opposite angles that add up to more than this call for a split, radians.
@@ -184,7 +186,8 @@ def collapsing(surface: Surface, targets: Targets, turn: Ints) -> Ints:
     that it cuts off; and around a boundary vertex with few triangles their angles, below π each, cannot add
     up to a large target. turn: (3m,) as in ``MirrorMesh``.
     """
-    return np.union1d(_chords(surface, targets, turn), _crowded(surface, targets))
+    crowded = _crowded(surface, targets, FULLEST, np.concatenate(surface.loops))
+    return np.union1d(_chords(surface, targets, turn), crowded)
 
 
 def _chords(surface: Surface, targets: Targets, turn: Ints) -> Ints:
@@ -210,20 +213,26 @@ def _chords(surface: Surface, targets: Targets, turn: Ints) -> Ints:
     return np.concatenate(found)
 
 
-def _crowded(surface: Surface, targets: Targets) -> Ints:
-    """The edges opposite to boundary vertices whose targets their triangles cannot reach."""
+def _crowded(surface: Surface, targets: Targets, most: float, among: Ints) -> Ints:
+    """The edges opposite to those boundary vertices ``among`` whose triangles would need a mean angle above
+    ``most``."""
     faces = surface.faces
     count = np.bincount(faces.ravel(), minlength=len(surface.vertices))
+    boundary = np.zeros(len(count), dtype=bool)
+    boundary[np.concatenate(surface.loops)] = True
+    among = among[boundary[among] & (targets.tie[among] < 0)]
     crowded = np.zeros(len(count), dtype=bool)
-    boundary = np.concatenate(surface.loops)
-    crowded[boundary] = (targets.tie[boundary] < 0) & (targets.angle[boundary] > count[boundary] * FULLEST)
+    crowded[among] = targets.angle[among] > count[among] * most
     corner = np.flatnonzero(crowded[faces.ravel()])
     return 3 * (corner // 3) + (corner % 3 + 1) % 3
 
 
-def split_places(surface: Surface, wrong: Ints) -> tuple[Ints, Floats]:
-    """(half-edges, places) that split the longest edge of each of the faces ``wrong``: at the foot of the
-    altitude."""
+def split_places(surface: Surface, targets: Targets, wrong: Ints) -> tuple[Ints, Floats]:
+    """(half-edges, places) to split where the faces ``wrong`` have turned over.
+
+    The longest edge of each, at the foot of its altitude; and around boundary vertices of theirs with few
+    triangles for their target, the opposite edges: a wide angle wants a fan.
+    """
     corner = surface.vertices[surface.faces[wrong]]
     along = np.roll(corner, -1, axis=1) - corner
     length = np.linalg.norm(along, axis=2)
@@ -232,4 +241,6 @@ def split_places(surface: Surface, wrong: Ints) -> tuple[Ints, Floats]:
     edge = along[rows, longest]
     apex = corner[rows, (longest + 2) % 3] - corner[rows, longest]
     foot = np.einsum("kd,kd->k", apex, edge) / length[rows, longest] ** 2
-    return 3 * wrong + longest, np.clip(foot, *WITHIN)
+    fan = _crowded(surface, targets, WIDE, np.unique(surface.faces[wrong]))
+    places = np.concatenate([np.full(len(fan), 0.5), np.clip(foot, *WITHIN)])
+    return np.concatenate([fan, 3 * wrong + longest]), places

@@ -38,14 +38,14 @@ def flatten_out(vertices: Floats, faces: Ints, parent: Ints) -> Ints:
 
 def angle_sums_opposite(points: Floats, faces: Ints, one: Ints, other: Ints) -> Floats:
     """(k,) the two angles that edges are seen under from their faces, from both half-edges."""
-    return _seen_under(points, faces, one) + _seen_under(points, faces, other)
+    return np.asarray(_seen_under(points, faces, one) + _seen_under(points, faces, other))
 
 
 def _seen_under(points: Floats, faces: Ints, h: Ints) -> Floats:
     tail, head = half_edges(faces)
     apex = points[faces.ravel()[next_half_edge(next_half_edge(h))]]
     a, b = points[tail[h]] - apex, points[head[h]] - apex
-    return np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.einsum("kd,kd->k", a, b))
+    return np.asarray(np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.einsum("kd,kd->k", a, b)))
 
 
 def _first_come(one: Ints, other: Ints, m: int) -> Bools:

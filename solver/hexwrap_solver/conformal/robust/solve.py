@@ -63,7 +63,7 @@ def solve_with_flips(
             return _told(found, surface, iterations)
         problem = replace(problem, u=found.log_scale)
         before = len(problem.surface.vertices)
-        problem = split_edges(problem, *split_places(problem.surface, wrong))
+        problem = split_edges(problem, *split_places(problem.surface, problem.targets, wrong))
         if len(wrong) >= fewest:
             problem = spread(problem, before)
         fewest = min(fewest, len(wrong))
