@@ -250,9 +250,11 @@ def _around(nurbs: NurbsSurface, sample: _Sample, heights: Floats, spacing: Floa
 
 
 def _numbers(needed: Floats) -> list[int]:
-    """Whole numbers of vertices, at least 3, in few different steps."""
+    """Whole numbers of vertices, at least 3, in few different steps; divisible by 12 where that costs little,
+    so that symmetric surfaces have symmetric boundaries."""
     level = np.ceil(np.log(np.maximum(needed, 3) / needed.max()) / np.log(STEP) - 1e-9)
     numbers = np.ceil(np.maximum(needed.max(), 3) * STEP**level - 1e-9)
+    numbers = np.where(numbers >= 72, 12 * np.ceil(numbers / 12), numbers)
     return [int(x) for x in np.maximum(numbers, 3)]
 
 
