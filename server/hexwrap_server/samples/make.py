@@ -31,7 +31,8 @@ def loft(rings: Floats) -> NurbsSurface:
 
 
 def _angles(around: int) -> Floats:
-    return np.arange(around) / around * 2 * np.pi
+    """Of the control points; a cubic periodic curve begins at its second one, so the seam is at angle 0."""
+    return (np.arange(around) - 1) / around * 2 * np.pi
 
 
 def tower() -> NurbsSurface:
@@ -85,11 +86,9 @@ def tent() -> NurbsSurface:
     t = np.linspace(0, 1, 8)[:, None]
     a = _angles(18)
     radius = np.array([24.0, 21.4, 18.4, 15.4, 12.6, 10.2, 8.3, 7.0])[:, None]
-    lobes = 1 + 0.13 * (1 - t) ** 1.5 * np.cos(3 * a)
-    turn = a + 0.7 * t
-    x = radius * lobes * np.cos(turn) + 2.0 * t
-    z = 30.0 * t**0.9 + 1.6 * t**2 * np.cos(turn)
-    return loft(np.stack([x, radius * lobes * np.sin(turn), z], axis=2))
+    radius = radius * (1 + 0.15 * (1 - t) ** 1.5 * np.cos(3 * a))
+    z = 30.0 * t**0.9 + 1.2 * t**2 * np.cos(3 * a)
+    return loft(np.stack([radius * np.cos(a), radius * np.sin(a), z], axis=2))
 
 
 def pavilion() -> NurbsSurface:
@@ -97,7 +96,7 @@ def pavilion() -> NurbsSurface:
     t = np.linspace(0, 1, 6)[:, None]
     a = _angles(16)
     radius = 13.0 + 2.6 * np.sin(np.pi * (0.15 + 0.7 * t)) + 0.5 * np.cos(2 * a) * t
-    z = 13.0 * t + 0.8 * t**2 * np.cos(a - 0.5)
+    z = 13.0 * t + 0.7 * t**2 * np.cos(2 * a)
     return loft(np.stack([radius * np.cos(a), 0.92 * radius * np.sin(a), z], axis=2))
 
 
@@ -183,7 +182,7 @@ def _cone() -> tuple[NurbsSurface, dict[str, Any]]:
         "cone",
         surface,
         boundary={"mode": "angles", "angles": angles, "angle_unit": "pi"},
-        pattern={"kind": "hex", "around": 48},
+        pattern={"kind": "hex", "around": 52},
     )
 
 
@@ -191,7 +190,7 @@ def _isometric() -> tuple[NurbsSurface, dict[str, Any]]:
     """Figure 5, right: boundary lengths kept, on the nearest cone that fits hexagons."""
     surface = tent()
     return surface, body(
-        "isometric", surface, boundary={"mode": "isometric"}, pattern={"kind": "hex", "around": 48}
+        "isometric", surface, boundary={"mode": "isometric"}, pattern={"kind": "hex", "around": 52}
     )
 
 
@@ -199,7 +198,7 @@ def _entrance() -> tuple[NurbsSurface, dict[str, Any]]:
     """Figure 7, left: two entrances, each of 4π/3, π/3, 4π/3 on the ground, on a straight cylinder."""
     surface = pavilion()
     angles = []
-    for middle in (0.125, 0.625):
+    for middle in (0.25, 0.75):
         left, tip, right = at(surface, 0, [middle - 0.06, middle, middle + 0.06])
         angles += [*corners([left], 4 / 3), *corners([tip], 1 / 3), *corners([right], 4 / 3)]
     return surface, body(
@@ -215,7 +214,7 @@ def _diagrid() -> tuple[NurbsSurface, dict[str, Any]]:
     surface = trunk()
     angles = []
     for middle in np.arange(4) / 4 + 0.125:
-        outer, inner = 0.085, 0.025
+        outer, inner = 0.09, 0.025
         places = at(surface, 0, [middle - outer, middle - inner, middle + inner, middle + outer])
         for place, angle in zip(places, (4 / 3, 2 / 3, 2 / 3, 4 / 3), strict=True):
             angles += corners([place], angle)
@@ -223,7 +222,7 @@ def _diagrid() -> tuple[NurbsSurface, dict[str, Any]]:
         "diagrid",
         surface,
         boundary={"mode": "angles", "angles": angles, "angle_unit": "pi"},
-        pattern={"kind": "triangle", "around": 60},
+        pattern={"kind": "triangle", "around": 64},
     )
 
 

@@ -222,7 +222,7 @@ def _rows(sample: _Sample, h: Floats) -> tuple[Floats, Floats]:
     steps = (rate[1:] + rate[:-1]) / 2 * np.diff(sample.t)[:, None]
     total = np.concatenate([np.zeros((1, rate.shape[1])), np.cumsum(steps, axis=0)])
     needed = total[-1]
-    m = max(1, int(np.ceil(needed.max())))
+    m = 2 * max(1, int(np.ceil(needed.max() / 2)))  # even, so that no boundary is half a step ahead
     heights = np.stack(
         [np.interp(np.arange(m + 1) / m * needed[i], total[:, i], sample.t) for i in range(rate.shape[1])],
         axis=1,
@@ -250,11 +250,12 @@ def _around(nurbs: NurbsSurface, sample: _Sample, heights: Floats, spacing: Floa
 
 
 def _numbers(needed: Floats) -> list[int]:
-    """Whole numbers of vertices, at least 3, in few different steps; divisible by 12 where that costs little,
-    so that symmetric surfaces have symmetric boundaries."""
+    """Whole numbers of vertices, at least 3, in few different steps; divisible by 12 or 6 where that costs
+    little, so that symmetric surfaces have symmetric boundaries."""
     level = np.ceil(np.log(np.maximum(needed, 3) / needed.max()) / np.log(STEP) - 1e-9)
     numbers = np.ceil(np.maximum(needed.max(), 3) * STEP**level - 1e-9)
-    numbers = np.where(numbers >= 72, 12 * np.ceil(numbers / 12), numbers)
+    unit = np.select([numbers >= 72, numbers >= 36], [12, 6], 1)
+    numbers = unit * np.ceil(numbers / unit)
     return [int(x) for x in np.maximum(numbers, 3)]
 
 
