@@ -174,10 +174,8 @@ def _waist() -> tuple[NurbsSurface, dict[str, Any]]:
 def _cone() -> tuple[NurbsSurface, dict[str, Any]]:
     """Figure 5, middle: three corners of 2π/3 below and three of 4π/3 above, on a cone."""
     surface = tent()
-    thirds = np.arange(3) / 3
-    angles = corners(at(surface, 0, thirds.tolist()), 2 / 3) + corners(
-        at(surface, 1, (thirds + 1 / 6).tolist()), 4 / 3
-    )
+    thirds = [0.0, 1 / 3, 2 / 3]
+    angles = corners(at(surface, 0, thirds), 2 / 3) + corners(at(surface, 1, thirds), 4 / 3)
     return surface, body(
         "cone",
         surface,
