@@ -20,6 +20,7 @@ from starlette.responses import Response
 
 from hexwrap_server import __version__
 from hexwrap_server.answers import WORTH_PACKING, problem_response
+from hexwrap_server.docs import add_docs
 from hexwrap_server.engine import Engine
 from hexwrap_server.hops import hops_router
 from hexwrap_server.observe import Observer, set_up_logging
@@ -63,11 +64,14 @@ def create_app(settings: Settings | None = None, engine: Engine | None = None) -
         summary="Seamless hexagonal, quad and triangle panels on tube-like surfaces",
         lifespan=lifespan,
         redirect_slashes=False,
+        docs_url=None,
+        redoc_url=None,
     )
     app.state.service = service
     app.include_router(router)
     app.include_router(hops_router())
     add_viewer(app)
+    add_docs(app)
     app.add_exception_handler(HexwrapError, _on_error)
     app.add_exception_handler(HTTPException, _on_http_exception)
     app.add_exception_handler(RequestValidationError, _on_parameters)

@@ -1,0 +1,93 @@
+"""The whole OpenAPI document, fuzzed: every answer is one that the document announces, and none is a 5xx."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import httpx
+import pytest
+import schemathesis
+from fastapi import FastAPI
+from hypothesis import HealthCheck, given, settings
+from schemathesis.checks import not_a_server_error
+from schemathesis.specs.openapi.checks import (
+    content_type_conformance,
+    response_schema_conformance,
+    status_code_conformance,
+)
+
+from hexwrap_server.routes import router
+from hexwrap_server.viewer import router as viewer
+from tests.server.live import Live, running
+
+CHECKS = [
+    not_a_server_error,
+    status_code_conformance,
+    content_type_conformance,
+    response_schema_conformance,
+]
+ordinary = settings(max_examples=8, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+thorough = settings(max_examples=500, deadline=None, suppress_health_check=list(HealthCheck))
+
+
+@pytest.fixture(scope="module")
+def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Live]:
+    with running(tmp_path_factory.mktemp("data"), workers=1, job_seconds=20.0) as live:
+        while live.get("/ready").status_code != 200:
+            time.sleep(0.05)
+        yield live
+
+
+def operations() -> list[Any]:
+    """Every route of the application."""
+    app = FastAPI()
+    app.include_router(router)
+    app.include_router(viewer)
+    return [
+        operation.ok() for operation in schemathesis.openapi.from_dict(app.openapi()).get_all_operations()
+    ]
+
+
+def test_document_names_every_route_of_the_contract(client: Live) -> None:
+    paths = client.get("/openapi.json").json()["paths"]
+    job = "/v1/jobs/{id}"
+    assert paths.keys() >= {"/health", "/v1/jobs", job, "/v1/solve", "/v1/surfaces"}
+    assert paths.keys() >= {
+        f"{job}/{name}" for name in ("events", "result", "lift", "flatten", "files/{name}")
+    }
+    assert paths[job].keys() >= {"get", "delete"}
+
+
+def test_documentation_is_served(client: Live) -> None:
+    page = client.get("/docs")
+    assert page.status_code == 200
+    assert "/v1/solve" in page.text
+    assert "//" not in page.text
+
+
+def attack(client: Live, operation: Any, how: settings) -> None:
+    @how
+    @given(case=operation.as_strategy())
+    def answers(case: Any) -> None:
+        case.call_and_validate(base_url=str(client.base_url), checks=CHECKS, timeout=60)
+
+    answers()
+
+
+@pytest.mark.parametrize("operation", operations(), ids=lambda operation: operation.label)
+def test_answers_are_those_announced(client: Live, operation: Any) -> None:
+    attack(client, operation, ordinary)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("operation", operations(), ids=lambda operation: operation.label)
+def test_answers_are_those_announced_in_many_cases(client: Live, operation: Any) -> None:
+    attack(client, operation, thorough)
+
+
+@pytest.mark.parametrize("accept", [httpx.Headers({"Accept": "*/*"}), httpx.Headers({"Accept": "text/html"})])
+def test_problems_are_problems_whatever_is_accepted(client: Live, accept: httpx.Headers) -> None:
+    answer = client.get("/v1/nothing", headers=accept)
+    assert answer.headers["content-type"] == "application/problem+json"
