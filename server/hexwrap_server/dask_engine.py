@@ -38,23 +38,28 @@ class DaskEngine:
         self._client: Any = None
         self._listeners: dict[str, Callable[..., None]] = {}
         self._places: dict[str, str] = {}
+        self._machines: dict[str, int] = {}  # threads by address
+        self._looking: asyncio.Task[None] | None = None
 
     @property
     def capacity(self) -> int:
-        threads: list[int] = [machine["nthreads"] for machine in self._machines().values()]
-        return max(1, sum(threads))
+        return max(1, sum(self._machines.values()))
 
     @property
     def is_ready(self) -> bool:
-        return bool(self._machines())
+        return bool(self._machines)
 
     async def start(self) -> None:
         """Raises OSError when the scheduler does not answer."""
         client: Any = Client
         self._client = await client(self._address, asynchronous=True, timeout=CONNECT_SECONDS)
         self._client.subscribe_topic(_TOPIC, self._hear)
+        await self._look()
+        self._looking = asyncio.create_task(self._keep_looking())
 
     async def stop(self) -> None:
+        if self._looking is not None:
+            self._looking.cancel()
         if self._client is not None:
             for _ in range(20):  # calls that were cancelled are just being killed
                 if not self._listeners:
@@ -98,7 +103,7 @@ class DaskEngine:
                     return answer.result()
                 place = self._places.get(ticket, "")
                 first = first or place
-                if first and (place != first or first not in self._machines()):
+                if first and (place != first or first not in self._machines):
                     raise WorkerDiedError(
                         f"The machine that ran the job ({first}) left the cluster; other jobs are not "
                         "affected. Send the job again."
@@ -112,11 +117,19 @@ class DaskEngine:
             await future.cancel(force=True)
             await self._client.run(_stop, ticket, on_error="ignore")
 
-    def _machines(self) -> dict[str, Any]:
-        if self._client is None or self._client.status != "running":
-            return {}
-        workers: dict[str, Any] = self._client.scheduler_info(n_workers=-1)["workers"]
-        return workers
+    async def _look(self) -> None:
+        """Ask the scheduler which machines there are."""
+        identity = await self._client.scheduler.identity(n_workers=-1)
+        self._machines = {address: machine["nthreads"] for address, machine in identity["workers"].items()}
+
+    async def _keep_looking(self) -> None:
+        while True:
+            await asyncio.sleep(CHECK_INTERVAL)
+            try:
+                await self._look()
+            except OSError as error:
+                self._machines = {}
+                log.warning("the dask scheduler does not answer: %s", error)
 
     def _hear(self, event: tuple[Any, Any]) -> None:
         ticket, *content = event[1]

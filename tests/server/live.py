@@ -25,10 +25,10 @@ class Live(httpx.Client):
 
 
 @contextmanager
-def running(data: Path, engine: Engine | None = None, **settings: Any) -> Iterator[Live]:
+def running(data: Path, own: Engine | None = None, **settings: Any) -> Iterator[Live]:
     """A server that keeps its things in data."""
     settings = {"workers": 2, "data": str(data)} | settings
-    app = create_app(Settings(**settings), engine)
+    app = create_app(Settings(**settings), own)
     listener = open_listener(Settings(port=0))
     server = uvicorn.Server(
         uvicorn.Config(

@@ -164,7 +164,7 @@ def choose_lengths(
     smallest: panels whose limit is below cannot reach the allowed range; they share no class with panels
     that can, and the number of classes (from 2) is divided between the two groups with the least total loss.
     """
-    if classes is None:
+    if classes is None or not len(limit):
         return floor_to(limit, increment)
     length = np.zeros_like(limit)
     low: Bools = floor_to(limit, increment) < smallest

@@ -1,0 +1,137 @@
+"""The dask engine against a real local cluster of two worker processes."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import time
+from collections.abc import AsyncIterator, Coroutine
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+import psutil
+import pytest
+
+from hexwrap_server.engine import nobody
+from hexwrap_server.worker import MemoryLimitError, TimeLimitError, WorkerDiedError
+from hexwrap_solver.errors import RequestError
+from tests.server.bodies import request
+from tests.server.live import finished, running
+
+distributed = pytest.importorskip("distributed", reason="dask.distributed is not installed (extra 'dask')")
+CALLS = "tests.server.calls:"
+
+
+@asynccontextmanager
+async def cluster(machines: int = 2) -> AsyncIterator[Any]:
+    """A scheduler, and worker processes that their nannies start again when they die."""
+    made = distributed.LocalCluster(
+        n_workers=machines,
+        threads_per_worker=1,
+        processes=True,
+        asynchronous=True,
+        dashboard_address=":0",
+        protocol="tcp://",
+        silence_logs=50,
+    )
+    async with made:
+        yield made
+
+
+@asynccontextmanager
+async def engine(made: Any) -> AsyncIterator[Any]:
+    from hexwrap_server.dask_engine import DaskEngine
+
+    e = DaskEngine(made.scheduler_address)
+    await e.start()
+    try:
+        while e.capacity < len(made.workers):
+            await asyncio.sleep(0.05)
+        yield e
+    finally:
+        await e.stop()
+
+
+def run(story: Coroutine[Any, Any, None]) -> None:
+    asyncio.run(story)
+
+
+async def call(e: Any, name: str, *arguments: Any, seconds: float = 60, mib: float = 4096) -> Any:
+    return await e.run(CALLS + name, *arguments, report=nobody, seconds=seconds, mib=mib)
+
+
+async def made_by(marks: list[Path]) -> None:
+    while not all(mark.exists() for mark in marks):
+        await asyncio.sleep(0.02)
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_same_promises_as_on_one_machine(tmp_path: Path) -> None:
+    heard: list[tuple[str, float, str]] = []
+
+    async def story() -> None:
+        async with cluster() as made, engine(made) as e:
+            assert (e.capacity, e.is_ready) == (2, True)
+            said = await e.run(CALLS + "talk", report=lambda *a: heard.append(a), seconds=60, mib=4096)
+            assert said == "talked"
+            with pytest.raises(RequestError) as caught:
+                await call(e, "refuse")
+            assert caught.value.vertices == [3]
+            with pytest.raises(WorkerDiedError):
+                await call(e, "die")
+            with pytest.raises(TimeLimitError):
+                await call(e, "sleep", 60, seconds=0.5)
+            with pytest.raises(MemoryLimitError):
+                await call(e, "hoard", 500, mib=300)
+            marks = [tmp_path / "running"]
+            task = asyncio.create_task(call(e, "sleep", 60, str(marks[0])))
+            await made_by(marks)
+            start = time.monotonic()
+            task.cancel()
+            with pytest.raises(asyncio.CancelledError):
+                await task
+            assert time.monotonic() - start < 2
+            assert await asyncio.gather(*(call(e, "echo", i) for i in range(4))) == list(range(4))
+            deadline = time.monotonic() + 10
+            while len(heard) < 2 and time.monotonic() < deadline:
+                await asyncio.sleep(0.05)
+
+    run(story())
+    assert heard == [("first", 0.25, "a quarter"), ("second", 0.75, "three quarters")]
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.skipif(os.name == "nt", reason="kill -9 of POSIX")
+def test_killed_machine_costs_its_own_job_only(tmp_path: Path) -> None:
+    async def story() -> None:
+        async with cluster() as made, engine(made) as e:
+            marks = [tmp_path / "one", tmp_path / "two"]
+            tasks = [asyncio.create_task(call(e, "sleep", 8, str(mark))) for mark in marks]
+            await made_by(marks)
+            victim = made.workers[0].pid
+            inside = psutil.Process(victim).children(recursive=True)
+            os.kill(victim, signal.SIGKILL)
+            answers = await asyncio.gather(*tasks, return_exceptions=True)
+            assert sorted(type(a).__name__ for a in answers) == ["WorkerDiedError", "str"]
+            assert await call(e, "echo", "still there") == "still there"
+            deadline = time.monotonic() + 5
+            while any(p.is_running() and p.status() != psutil.STATUS_ZOMBIE for p in inside):
+                assert time.monotonic() < deadline, "the job outlived its machine"
+                await asyncio.sleep(0.05)
+
+    run(story())
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_jobs_run_on_a_cluster(tmp_path: Path) -> None:
+    with (
+        distributed.LocalCluster(
+            n_workers=1, threads_per_worker=1, dashboard_address=":0", protocol="tcp://", silence_logs=50
+        ) as made,
+        running(tmp_path, engine="dask", scheduler=made.scheduler_address) as client,
+    ):
+        job = finished(client, client.post("/v1/jobs", json=request()).json()["id"])
+        assert job["status"] == "done"
+        assert client.get(f"/v1/jobs/{job['id']}/files/panels.csv").status_code == 200
