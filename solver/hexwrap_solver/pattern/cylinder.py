@@ -90,8 +90,8 @@ def _translations(cmap: ConformalMap, lattice: Lattice, settings: PatternSetting
     edges = cmap.circumference / wanted_edge(cmap, lattice, settings, angle)
     if edges > EDGES_PER_CELL * settings.max_cells:
         raise PatternError(
-            f"About {edges / EDGES_PER_CELL:,.0f} cells would be needed around the surface alone, over the limit "
-            f"of {settings.max_cells:,}: ask for a larger edge length or fewer cells around.",
+            f"About {edges / EDGES_PER_CELL:,.0f} cells would be needed around the surface alone, over the "
+            f"limit of {settings.max_cells:,}: ask for a larger edge length or fewer cells around.",
             data={"limit": settings.max_cells},
         )
     wanted = edges * lattice.edge * toward
