@@ -50,7 +50,7 @@ def _place_by_sides(
         return tried
     told = (
         f"To align loop {' and loop '.join(map(str, loops))} at this size would distort cells by "
-        f"{tried.distortion:.2f}, more than {BEARABLE}: smaller cells, or corners elsewhere, fit better."
+        f"{tried.distortion:.2f}, more than {BEARABLE:g}: smaller cells, or corners elsewhere, fit better."
     )
     turned = abs(np.rad2deg(turn_between_loops(cmap, lattice, loops)))
     if turned > 1:
