@@ -11,13 +11,15 @@ from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.errors import PanelsError
 from hexwrap_solver.panels import limits
 from hexwrap_solver.panels.best import jointly_largest
+from hexwrap_solver.panels.energy import minimise_singly, minimise_watertight
 from hexwrap_solver.panels.halfedges import HalfEdges, half_edges
-from hexwrap_solver.panels.polygons import fan_areas, mean_edges
+from hexwrap_solver.panels.polygons import edge_lengths, fan_areas, mean_edges, means, row_minima
 from hexwrap_solver.panels.regular import Poses, nearest_regular, nearest_regular_in_plane
 from hexwrap_solver.panels.separation import Separation, separating_planes
 from hexwrap_solver.panels.trimmed import flatten_and_clear, plane_normals
 from hexwrap_solver.panels.types import FittedPanels, PanelSettings, Weights
 from hexwrap_solver.pattern.types import Pattern
+from hexwrap_solver.surface.closest import TriangleTree
 
 #: Corners of a whole cell of each kind.
 CORNERS = {"hex": 6, "quad": 4, "triangle": 3}
@@ -49,43 +51,91 @@ class FitKey:
         )
 
 
+WATERTIGHT_NOTES = (
+    "Watertight panels share their corners: joint, orientation and size classes do not apply, and method is"
+    " always energy.",
+)
+
+
 def fit_panels(
     cmap: ConformalMap, pattern: Pattern, settings: PanelSettings, progress: Progress = no_progress
 ) -> FittedPanels:
-    """Poses and size limits of split panels (paper, section 5).
+    """Poses and size limits of split panels, or the finished faces of a watertight mesh (paper, section 5).
 
-    Depends on the settings in ``FitKey`` only.
-    Raises PanelsError where a whole cell has no room for a panel.
+    Depends on the settings in ``FitKey`` only. Raises PanelsError where no whole cell has room for a panel.
     """
     progress(0.0, "fitting panels")
+    pull = settings.weights.surface > 0 and (settings.method == "energy" or settings.mode == "watertight")
+    surface = TriangleTree.build(cmap.surface.vertices, cmap.surface.faces) if pull else None
+    if settings.mode == "watertight":
+        return _fit_watertight(pattern, settings, surface, progress)
+    return _fit_split(pattern, settings, surface, progress)
+
+
+def _fit_split(
+    pattern: Pattern, settings: PanelSettings, surface: TriangleTree | None, progress: Progress
+) -> FittedPanels:
     cells = _corner_points(pattern)
     p = CORNERS[pattern.kind]
     regular: Bools = pattern.whole & (pattern.faces.lengths == p)
     points = _table(cells, regular, p)
-    poses = _poses(pattern, points, regular, settings)
+    poses, energy, notes = _poses(pattern, points, regular, settings, surface, progress)
     edges = half_edges(pattern)
     normal = plane_normals(cells)
     normal[regular] = poses.normal
     planes = separating_planes(pattern, edges, normal, settings.joint)
     progress(0.4, "limiting sizes")
     length, center = _limits(poses, points, planes, regular, pattern, edges, settings, progress)
-    _require_room(length, np.flatnonzero(regular), settings.joint)
-    shapes, shape_center, kept = _trimmed(cells, normal, planes, edges, ~regular)
-    face = np.flatnonzero(regular | kept)
-    notes = _dropped_note(int((~regular & ~kept).sum()))
+    roomy = length > 0
+    kept = np.zeros(pattern.n_cells, dtype=bool)
+    kept[regular] = roomy
+    notes += _room_note(np.flatnonzero(regular & ~kept), int(kept.sum()), settings.joint)
+    shapes, shape_center, cut = _trimmed(cells, normal, planes, edges, ~regular)
+    face = np.flatnonzero(kept | cut)
     return FittedPanels(
         mode="split",
         face=face,
-        regular=regular[face],
-        spokes=poses.spokes(p),
+        regular=kept[face],
+        spokes=poses.spokes(p)[roomy],
         shapes=shapes,
-        center=_merge(regular, center, kept, shape_center)[face],
+        center=_merge(kept, center[roomy], cut, shape_center)[face],
         normal=normal[face],
-        limit=_merge(regular, length, kept, mean_edges(shapes))[face],
+        limit=_merge(kept, length[roomy], cut, mean_edges(shapes))[face],
         whole=pattern.whole[face],
         cell_area=fan_areas(cells)[face],
-        notes=notes,
+        energy=energy,
+        notes=notes + _dropped_note(int((~regular & ~cut).sum())),
     )
+
+
+def _fit_watertight(
+    pattern: Pattern, settings: PanelSettings, surface: TriangleTree | None, progress: Progress
+) -> FittedPanels:
+    """All cells, trimmed ones too, as polygons over shared corners."""
+    target = _target_lengths(_corner_points(pattern), settings)
+    moved, energy = minimise_watertight(pattern, target, settings.weights, surface, progress)
+    shapes = Ragged(moved[pattern.faces.values.astype(np.int64)], pattern.faces.offsets)
+    return FittedPanels(
+        mode="watertight",
+        face=np.arange(pattern.n_cells),
+        regular=np.zeros(pattern.n_cells, dtype=bool),
+        spokes=np.zeros((0, CORNERS[pattern.kind], 3)),
+        shapes=shapes,
+        center=means(shapes),
+        normal=plane_normals(shapes),
+        limit=mean_edges(shapes),
+        whole=pattern.whole,
+        cell_area=fan_areas(_corner_points(pattern)),
+        energy=energy,
+        notes=WATERTIGHT_NOTES,
+    )
+
+
+def _target_lengths(cells: Ragged, settings: PanelSettings) -> Floats:
+    """ℓ_P of the energies: the shortest edge of each cell, or its mean edge."""
+    if settings.target == "shortest":
+        return row_minima(edge_lengths(cells), cells.offsets)
+    return mean_edges(cells)
 
 
 def _corner_points(pattern: Pattern) -> Ragged:
@@ -97,15 +147,43 @@ def _table(cells: Ragged, chosen: Bools, p: int) -> Floats:
     return np.asarray(cells.values[cells.offsets[:-1][chosen][:, None] + np.arange(p)], dtype=np.float64)
 
 
-def _poses(pattern: Pattern, points: Floats, regular: Bools, settings: PanelSettings) -> Poses:
+def _poses(
+    pattern: Pattern,
+    points: Floats,
+    regular: Bools,
+    settings: PanelSettings,
+    surface: TriangleTree | None,
+    progress: Progress,
+) -> tuple[Poses, Floats | None, tuple[str, ...]]:
+    """Regular polygons for the whole cells; with method ``energy`` those nearest to the minimisers, the
+    energy curve, and how near they are."""
+    energy: Floats | None = None
+    notes: tuple[str, ...] = ()
+    shape = points
+    if settings.method == "energy":
+        target = _target_lengths(Ragged.from_table(points), settings)
+        shape, energy = minimise_singly(points, target, settings.weights, surface, progress)
+    poses = _nearest(pattern, shape, regular, settings)
+    if settings.method == "energy":
+        p = points.shape[1]
+        ideal = poses.center[:, None] + poses.free_length[:, None, None] * poses.spokes(p)
+        miss = float((np.linalg.norm(shape - ideal, axis=2).max(axis=1) / target).max(initial=0.0))
+        if miss > 1e-9:
+            notes = (
+                f"The minimisers of the energy differ from regular panels by up to {miss:.1e} of the edge"
+                " length; the panels are the regular ones nearest to them.",
+            )
+    return poses, energy, notes
+
+
+def _nearest(pattern: Pattern, shape: Floats, regular: Bools, settings: PanelSettings) -> Poses:
     if settings.orientation == "fit":
-        return nearest_regular(points)
-    p = points.shape[1]
+        return nearest_regular(shape)
     corner = pattern.faces.values.astype(np.int64)[
-        pattern.faces.offsets[:-1][regular][:, None] + np.arange(p)
+        pattern.faces.offsets[:-1][regular][:, None] + np.arange(shape.shape[1])
     ]
     normal = pattern.normals[corner].mean(axis=1)
-    return nearest_regular_in_plane(points, normal / np.linalg.norm(normal, axis=1)[:, None])
+    return nearest_regular_in_plane(shape, normal / np.linalg.norm(normal, axis=1)[:, None])
 
 
 def _limits(
@@ -142,14 +220,18 @@ def _partners(at: Ints, edges: HalfEdges) -> Ints:
     return np.where(twin >= 0, position[twin], -1)
 
 
-def _require_room(length: Floats, cell: Ints, joint: float) -> None:
-    empty = cell[length <= 0]
-    if len(empty):
+def _room_note(empty: Ints, others: int, joint: float) -> tuple[str, ...]:
+    """Raises PanelsError where no cell at all has room."""
+    if not len(empty):
+        return ()
+    some = f"{len(empty)} cells (first: {', '.join(map(str, empty[:5]))})"
+    if not others:
         raise PanelsError(
-            f"{len(empty)} cells (first: {', '.join(map(str, empty[:5]))}) have no room for a regular panel"
-            f" beside joints of {joint:g}; ask for larger cells or a narrower joint.",
+            f"{some} have no room for a regular panel beside joints of {joint:g}; ask for larger cells or a"
+            " narrower joint.",
             data={"cells": empty[:100].tolist()},
         )
+    return (f"{some} have no room for a regular panel beside joints of {joint:g} and were left open.",)
 
 
 def _trimmed(

@@ -62,6 +62,7 @@ def measure(
         congruence=congruence_classes(polygons, panels.normal),
         overlaps=_count_overlaps(pattern, edges, panels),
         coverage=_coverage(pattern, panels),
+        movement=_movement(pattern, panels),
     )
 
 
@@ -77,6 +78,14 @@ def _count_overlaps(pattern: Pattern, edges: HalfEdges, panels: Panels) -> int:
 def _coverage(pattern: Pattern, panels: Panels) -> float:
     cells = Ragged(pattern.vertices[pattern.faces.values.astype(np.int64)], pattern.faces.offsets)
     return float(fan_areas(panels.polygons).sum() / fan_areas(cells).sum())
+
+
+def _movement(pattern: Pattern, panels: Panels) -> float:
+    """How far shared corners stand from the pattern's; 0 for split panels, which share none."""
+    if panels.mode == "split":
+        return 0.0
+    places = pattern.vertices[pattern.faces.values.astype(np.int64)]
+    return float(np.linalg.norm(panels.polygons.values - places, axis=1).max(initial=0.0))
 
 
 def stretch_ratio(cmap: ConformalMap) -> tuple[Floats, Floats]:
