@@ -15,6 +15,7 @@ import numpy as np
 
 from hexwrap_solver.arrays import Bools, Floats, Ints
 from hexwrap_solver.conformal.types import Targets
+from hexwrap_solver.surface.topology import edge_groups, half_edges
 from hexwrap_solver.surface.types import Surface
 
 
@@ -107,14 +108,18 @@ class Energy:
         return points
 
     def _find_pattern(self) -> None:
-        first, second = self.dof[self.corner[[1, 2, 0]].ravel()], self.dof[self.corner[[2, 0, 1]].ravel()]
-        low, high = np.minimum(first, second), np.maximum(first, second)
-        apart = low != high  # an edge inside one tie does not change
-        self._to_low = np.flatnonzero(apart & (low >= 0))
-        self._to_high = np.flatnonzero(apart)
-        self._low, self._high = low[self._to_low], high[self._to_high]
-        pairs, self._pair = np.unique(self._low * self.n_dof + high[self._to_low], return_inverse=True)
-        self.rows, self.columns = pairs % self.n_dof, pairs // self.n_dof
+        """Edges between unknowns, each once, and the corners whose cotangents they take."""
+        ends = (self.dof + 1)[self.corner.T]  # 0: pinned
+        order, first = edge_groups(ends, self.n_dof + 1)
+        face, corner = order // 3, order % 3
+        self._opposite = (corner + 2) % 3 * len(ends) + face
+        self._first = first[:-1]
+        start, end = (side[order[self._first]] for side in half_edges(ends))
+        low, high = np.minimum(start, end), np.maximum(start, end)
+        self._apart = np.flatnonzero(low != high)  # an edge inside one tie does not change
+        self._low, self._high = low[self._apart], high[self._apart]
+        self._inner = np.flatnonzero(self._low > 0)
+        self.rows, self.columns = self._high[self._inner] - 1, self._low[self._inner] - 1
 
     def reduce(self, per_vertex: Floats) -> Floats:
         """Sums over the vertices that share an unknown; pinned ones fall away."""
@@ -151,11 +156,10 @@ class Energy:
 
     def hessian(self, corners: Corners) -> tuple[Floats, Floats]:
         """(n_dof,) diagonal and (e,) off-diagonal values of half the cotangent Laplacian."""
-        weight = 0.5 * corners.cotangent().ravel()
-        to_low = weight[self._to_low]
-        diagonal = total(self._low, to_low, self.n_dof)
-        diagonal += total(self._high, weight[self._to_high], self.n_dof)
-        return diagonal, -total(self._pair, to_low, len(self.rows))
+        weight = 0.5 * corners.cotangent().ravel()[self._opposite]
+        edge = np.add.reduceat(weight, self._first)[self._apart]
+        diagonal = total(self._low, edge, self.n_dof + 1) + total(self._high, edge, self.n_dof + 1)
+        return diagonal[1:], -edge[self._inner]
 
 
 def _unknowns(targets: Targets) -> tuple[Ints, int]:

@@ -154,19 +154,27 @@ class Factorisation:
         return result
 
 
+def _distinct(keys: Ints) -> Ints:
+    """Sorted, each once; ``np.unique`` takes ten times as long for many integers, since it hashes them."""
+    keys = np.sort(keys)
+    first = np.ones(len(keys), dtype=bool)
+    first[1:] = keys[1:] != keys[:-1]
+    return np.asarray(keys[first])
+
+
 def _analyse(tree: Dissection, low: Ints, high: Ints) -> list[_Front]:
     """Fronts in elimination order (deepest level first), with the boundaries that elimination creates."""
     n = len(tree.order)
     nodes = len(tree.start) - 1
     size = np.diff(tree.start)
     position = np.repeat(np.arange(nodes), size)  # of the front that owns an unknown
-    keys = np.unique((position[low] * n + high)[position[low] != position[high]])
+    keys = _distinct((position[low] * n + high)[position[low] != position[high]])
     found = []  # per level: sorted keys front · n + boundary unknown
     carried = np.zeros(0, dtype=np.int64)
     for level in range(tree.depth, -1, -1):
         start, stop = nodes - 2 ** (level + 1) + 1, nodes - 2**level + 1
         from_, to = np.searchsorted(keys, [start * n, stop * n])
-        level_keys = np.unique(np.concatenate([keys[from_:to], carried]))
+        level_keys = _distinct(np.concatenate([keys[from_:to], carried]))
         found.append(level_keys)
         front, unknown = level_keys // n, level_keys % n
         parent = nodes - 1 - (nodes - 2 - front) // 2
