@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from tests.server.bodies import tube
-from tests.server.live import Live, running
+from tests.server.process import free_port, served
 
 Body = dict[str, Any]
 Chance = np.random.Generator
@@ -152,7 +152,7 @@ def mutated(seed: int) -> Body:
 
 
 @contextmanager
-def awake(client: Live, longest: float) -> Iterator[list[float]]:
+def awake(client: httpx.Client, longest: float) -> Iterator[list[float]]:
     """Asks for /health all the while; every answer must come within longest seconds."""
     times: list[float] = []
     over = threading.Event()
@@ -175,7 +175,7 @@ def awake(client: Live, longest: float) -> Iterator[list[float]]:
     assert max(times) < longest
 
 
-def attack(client: Live, seeds: range) -> dict[int, int]:
+def attack(client: httpx.Client, seeds: range) -> dict[int, int]:
     """Statuses and how often they came."""
     counts: dict[int, int] = {}
     for seed in seeds:
@@ -193,12 +193,16 @@ def attack(client: Live, seeds: range) -> dict[int, int]:
 
 
 @pytest.fixture(scope="module")
-def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Live]:
-    with running(tmp_path_factory.mktemp("data"), workers=1, job_seconds=60.0, max_panels=20_000) as live:
-        yield live
+def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[httpx.Client]:
+    port = free_port()
+    with (
+        served(tmp_path_factory.mktemp("data"), port, workers=1, job_seconds=60.0, max_panels=20_000),
+        httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=90, trust_env=False) as client,
+    ):
+        yield client
 
 
-def test_mutated_meshes_get_an_answer(client: Live) -> None:
+def test_mutated_meshes_get_an_answer(client: httpx.Client) -> None:
     with awake(client, 0.5):
         counts = attack(client, range(200))
     assert counts[200] > 20
@@ -207,6 +211,6 @@ def test_mutated_meshes_get_an_answer(client: Live) -> None:
 
 @pytest.mark.long
 @pytest.mark.parametrize("block", range(20))
-def test_many_mutated_meshes_get_an_answer(client: Live, block: int) -> None:
+def test_many_mutated_meshes_get_an_answer(client: httpx.Client, block: int) -> None:
     with awake(client, 0.5):
         attack(client, range(500 * block, 500 * (block + 1)))

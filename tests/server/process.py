@@ -1,0 +1,64 @@
+"""A server as a process of its own, to be signalled and killed."""
+
+from __future__ import annotations
+
+import os
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import httpx
+import psutil
+
+PROGRAM = """
+import sys
+from hexwrap_server.app import serve
+from hexwrap_server.settings import Settings
+serve(Settings.from_environment({"port": int(sys.argv[1]), "data": sys.argv[2], "workers": int(sys.argv[3])}))
+"""
+
+
+def free_port() -> int:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port: int = taken.getsockname()[1]
+        return port
+
+
+@contextmanager
+def served(data: Path, port: int, workers: int = 2, **settings: object) -> Iterator[subprocess.Popen[bytes]]:
+    """A server process that answers."""
+    paths = os.pathsep.join(os.path.abspath(p or ".") for p in sys.path)
+    command = [sys.executable, "-c", PROGRAM, str(port), str(data), str(workers)]
+    with (data / "log").open("ab") as log:
+        environment = {f"HEXWRAP_{name.upper()}": str(value) for name, value in settings.items()}
+        process = subprocess.Popen(command, env=os.environ | environment | {"PYTHONPATH": paths}, stderr=log)
+    try:
+        deadline = time.monotonic() + 60
+        while True:
+            assert process.poll() is None, (data / "log").read_text()
+            assert time.monotonic() < deadline
+            try:
+                httpx.get(f"http://127.0.0.1:{port}/health", trust_env=False)
+                break
+            except httpx.TransportError:
+                time.sleep(0.05)
+        yield process
+    finally:
+        process.kill()
+        process.wait()
+
+
+def children(process: subprocess.Popen[bytes]) -> list[psutil.Process]:
+    return psutil.Process(process.pid).children(recursive=True)
+
+
+def is_gone(process: psutil.Process) -> bool:
+    """A process that init has not collected yet is gone all the same."""
+    try:
+        return not process.is_running() or process.status() == psutil.STATUS_ZOMBIE
+    except psutil.NoSuchProcess:
+        return True

@@ -1,0 +1,46 @@
+"""Fifty clients at once: everybody is served, and nothing is computed twice."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import httpx
+
+from tests.server.bodies import tube
+from tests.server.process import free_port, served
+from tests.server.test_mutations import awake
+
+CLIENTS = 50
+
+
+def test_fifty_clients_at_once(tmp_path: Path) -> None:
+    port = free_port()
+    with (
+        served(tmp_path, port),
+        httpx.Client(
+            base_url=f"http://127.0.0.1:{port}",
+            timeout=120,
+            trust_env=False,
+            limits=httpx.Limits(max_connections=CLIENTS),
+        ) as client,
+        ThreadPoolExecutor(CLIENTS) as threads,
+    ):
+
+        def one(i: int) -> tuple[int, dict[str, Any]]:
+            body = {"surface": tube(height=10 + i % 10), "pattern": {"around": 10}}
+            answer = client.post("/v1/solve", json=body)
+            return answer.status_code, answer.json()
+
+        with awake(client, 0.5):
+            answers = list(threads.map(one, range(2 * CLIENTS)))
+        assert {status for status, _ in answers} == {200}
+        for i, (_, result) in enumerate(answers):
+            assert result == answers[i % 10][1]
+        jobs = client.get("/v1/jobs", params={"limit": 1000}).json()["jobs"]
+        assert len(jobs) == 2 * CLIENTS
+        counted = client.get("/metrics").text
+        assert 'hexwrap_jobs_total{status="done"}' in counted
+        works = sum("computed" in job["found"].values() for job in jobs)
+        assert works >= 10
