@@ -125,7 +125,7 @@ def make_parser() -> argparse.ArgumentParser:
 
 
 def _kinds() -> list[str]:
-    return [*ENDINGS, "flat.dxf"]
+    return [*ENDINGS, "flat.dxf", "domain.dxf"]
 
 
 def _serve(asked: argparse.Namespace) -> int:

@@ -44,6 +44,7 @@ FILES = {
     "panels.csv": "text/csv; charset=utf-8",
     "flat.dxf": "image/vnd.dxf",
     "domain.svg": "image/svg+xml",
+    "domain.dxf": "image/vnd.dxf",
     "panels.png": "image/png",
     "result.json": JSON,
     "result.npz": "application/octet-stream",

@@ -55,7 +55,7 @@ def read_dxf(data: bytes) -> ezdxf.document.Drawing:
 
 
 def test_names_are_the_contracts() -> None:
-    assert set(WRITERS) == {*NEEDS_PANELS, "domain.svg", "result.json", "result.npz"}
+    assert set(WRITERS) == {*NEEDS_PANELS, "domain.svg", "domain.dxf", "result.json", "result.npz"}
 
 
 @pytest.mark.usefixtures("small_pictures")
@@ -81,7 +81,7 @@ def test_a_pattern_without_a_panel_is_told(solution: Solution, name: str) -> Non
         write(name, none, ODD)
 
 
-@pytest.mark.parametrize("name", ["domain.svg", "result.npz", "result.json"])
+@pytest.mark.parametrize("name", ["domain.svg", "domain.dxf", "result.npz", "result.json"])
 def test_other_files_need_only_the_map(solution: Solution, name: str) -> None:
     for less in (replace(solution, pattern=None, panels=None), replace(solution, panels=None)):
         assert len(write(name, less, ODD)) > 500
@@ -282,6 +282,25 @@ def test_svg_marks_corners_with_their_angles(solution: Solution) -> None:
     ns = {"s": "http://www.w3.org/2000/svg"}
     assert [t.text for t in root.iterfind(".//s:text[@class='angle halo']", ns)] == ["4π/3", "π/3"]
     assert len(root.findall(".//s:circle[@class='corner']", ns)) == 2
+
+
+def test_domain_dxf_is_the_domain_in_its_own_units(solution: Solution) -> None:
+    bottom = solution.map.boundary_angles[0].copy()
+    bottom[4] = np.pi / 3
+    cornered = replace(solution.map, boundary_angles=(bottom, solution.map.boundary_angles[1]))
+    space = read_dxf(write("domain.dxf", replace(solution, map=cornered), ODD)).modelspace()
+    lines = {
+        name: space.query(f'LWPOLYLINE[layer=="{name}"]') for name in ("loop-0", "loop-1", "cut", "pattern")
+    }
+    for number, height in enumerate((0.0, np.sqrt(3) * 5.5)):
+        points = np.vstack([line.get_points("xy") for line in lines[f"loop-{number}"]])
+        assert points[:, 1] == pytest.approx(np.full(len(points), height))
+        assert np.ptp(points[:, 0]) == pytest.approx(solution.map.circumference)
+    assert len(lines["pattern"]) == len(labels_of(solution))
+    assert len(lines["cut"]) == 2
+    (corner,) = space.query('POINT[layer=="corners"]')
+    vertex = solution.map.uv[solution.map.surface.loops[0][4]]
+    assert corner.dxf.location.xyz == pytest.approx((vertex.real, vertex.imag, 0.0))
 
 
 def test_npz_holds_the_arrays_themselves(solution: Solution) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from hexwrap_server.files.arrays_npz import result_npz
+from hexwrap_server.files.domain_dxf import domain_dxf
 from hexwrap_server.files.domain_svg import domain_svg
 from hexwrap_server.files.dxf import panels_dxf
 from hexwrap_server.files.flat import flat_dxf
@@ -24,6 +25,7 @@ WRITERS: dict[str, Callable[[Solution, Meta], bytes]] = {
     "panels.csv": panels_csv,
     "flat.dxf": flat_dxf,
     "domain.svg": domain_svg,
+    "domain.dxf": domain_dxf,
     "panels.png": panels_png,
     "result.json": result_json,
     "result.npz": result_npz,

@@ -12,8 +12,9 @@ from hexwrap_server.files.colours import size_colours
 from hexwrap_server.files.layers import size_name
 from hexwrap_server.files.meta import Meta
 from hexwrap_server.files.text import angle, length, one_line
+from hexwrap_server.files.unrolled import Unrolled, cells, plane
 from hexwrap_server.files.viewpoint import corners
-from hexwrap_solver.arrays import Complexes, Floats, Ints, Ragged
+from hexwrap_solver.arrays import Complexes, Floats, Ragged
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.pattern.types import Pattern
 from hexwrap_solver.pipeline import Solution
@@ -26,8 +27,6 @@ MAX_FACES = 30_000
 MAX_NAMES = 40
 #: The apex is shown where it is no further from the domain than this many times the domain's size.
 APEX_REACH = 0.6
-#: A cut edge: its two sides stand apart by more than this part of the circumference.
-APART = 1e-6
 
 STYLE = """
 text { font-family: "DejaVu Sans", "Segoe UI", Helvetica, Arial, sans-serif; fill: #23262b; }
@@ -53,38 +52,40 @@ class Frame:
     height: float
 
     @classmethod
-    def around(cls, points: Complexes) -> Frame:
-        low = np.array([points.real.min(), points.imag.min()])
-        extent = np.array([np.ptp(points.real), np.ptp(points.imag)])
+    def around(cls, points: Floats) -> Frame:
+        extent = np.ptp(points, axis=0)
         scale = SIDE / float(extent.max())
         width, height = (extent * scale + 2 * MARGIN).tolist()
-        return cls(low, scale, width, height)
+        return cls(points.min(axis=0), scale, width, height)
 
-    def place(self, z: Complexes) -> Floats:
+    def place(self, points: Floats) -> Floats:
         """(…, 2) drawing coordinates."""
-        x = MARGIN + (z.real - self.low[0]) * self.scale
-        y = self.height - MARGIN - (z.imag - self.low[1]) * self.scale
+        x = MARGIN + (points[..., 0] - self.low[0]) * self.scale
+        y = self.height - MARGIN - (points[..., 1] - self.low[1]) * self.scale
         return np.stack([x, y], axis=-1)
+
+    def at(self, z: complex) -> tuple[float, float]:
+        """Drawing coordinates of one place."""
+        x, y = self.place(np.array([z.real, z.imag])).tolist()
+        return x, y
 
 
 def domain_svg(solution: Solution, meta: Meta) -> bytes:
     """SVG 1.1, complete in itself. Cells across the cut are drawn in one piece, in a sheet of their own."""
     cmap, pattern = solution.map, solution.pattern
-    at = cmap.corners()
-    shown = [at.ravel()]
-    cells = None
-    if pattern is not None:
-        cells = cmap.deck.apply(pattern.uv[np.asarray(pattern.faces.values)], pattern.sheet)
-        shown.append(cells)
-    frame = Frame.around(_with_apex(cmap, np.concatenate(shown)))
-    parts = [_path(frame.place(at), "mesh")] if len(at) <= MAX_FACES else []
-    if pattern is not None and cells is not None:
-        parts += _cells(solution, pattern, frame.place(cells))
-    on_boundary, on_cut = _sides(cmap, at)
-    start, end = at.ravel(), at[:, [1, 2, 0]].ravel()
-    parts.append(_segments(frame, start[on_cut], end[on_cut], "cut"))
-    parts += _loops(cmap, frame, start, end, on_boundary)
-    parts += _corner_marks(cmap, frame, start, on_boundary)
+    unrolled = Unrolled.of(cmap)
+    outlines = None if pattern is None else cells(cmap, pattern)
+    points = [plane(unrolled.start)] if outlines is None else [plane(unrolled.start), outlines.values]
+    frame = Frame.around(np.vstack([*points, *_apex(cmap)]))
+    parts = []
+    if len(cmap.surface.faces) <= MAX_FACES:
+        corners_at = frame.place(plane(unrolled.start).reshape(-1, 3, 2))
+        parts.append(_path(_outlines(Ragged.from_table(corners_at)), "mesh"))
+    if pattern is not None and outlines is not None:
+        parts += _cells(solution, pattern, Ragged(frame.place(np.asarray(outlines.values)), outlines.offsets))
+    parts.append(_path(_polylines(frame, unrolled.lines(unrolled.cut)), "cut"))
+    parts += _loops(cmap, frame, unrolled)
+    parts += _corner_marks(cmap, frame, unrolled)
     parts += _apex_mark(cmap, frame)
     return _page(frame, parts, solution, meta).encode()
 
@@ -118,43 +119,23 @@ def _caption(solution: Solution) -> str:
     return words
 
 
-def _with_apex(cmap: ConformalMap, points: Complexes) -> Complexes:
-    """The points, and the apex where it is near enough to be shown."""
-    apex = cmap.deck.apex
-    return points if apex is None or not _apex_near(cmap) else np.append(points, apex)
-
-
-def _apex_near(cmap: ConformalMap) -> bool:
+def _apex(cmap: ConformalMap) -> Floats:
+    """(1, 2) where it is near enough to be shown, else (0, 2)."""
     apex, uv = cmap.deck.apex, cmap.uv
     if apex is None:
-        return False
+        return np.zeros((0, 2))
     size = abs(complex(np.ptp(uv.real), np.ptp(uv.imag)))
-    return bool(np.abs(uv - apex).min() < APEX_REACH * size)
+    near = np.abs(uv - apex).min() < APEX_REACH * size
+    return plane(np.array([apex] if near else [], dtype=complex))
 
 
-def _sides(cmap: ConformalMap, at: Complexes) -> tuple[Ints, Ints]:
-    """Positions in the (m, 3) table of face sides that lie on the boundary, and of those along the cut."""
-    faces = cmap.surface.faces
-    tail, head = faces.ravel(), faces[:, [1, 2, 0]].ravel()
-    start, end = at.ravel(), at[:, [1, 2, 0]].ravel()
-    key = np.minimum(tail, head) * (faces.max() + 1) + np.maximum(tail, head)
-    order = np.argsort(key, kind="stable")
-    paired = np.flatnonzero(key[order][1:] == key[order][:-1])
-    one, two = order[paired], order[paired + 1]
-    boundary = np.ones(len(key), dtype=bool)
-    boundary[one] = boundary[two] = False
-    apart = np.abs(start[one] - end[two]) + np.abs(end[one] - start[two]) > APART * cmap.circumference
-    return np.flatnonzero(boundary), np.concatenate([one[apart], two[apart]])
-
-
-def _cells(solution: Solution, pattern: Pattern, places: Floats) -> list[str]:
+def _cells(solution: Solution, pattern: Pattern, rows: Ragged) -> list[str]:
     """Cells filled with the colour of their panel's size, one path per size."""
     size = np.full(pattern.n_cells, -1)
     colours: list[str] = []
     if solution.panels is not None:
         size[solution.panels.face] = solution.panels.size
         colours = size_colours(len(solution.panels.class_length))
-    rows = Ragged(places, pattern.faces.offsets)
     outlines = _outlines(rows)
     members: dict[int, list[str]] = {}
     for outline, group in zip(outlines, size.tolist(), strict=True):
@@ -182,44 +163,31 @@ def _areas(rows: Ragged) -> Floats:
     return np.abs(np.bincount(rows.row, (np.conj(z) * z[rows.next()]).imag, rows.n_rows)) / 2
 
 
-def _path(polygons: Floats, kind: str) -> str:
-    """One path of closed polygons (n, m, 2)."""
-    return f'<path class="{kind}" d="{"".join(_outlines(Ragged.from_table(polygons)))}"/>'
-
-
-def _segments(frame: Frame, start: Complexes, end: Complexes, kind: str) -> str:
-    """One path of lines, each drawn on where the one before it ends."""
-    ends = np.hstack([frame.place(start), frame.place(end)])
-    words: list[str] = []
-    last = (np.nan, np.nan)
-    for x0, y0, x1, y1 in ends.tolist():
-        if abs(x0 - last[0]) + abs(y0 - last[1]) < 1e-6:
-            words.append(f"L{x1:.2f} {y1:.2f}")
-        else:
-            words.append(f"M{x0:.2f} {y0:.2f}L{x1:.2f} {y1:.2f}")
-        last = (x1, y1)
+def _path(words: list[str], kind: str) -> str:
     return f'<path class="{kind}" d="{"".join(words)}"/>'
 
 
-def _loop_sides(cmap: ConformalMap, on_boundary: Ints) -> list[Ints]:
-    """Per loop, the face sides along it, in its order (each starts at the loop's vertex)."""
-    tail = cmap.surface.faces.ravel()
-    side = np.full(len(cmap.surface.vertices), -1)
-    side[tail[on_boundary]] = on_boundary
-    return [side[loop] for loop in cmap.surface.loops]
+def _polylines(frame: Frame, lines: list[Complexes]) -> list[str]:
+    """An open path for each line."""
+    return [
+        "M" + "L".join(f"{x:.2f} {y:.2f}" for x, y in frame.place(plane(line)).tolist()) for line in lines
+    ]
 
 
-def _loops(
-    cmap: ConformalMap, frame: Frame, start: Complexes, end: Complexes, on_boundary: Ints
-) -> list[str]:
+def _loops(cmap: ConformalMap, frame: Frame, unrolled: Unrolled) -> list[str]:
     """Each loop's curve, its name and the way it runs."""
     parts = []
-    for number, sides in enumerate(_loop_sides(cmap, on_boundary)):
-        parts.append(_segments(frame, start[sides], end[sides], f"loop{number}"))
-        middle = sides[len(sides) // 2]
-        along = end[middle] - start[middle]
-        away = np.array([along / abs(along) * -1j * 34 / frame.scale])
-        x, y = frame.place(start[middle] + away)[0].tolist()
+    marked = [vertex for vertex, _ in corners(cmap)]
+    for number, (loop, sides) in enumerate(zip(cmap.surface.loops, unrolled.loops, strict=True)):
+        parts.append(_path(_polylines(frame, unrolled.lines(sides)), f"loop{number}"))
+        places = unrolled.start[sides]
+        # The name stands where no corner's angle does, and away from the cut.
+        taken = np.append(places[np.isin(loop, marked)], unrolled.end[unrolled.cut])
+        free = np.abs(places[:, None] - taken).min(axis=1, initial=np.inf)
+        middle = sides[int(np.argmax(free)) if len(taken) else len(sides) // 2]
+        along = unrolled.end[middle] - unrolled.start[middle]
+        away = along / abs(along) * -1j * 34 / frame.scale
+        x, y = frame.at(unrolled.start[middle] + away)
         turn = -np.degrees(np.angle(along))
         arrow, turn = ("→", turn) if abs(turn) <= 90 else ("←", turn - np.copysign(180, turn))
         words = f"loop {number} {arrow}" if arrow == "→" else f"{arrow} loop {number}"
@@ -230,23 +198,23 @@ def _loops(
     return parts
 
 
-def _corner_marks(cmap: ConformalMap, frame: Frame, start: Complexes, on_boundary: Ints) -> list[str]:
+def _corner_marks(cmap: ConformalMap, frame: Frame, unrolled: Unrolled) -> list[str]:
     """A dot at each corner of the domain, with its angle."""
     marked = dict(corners(cmap))
     parts = []
-    for loop, sides in zip(cmap.surface.loops, _loop_sides(cmap, on_boundary), strict=True):
+    for loop, sides in zip(cmap.surface.loops, unrolled.loops, strict=True):
         for vertex, side in zip(loop.tolist(), sides.tolist(), strict=True):
             if vertex not in marked:
                 continue
-            x, y = frame.place(start[[side]])[0].tolist()
+            place = unrolled.start[side]
+            x, y = frame.at(place)
             parts.append(f'<circle class="corner" cx="{x:.2f}" cy="{y:.2f}" r="8"/>')
             if len(marked) > MAX_NAMES:
                 continue
             # The inside spans the angle to the left of the side that leaves the corner.
-            face, corner = divmod(side, 3)
-            along = start[3 * face + (corner + 1) % 3] - start[side]
+            along = unrolled.end[side] - place
             away = -along / abs(along) * np.exp(0.5j * marked[vertex]) * 30 / frame.scale
-            x, y = frame.place(start[[side]] + away)[0].tolist()
+            x, y = frame.at(place + away)
             parts.append(
                 f'<text class="angle halo" text-anchor="middle" dominant-baseline="central" '
                 f'x="{x:.2f}" y="{y:.2f}">{angle(marked[vertex])}</text>'
@@ -255,12 +223,11 @@ def _corner_marks(cmap: ConformalMap, frame: Frame, start: Complexes, on_boundar
 
 
 def _apex_mark(cmap: ConformalMap, frame: Frame) -> list[str]:
-    apex = cmap.deck.apex
-    if apex is None or not _apex_near(cmap):
-        return []
-    x, y = frame.place(np.array([apex]))[0].tolist()
-    return [
-        f'<path class="apex" d="M{x - 12:.2f} {y:.2f}h24M{x:.2f} {y - 12:.2f}v24"/>',
-        f'<circle class="apex" cx="{x:.2f}" cy="{y:.2f}" r="7"/>',
-        f'<text class="named halo" x="{x + 16:.2f}" y="{y - 12:.2f}">apex</text>',
-    ]
+    parts = []
+    for x, y in frame.place(_apex(cmap)).tolist():
+        parts += [
+            f'<path class="apex" d="M{x - 12:.2f} {y:.2f}h24M{x:.2f} {y - 12:.2f}v24"/>',
+            f'<circle class="apex" cx="{x:.2f}" cy="{y:.2f}" r="7"/>',
+            f'<text class="named halo" x="{x + 16:.2f}" y="{y - 12:.2f}">apex</text>',
+        ]
+    return parts

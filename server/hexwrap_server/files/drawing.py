@@ -1,4 +1,4 @@
-"""What both DXF files share: a document with a layer per size, and its bytes."""
+"""What all DXF files share: a document with its layers, and its bytes."""
 
 from __future__ import annotations
 
@@ -14,11 +14,17 @@ from hexwrap_solver.panels.types import Panels
 
 def drawing(panels: Panels, name: str, *others: str) -> Drawing:
     """An empty drawing without a unit, with a coloured layer per size and further grey ones."""
+    document = grey_drawing(name, *others)
+    for layer in size_layers(panels).values():
+        document.layers.add(layer.name).rgb = layer.colour
+    return document
+
+
+def grey_drawing(name: str, *others: str) -> Drawing:
+    """An empty drawing without a unit, with grey layers."""
     document = new("R2010")
     document.header["$INSUNITS"] = 0
     document.header["$PROJECTNAME"] = one_line(name)
-    for layer in size_layers(panels).values():
-        document.layers.add(layer.name).rgb = layer.colour
     for other in others:
         document.layers.add(other).rgb = (110, 115, 124)
     return document

@@ -1,0 +1,88 @@
+"""The unrolled domain as lines: cells, boundary loops, the cut. For drawings of it, in its own units."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hexwrap_solver.arrays import Complexes, Floats, Ints, Ragged
+from hexwrap_solver.conformal.types import ConformalMap
+from hexwrap_solver.pattern.types import Pattern
+
+#: Two places are one where they are nearer than this part of the circumference.
+SAME = 1e-6
+
+
+@dataclass(frozen=True)
+class Unrolled:
+    """A mesh laid out face by face.
+
+    start, end: (3m,) the sides of all faces, three each. loops: per boundary loop its sides in order, each
+    starting at the loop's vertex. cut: sides along the cut, both banks of it.
+    """
+
+    start: Complexes
+    end: Complexes
+    loops: tuple[Ints, Ints]
+    cut: Ints
+
+    @classmethod
+    def of(cls, cmap: ConformalMap) -> Unrolled:
+        faces, at = cmap.surface.faces, cmap.corners()
+        tail, head = faces.ravel(), faces[:, [1, 2, 0]].ravel()
+        start, end = at.ravel(), at[:, [1, 2, 0]].ravel()
+        key = np.minimum(tail, head) * (int(faces.max()) + 1) + np.maximum(tail, head)
+        order = np.argsort(key, kind="stable")
+        paired = np.flatnonzero(key[order][1:] == key[order][:-1])
+        one, two = order[paired], order[paired + 1]
+        apart = np.abs(start[one] - end[two]) + np.abs(end[one] - start[two]) > SAME * cmap.circumference
+        rim = np.ones(len(key), dtype=bool)
+        rim[one] = rim[two] = False
+        side = np.full(len(cmap.surface.vertices), -1)
+        side[tail[rim]] = np.flatnonzero(rim)
+        first, second = cmap.surface.loops
+        banks = np.concatenate([one[apart], two[apart]])
+        near = SAME * cmap.circumference
+        return cls(start, end, (side[first], side[second]), _chained(banks, tail, head, start, end, near))
+
+    def lines(self, sides: Ints) -> list[Complexes]:
+        """The sides in the given order as polylines: a new one wherever a side starts elsewhere."""
+        start, end = self.start[sides], self.end[sides]
+        size = max(float(np.ptp(self.start.real)), float(np.ptp(self.start.imag)))
+        breaks = np.flatnonzero(np.abs(start[1:] - end[:-1]) > SAME * size) + 1
+        return [
+            np.append(part, end[last])
+            for part, last in zip(np.split(start, breaks), np.append(breaks, len(start)) - 1, strict=True)
+            if len(part)
+        ]
+
+
+def _chained(sides: Ints, tail: Ints, head: Ints, start: Complexes, end: Complexes, near: float) -> Ints:
+    """The sides in such an order that each starts where the one before it ends, as far as there is one."""
+    leaving: dict[int, list[int]] = {}
+    for side in sides.tolist():
+        leaving.setdefault(int(tail[side]), []).append(side)
+    following: dict[int, int] = {}
+    for side in sides.tolist():
+        for other in leaving.get(int(head[side]), []):
+            if abs(start[other] - end[side]) < near:
+                following[side] = other
+    ordered: list[int] = []
+    for first in sorted(set(sides.tolist()) - set(following.values())):
+        at: int | None = first
+        while at is not None:
+            ordered.append(at)
+            at = following.get(at)
+    return np.array(ordered, dtype=np.int64)
+
+
+def cells(cmap: ConformalMap, pattern: Pattern) -> Ragged:
+    """(·, 2) outlines of the cells, each in one piece in a sheet of its own."""
+    z = cmap.deck.apply(pattern.uv[np.asarray(pattern.faces.values)], pattern.sheet)
+    return Ragged(plane(z), pattern.faces.offsets)
+
+
+def plane(z: Complexes) -> Floats:
+    """(…, 2) real and imaginary parts."""
+    return np.stack([z.real, z.imag], axis=-1)
