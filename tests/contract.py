@@ -159,7 +159,7 @@ def check_pattern(result: Json, whole: bool = True) -> list[str]:
 
 
 def check_panels(result: Json, *, regular: bool = True, overlap_free: bool = True) -> list[str]:
-    """Whole hexagons are planar and regular to 1e-9 ℓ, sizes are those listed, neighbours do not overlap."""
+    """Whole cells are planar and regular to 1e-9 ℓ, sizes are those listed, neighbours do not overlap."""
     bad = []
     p = result["panels"]
     table = {s["size"]: s["edge_length"] for s in result["sizes"]}
@@ -173,9 +173,8 @@ def check_panels(result: Json, *, regular: bool = True, overlap_free: bool = Tru
         normal = np.linalg.svd(q - c)[2][2]
         a, b = np.roll(q, -1, 0) - q, np.roll(q, 1, 0) - q
         cos = (a * b).sum(1) / (np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1))
-        worst = max(
-            np.abs(edge - length).max(), np.abs((q - c) @ normal).max(), length * np.abs(cos + 0.5).max()
-        )
+        off = np.abs(cos + np.cos(2 * np.pi / len(q))).max()  # −cos of the exterior angle
+        worst = max(np.abs(edge - length).max(), np.abs((q - c) @ normal).max(), length * off)
         if worst > 1e-9 * max(length, 1e-7 * np.abs(q).max() * 1e-3) + 4e-16 * np.abs(q).max() * 8:
             bad.append(f"panel {p['label'][i]} is off by {worst / length:.2e} ℓ")
             break
