@@ -131,6 +131,7 @@ def panels(solution: Solution) -> dict[str, Any]:
         "center": flat(made.center),
         "normal": flat(made.normal),
         "whole": flat(made.whole),
+        "outside": flat(made.outside),
         "planarity": flat(measured.planarity),
         "edge_deviation": flat(measured.edge_deviation),
         "angle_deviation": flat(measured.angle_deviation),

@@ -18,8 +18,9 @@ FARTHEST_SHIFT = 0.25
 #: programme would have no interior where panels are jammed.)
 GREATEST_LOSS = 1e-3
 
-#: Cost of ½ (shift / edge)² against 1 for an edge of size: so small that it only decides between equals.
-SHIFT_COST = 1e-4
+#: Cost of ½ (shift / edge)² against 1 for an edge of size. Long rings of panels could otherwise close up a
+#: little more by sliding along, and leave all that they gained as one wide gap at the boundary.
+SHIFT_COST = 1.0
 
 
 def jointly_largest(
