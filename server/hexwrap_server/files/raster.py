@@ -6,11 +6,12 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged
 
 #: Samples drawn at a time; bounds the memory that fragments take.
-CHUNK = 2_000_000
+CHUNK = 500_000
 #: Polygons seen at a flatter angle than this (sine) cover no sample worth drawing.
 EDGE_ON = 1e-4
 
@@ -90,7 +91,7 @@ def planes(camera: Camera, polygons: Polygons) -> Floats:
     return np.where(seen[:, None], np.stack([a, b, c], axis=1) / np.where(seen, offset, 1.0)[:, None], 0.0)
 
 
-def draw(camera: Camera, polygons: Polygons) -> tuple[Ints, Floats]:
+def draw(camera: Camera, polygons: Polygons) -> tuple[NDArray[np.int32], Floats]:
     """(height, width) row of the nearest polygon at each sample (−1: none), and 1/depth there (0: none).
 
     A sample belongs to a polygon when its middle lies inside (even–odd rule, so any simple polygon will do).
@@ -99,7 +100,7 @@ def draw(camera: Camera, polygons: Polygons) -> tuple[Ints, Floats]:
     inverse = planes(camera, polygons)
     row, y, first, last = _spans(camera, polygons, np.flatnonzero(np.any(inverse != 0, axis=1)))
     nearest = np.zeros(camera.height * camera.width)
-    owner = np.full(camera.height * camera.width, -1, dtype=np.int64)
+    owner = np.full(camera.height * camera.width, -1, dtype=np.int32)
     ends = np.cumsum(last - first)
     n_samples = int(ends[-1]) if len(ends) else 0
     cuts = np.searchsorted(ends, np.arange(CHUNK, n_samples, CHUNK)).tolist()

@@ -10,7 +10,7 @@ from scipy import ndimage
 
 from hexwrap_server.files.colours import encoded, from_hex, linear
 from hexwrap_server.files.raster import Camera, Polygons, draw, planes
-from hexwrap_solver.arrays import Bools, Floats, Ints
+from hexwrap_solver.arrays import Bools, Floats
 
 #: Pixels: the model is fitted into this box, with room around it for its shadow on the ground.
 HEIGHT, WIDTH, MARGIN = 1600, 1460, 100
@@ -24,8 +24,8 @@ SUN, SUN_DISTANCE = (-0.52, 0.62, 0.72), 40.0
 #: model and on the ground, in those samples; how much nearer, in radii, a thing must be to cast a shadow.
 SUN_MAP, TAPS, PENUMBRA, GROUND_BLUR, BIAS = 1200, 24, 5.0, 26.0, 0.012
 SUNLIGHT, SKYLIGHT, GLOSS, GLOSS_EXPONENT = 0.70, 0.52, 0.10, 40.0
-#: Blur radii in pixels, and depths in radii of the model, over which hollows darken.
-HOLLOWS = ((6.0, 0.03), (40.0, 0.25))
+#: Blur radii in pixels, depths in radii of the model, over which hollows darken; pixels per blurred one.
+HOLLOWS = ((6.0, 0.03, 2), (40.0, 0.25, 8))
 #: The backs of the panels keep this much of their colour.
 SHELL, BACK, BACK_COLOUR = "#4a4f58", "#b3b0ab", 0.25
 #: What is left of the light on an outline; the panel width in pixels from which outlines have full strength.
@@ -155,7 +155,13 @@ def _light(scene: Scene, drawn: Polygons, camera: Camera, sun: Sun) -> tuple[Flo
 
 
 def _lit(
-    camera: Camera, drawn: Polygons, owner: Ints, sun: Sun, scene: Scene, points: Floats, radius: float
+    camera: Camera,
+    drawn: Polygons,
+    owner: NDArray[np.int32],
+    sun: Sun,
+    scene: Scene,
+    points: Floats,
+    radius: float,
 ) -> Floats:
     """(h, w) share of the sun at each pixel, of the model and of the ground under it."""
     y, x = np.meshgrid(*(np.arange(n) * FINE + FINE / 2 for n in owner.shape), indexing="ij")
@@ -190,14 +196,24 @@ def _openness(nearest: Floats, radius: float) -> Floats:
     there: Bools = nearest > 0
     depth = np.where(there, 1.0 / np.where(there, nearest, 1.0), 0.0)
     light = np.ones(nearest.shape)
-    for blur, reach in HOLLOWS:
-        weight = ndimage.gaussian_filter(there.astype(np.float64), blur, truncate=2.5)
-        around = ndimage.gaussian_filter(depth, blur, truncate=2.5) / np.maximum(weight, 1e-9)
+    for blur, reach, coarse in HOLLOWS:
+        weight, total = (
+            ndimage.gaussian_filter(image[::coarse, ::coarse].astype(np.float64), blur / coarse, truncate=2.5)
+            for image in (there, depth)
+        )
+        around = _enlarged(total / np.maximum(weight, 1e-9), nearest.shape)
         light *= 1 - 0.5 * np.clip((depth - around) / (reach * radius), 0, 1)
     return np.where(there, light, 1.0)
 
 
-def _outline(owner: Ints, n_panels: int) -> NDArray[np.float32]:
+def _enlarged(image: Floats, shape: tuple[int, ...]) -> Floats:
+    """A coarse image at the size of a fine one, linearly between its pixels."""
+    rows, columns = (np.arange(n) * c / n for n, c in zip(shape, image.shape, strict=True))
+    there = np.meshgrid(rows, columns, indexing="ij")
+    return np.asarray(ndimage.map_coordinates(image, there, order=1, mode="nearest"))
+
+
+def _outline(owner: NDArray[np.int32], n_panels: int) -> NDArray[np.float32]:
     """(h, w) what is left of the light at each sample: less along the edges of panels and of the model."""
     thing = np.minimum(owner, n_panels)  # the shell is one thing
     line = np.zeros(owner.shape, dtype=bool)
