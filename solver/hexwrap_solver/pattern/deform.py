@@ -27,7 +27,7 @@ ROUNDS, FLOOR = 4, 1e-2
 REST = 1e-9
 
 #: Unknowns up to which the system is factorised; beyond, a number of conjugate-gradient steps must do.
-DIRECT, STEPS = 60_000, 400
+DIRECT, STEPS = 60_000, 150
 
 
 def deform(
@@ -46,13 +46,15 @@ def deform(
     start = basis.T @ _parts(rest - fixed)  # the basis is orthonormal
     weight = np.sqrt(area / area.sum())
     n, best, least = len(rest), rest, np.inf
-    for _ in range(ROUNDS if basis.shape[1] <= DIRECT else 1):
+    free = start
+    for _ in range(ROUNDS):
         both = np.tile(weight, 2)
         matrix = conformal.T @ (both[:, None] * conformal) + SIZE * (similar.T @ (both[:, None] * similar))
         right = conformal.T @ (both * aim_a) + SIZE * (similar.T @ (both * aim_s))
         pull = REST * float(matrix.diagonal().mean())
         matrix = (matrix + pull * sparse.eye_array(matrix.shape[0])).tocsc()
-        moved = basis @ _solve(matrix, right + pull * start, start)
+        free = _solve(matrix, right + pull * start, free)
+        moved = basis @ free
         place = np.asarray(fixed + moved[:n] + 1j * moved[n:])
         worst = distortion_of(cmap, motion, place)
         if worst < least or best is rest:

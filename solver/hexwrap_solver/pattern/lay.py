@@ -76,7 +76,8 @@ def _lay(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings, progre
             raise _too_coarse(placement) from None
     else:
         cells = only_whole_cells(lattice, layout.motion, links)
-        points = Points(nodes.face[nodes.own], lattice.position(nodes.point[nodes.own]))
+        own = nodes.own
+        points = Points(nodes.face[own], lattice.position(nodes.point[own]), np.zeros(nodes.n, dtype=bool))
         trimmed = Trimmed(cells, np.ones(cells.n, dtype=bool), points)
     progress(0.8, f"{trimmed.cells.n} cells")
     return _finish(cmap, settings, placement, layout, trimmed)

@@ -30,8 +30,9 @@ from hexwrap_solver.pattern.rim import (
 #: Pieces smaller than this part of a cell are joined to a cut neighbour, or dropped where there is none.
 SLIVER = 0.05
 
-#: Faces smaller than this, in cells, are rounding: a boundary that runs along links.
-NOTHING = 1e-7
+#: Faces thinner than this many times the reach, over the length of an edge, are rounding: a boundary that
+#: runs along links.
+NOTHING = 4.0
 
 #: Order of half-edges around a point on the boundary: along it, then into the domain by angle, then back.
 ALONG, BACK = -1.0, 100.0
@@ -44,10 +45,11 @@ class TooCoarse(Exception):
 @dataclass(frozen=True)
 class Points:
     """Points of the arrangement: nodes first. face: triangle of the map; place: complex in its coordinates,
-    which are the point's own."""
+    which are the point's own. straight: (p,) no node, and on the boundary where that does not turn."""
 
     face: Ints
     place: Complexes
+    straight: Bools
 
 
 @dataclass(frozen=True)
@@ -104,20 +106,23 @@ def trim(cmap: ConformalMap, layout: Layout, nodes: Nodes, links: Links) -> Trim
     points, edges = _arrangement(cmap, layout, nodes, links, used)
     faces = _trace(edges, used)
     area = _areas(layout, points, faces)
-    gone = _slivers(edges, faces, area, lattice.cell_area, _lengths(layout, points, edges))
+    nothing, sliver = NOTHING * layout.reach * lattice.edge, SLIVER * lattice.cell_area
+    gone = _slivers(edges, faces, area, (nothing, sliver), _lengths(layout, points, edges))
     joined = 0
     if gone.any():
-        joined = int(((area > NOTHING * lattice.cell_area) & (area < SLIVER * lattice.cell_area)).sum())
+        joined = int(((area > nothing) & (area < sliver)).sum())
         edges = edges.without(gone)
         faces = _trace(edges, used)
+        linked = np.bincount(edges.tail[~edges.outer], minlength=len(points.face)) > 1
+        faces = faces.entries(~points.straight[faces.corner] | linked[faces.corner])
         area = _areas(layout, points, faces)
-    small = area < SLIVER * lattice.cell_area
-    lost = int((small & (area > NOTHING * lattice.cell_area)).sum())
+    small = area < sliver
+    lost = int((small & (area > nothing)).sum())
     kept = faces.part(~small)
     cells = _together(corner, turns, direction, kept, edges, links, layout)
     whole = np.arange(cells.n) < len(corner)
     dropped = float(area[small].sum() / lattice.cell_area)
-    return Trimmed(cells, whole, points, dropped, joined - lost, lost)
+    return Trimmed(cells, whole, points, dropped, max(joined - lost, 0), lost)
 
 
 @dataclass(frozen=True)
@@ -129,9 +134,16 @@ class _Faces:
     corner: Ints
 
     def part(self, keep: Bools) -> _Faces:
+        """Some of the faces."""
         entry = np.repeat(keep, self.half_edge.lengths)
         offsets = np.concatenate([[0], np.cumsum(self.half_edge.lengths[keep])])
         return _Faces(Ragged(self.half_edge.values[entry], offsets), self.turns[entry], self.corner[entry])
+
+    def entries(self, keep: Bools) -> _Faces:
+        """All faces with some of their corners; the side before a corner left out goes on to the next."""
+        lengths = np.bincount(self.half_edge.row[keep], minlength=self.half_edge.n_rows)
+        offsets = np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
+        return _Faces(Ragged(self.half_edge.values[keep], offsets), self.turns[keep], self.corner[keep])
 
 
 def _trace(edges: _HalfEdges, used: Bools) -> _Faces:
@@ -188,7 +200,9 @@ def _lengths(layout: Layout, points: Points, edges: _HalfEdges) -> Floats:
     )
 
 
-def _slivers(edges: _HalfEdges, faces: _Faces, area: Floats, cell_area: float, length: Floats) -> Bools:
+def _slivers(
+    edges: _HalfEdges, faces: _Faces, area: Floats, between: tuple[float, float], length: Floats
+) -> Bools:
     """Half-edges to take away, so that each small piece joins the cut neighbour with the longest border.
 
     Of equal ones, the neighbour that follows along the boundary, so that nothing depends on numbering.
@@ -196,12 +210,12 @@ def _slivers(edges: _HalfEdges, faces: _Faces, area: Floats, cell_area: float, l
     gone = np.zeros(len(edges.tail), dtype=bool)
     face_of = np.full(len(edges.tail), -1, dtype=np.int64)
     face_of[faces.half_edge.values] = faces.half_edge.row
-    small = (area < SLIVER * cell_area) & (area > NOTHING * cell_area)
+    small = (area > between[0]) & (area < between[1])
     entry = np.flatnonzero(small[faces.half_edge.row])
     half_edge = faces.half_edge.values[entry]
     mine, other = faces.half_edge.row[entry], face_of[edges.twin[half_edge]]
     fits = other >= 0
-    fits &= np.where(fits, area[other] >= SLIVER * cell_area, False)
+    fits &= np.where(fits, area[other] >= between[1], False)
     after_rim = np.zeros(len(edges.tail), dtype=bool)
     on_rim = edges.outer[edges.twin[faces.half_edge.values]]
     after_rim[faces.half_edge.values[faces.half_edge.next()]] = on_rim
@@ -230,6 +244,7 @@ def _arrangement(
     points = Points(
         np.concatenate([nodes.face[nodes.own], rim.face[new.edge]]),
         np.concatenate([lattice.position(nodes.point[nodes.own]), new.places(rim)]),
+        np.concatenate([np.zeros(nodes.n, dtype=bool), (new.t > 0) | ~corners_of_rim(layout, rim)[new.edge]]),
     )
     key = _keys(layout, rim, at_node, nodes.n)
     near = np.zeros(nodes.n, dtype=bool)
