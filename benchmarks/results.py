@@ -34,7 +34,8 @@ HEAD = """
 ### Results
 
 Gaps between neighbours in mm, mean / worst: by the paper's shortest-edge rule, with `inscribed` (the
-default) and `best`, each panel at its own length; then `inscribed` in 11 sizes. Uncovered is the cells' area left open.
+default) and `best`, each panel at its own length; then `inscribed` in 11 sizes. Uncovered is the cells'
+area left open.
 Planarity and regularity (edges; relative to the edge length) are the worst panel's. This table is made by
 `python benchmarks/results.py --write`.
 
