@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from hexwrap_solver.arrays import Bools, Floats, Ints
 from hexwrap_solver.conformal.boundary import nearest_multiple
@@ -107,8 +108,7 @@ def _nearest(surface: Surface, points: Floats, entries: Ints) -> Ints:
             field=_field(bad[0], "point"),
         )
     boundary = np.concatenate(surface.loops)
-    offset = points[entries][:, None] - surface.vertices[boundary][None]
-    return np.asarray(boundary[np.linalg.norm(offset, axis=2).argmin(axis=1)])
+    return np.asarray(boundary[cKDTree(surface.vertices[boundary]).query(points[entries])[1]])
 
 
 def _check_distinct(surface: Surface, placed: Ints) -> None:

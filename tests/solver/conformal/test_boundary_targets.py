@@ -1,0 +1,83 @@
+"""From boundary conditions to targets: Gauss–Bonnet for each mode, and the even spreading of the paper."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hexwrap_solver.arrays import Floats
+from hexwrap_solver.conformal import boundary, conformal_map
+from hexwrap_solver.conformal.types import BoundaryCondition
+from tests.solver.conformal.annuli import bump, grid, revolution
+
+TOWER = bump(24, 8)
+angles = st.lists(st.floats(0.02, 6.0), min_size=3, max_size=40).map(lambda x: np.array(x, dtype=float))
+
+
+@settings(max_examples=100, deadline=None)
+@given(angles, st.floats(-0.5, 0.5))
+def test_spreading_adds_the_same_to_every_angle(given_angles: Floats, difference: float) -> None:
+    wanted = boundary.cone_angle(given_angles) - difference
+    spread = boundary.spread_evenly(given_angles, wanted)
+    assert boundary.cone_angle(spread) == pytest.approx(wanted, abs=1e-11)
+    change = spread - given_angles
+    assert (spread >= given_angles / 2 - 1e-12).all()
+    whole = spread > given_angles / 2 + 1e-12  # the others had to keep half of their angle
+    if whole.any():
+        assert np.ptp(change[whole]) < 1e-12
+        assert (change[~whole] >= change[whole].max() - 1e-12).all()
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.integers(-12, 12), st.floats(-0.4, 0.4), st.sampled_from([np.pi / 3, np.pi / 2]))
+def test_the_nearest_multiple(k: int, off: float, quantum: float) -> None:
+    assert boundary.nearest_multiple((k + off) * quantum, quantum) == pytest.approx(k * quantum, abs=1e-14)
+
+
+def test_cone_angles_lose_their_rounding_and_nothing_else() -> None:
+    assert boundary.snapped(np.pi / 3 + 1e-13) == boundary.nearest_multiple(1.0, np.pi / 3)
+    assert boundary.snapped(-3e-12) == 0
+    assert boundary.snapped(1.0) == 1.0
+    assert boundary.snapped(1e-8) == 1e-8
+
+
+def test_every_target_satisfies_gauss_bonnet() -> None:
+    """Σ (2π − Θ) inside + Σ (π − Θ) on the boundary = 0, ties counted by their totals."""
+    loops = TOWER.loops
+    inside = len(TOWER.vertices) - len(loops[0]) - len(loops[1])
+    straight = boundary.straight(TOWER)
+    assert straight.angle.sum() == pytest.approx(2 * np.pi * inside + np.pi * (len(loops[0]) + len(loops[1])))
+    tied = boundary.constant_on_loops(TOWER, np.pi / 3)
+    free = tied.angle[tied.tie < 0].sum()
+    loop_0 = len(loops[0]) * np.pi - np.pi / 3  # Σκ = K
+    assert free + tied.tie_angle[1] + loop_0 == pytest.approx(np.pi * len(TOWER.faces))
+
+
+def test_optimal_spreading_keeps_u_constant_on_each_loop() -> None:
+    cmap = conformal_map(TOWER, BoundaryCondition("isometric", quantum=np.pi / 3, spread="optimal"))
+    first, second = (cmap.log_scale[loop] for loop in TOWER.loops)
+    assert not first.any()
+    assert np.ptp(second) == 0
+    assert second[0] != 0
+
+
+def test_even_spreading_keeps_boundary_lengths_on_average() -> None:
+    cmap = conformal_map(TOWER, BoundaryCondition("isometric", quantum=np.pi / 3))
+    assert np.abs(np.concatenate([cmap.log_scale[loop] for loop in TOWER.loops])).max() < 0.2
+    exact = conformal_map(TOWER, BoundaryCondition("isometric"))
+    changes = [(a - b) for a, b in zip(cmap.boundary_angles, exact.boundary_angles, strict=True)]
+    for change in changes:
+        assert np.ptp(change) < 1e-10
+
+
+def test_an_isometric_boundary_keeps_every_boundary_length() -> None:
+    vase = grid(30, 10, revolution(lambda s: 2 + np.sin(3 * s), lambda s: 4 * s))
+    cmap = conformal_map(vase, BoundaryCondition("isometric"))
+    for loop in vase.loops:
+        drawn = np.abs(np.diff(cmap.deck.apply(cmap.uv[loop], 0)))
+        length = np.linalg.norm(np.diff(vase.vertices[loop], axis=0), axis=1)
+        same_sheet = drawn < 1.5 * length  # not the one edge across the cut
+        assert same_sheet.sum() >= len(loop) - 2
+        np.testing.assert_allclose(drawn[same_sheet], length[same_sheet], rtol=1e-11)
