@@ -29,9 +29,9 @@ SHIFTS = (0.0, 1e-12, 1e-9, 1e-6)
 #: Acceptable overshoot φ'(t) / |φ'(0)| of a step.
 OVERSHOOT = 0.1
 MAX_TRIALS = 30
-#: After a step that changes no unknown by more than this, the factorised Hessian is used once more: its error
-#: is of that order, so the residual falls by about this factor for the price of a solve.
-CHORD = 1e-2
+#: After a full step that changes no unknown by more than CHORD, the factorised Hessian is used again, as long
+#: as each such step leaves at most CHORD_GAIN of the residual: a solve costs a fifth of a factorisation.
+CHORD, CHORD_GAIN = 0.5, 0.2
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ def _largest(gradient: Floats) -> float:
 def _chord(energy: Energy, factorisation: Factorisation, point: _Point) -> _Point | None:
     """A step with the Hessian of an earlier one; None where that is not good enough."""
     following = _Point.at(energy, point.x - factorisation.solve(point.gradient))
-    return following if following.residual <= 10 * CHORD * point.residual else None
+    return following if following.residual <= CHORD_GAIN * point.residual else None
 
 
 def _newton_step(energy: Energy, factorisation: Factorisation, point: _Point) -> tuple[_Point | None, bool]:
