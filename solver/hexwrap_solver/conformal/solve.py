@@ -14,12 +14,9 @@ from hexwrap_solver.conformal.layout import lay_out
 from hexwrap_solver.conformal.newton import Minimum, minimise
 from hexwrap_solver.conformal.orientation import faithful, positive
 from hexwrap_solver.conformal.robust import solve_with_flips, with_inserted
+from hexwrap_solver.conformal.span import check_span
 from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap, Deck, Targets
-from hexwrap_solver.errors import ConvergenceError
 from hexwrap_solver.surface.types import Surface
-
-#: The largest difference of u that a layout in double precision can show: e^36 is 4e15.
-MAX_SPAN = 36.0
 
 
 def conformal_map(
@@ -88,18 +85,11 @@ def _metric(
 ) -> _Plain | ConformalMap:
     """On the triangles as they are where that works, otherwise with flips (which lay the map out at once)."""
     energy = Energy(surface, targets)
-    minimum = minimise(energy, start, progress)
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # where u runs away, flips take over
+        minimum = minimise(energy, start, progress)
     if not minimum.converged or minimum.broken:
         return solve_with_flips(surface, targets, progress, start)
-    span = float(np.ptp(minimum.u))
-    if span > MAX_SPAN:
-        angle = boundary.cone_angle_of(targets, energy.angle_sums(minimum.corners), surface)
-        raise ConvergenceError(
-            f"Under this boundary condition (cone angle {np.degrees(angle):.4g}°) the map would shrink some "
-            f"parts of the surface 10^{span / np.log(10):.0f} times as much as others, more than the 16 "
-            "digits of a coordinate can tell apart; ask for a smaller cone angle, or cut the surface where "
-            "it is long and thin."
-        )
+    check_span(minimum.u, boundary.cone_angle_of(targets, energy.angle_sums(minimum.corners), surface))
     return _Plain(energy, minimum)
 
 

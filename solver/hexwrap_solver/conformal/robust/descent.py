@@ -17,6 +17,7 @@ from hexwrap_solver.conformal.factor import Factorisation
 from hexwrap_solver.conformal.robust.delaunay import make_delaunay
 from hexwrap_solver.conformal.robust.metric import Metric, angle_sums, edge_weights, measure
 from hexwrap_solver.conformal.robust.mirror import MirrorMesh
+from hexwrap_solver.conformal.span import MAX_SPAN
 
 MAX_STEPS = 200
 #: No single step may change u along an edge by more than this: Newton leaps where the Hessian is nearly
@@ -29,6 +30,8 @@ MAX_TRIALS = 40
 ROUNDING = 1e-14
 #: Added to the diagonal, relative to it and to 1, where rounding has made the Hessian indefinite.
 LIFT = 1e-9
+#: Newton may overshoot, but not by so much, where the answer lies within MAX_SPAN.
+RUNAWAY = 2.0
 #: Above this the answer is not accepted. Needles of 1e-4 degrees have rounding of 1e-9 in their angles.
 ACCEPTED = 1e-8
 
@@ -121,6 +124,8 @@ def descend(energy: FlipEnergy, start: Floats, progress: Progress) -> Descent:
             x, metric, gradient = step
         if not gained and residual <= ACCEPTED:
             break  # nothing but rounding is left
+        if np.ptp(x) > RUNAWAY * MAX_SPAN:
+            break  # no use to follow it further
     metric, gradient = energy.at(x)
     return Descent(energy.plain.scale_of(x), metric, _largest(gradient), iterations, energy.flips)
 

@@ -26,6 +26,7 @@ from hexwrap_solver.conformal.robust.refine import (
     spread,
 )
 from hexwrap_solver.conformal.robust.straight import straighten
+from hexwrap_solver.conformal.span import check_span
 from hexwrap_solver.conformal.types import ConformalMap, Deck, Targets
 from hexwrap_solver.errors import ConvergenceError
 from hexwrap_solver.surface.types import Surface
@@ -101,15 +102,16 @@ def _attempt(problem: Problem, progress: Progress) -> ConformalMap:
     mesh = mirror_mesh(surface, log_length - unit, turn.ravel())
     flips = make_delaunay(mesh, np.zeros(mesh.n), euclidean=True)
     descent = descend(FlipEnergy(Energy(surface, targets), mesh), problem.u, progress)
+    sums = angle_sums(mesh, descent.metric)
+    known = sums if (targets.tie == 0).any() else targets.angle
+    angle = cone_angle_of(targets, known, surface)
+    check_span(descent.u, angle)
     if not descent.residual <= ACCEPTED:
         raise ConvergenceError(
             f"Newton's method with flips ended after {descent.iterations} steps with angle sums still "
             f"{descent.residual:.1e} rad off: double precision cannot hold the map of this surface; "
             "remesh it more evenly."
         )
-    sums = angle_sums(mesh, descent.metric)
-    known = sums if (targets.tie == 0).any() else targets.angle
-    angle = cone_angle_of(targets, known, surface)
     foot = int(surface.loops[0][0])
     laid = develop(mesh, descent.metric, angle)
     uv, deck, circumference = normalise(
