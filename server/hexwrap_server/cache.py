@@ -29,11 +29,13 @@ log = logging.getLogger("hexwrap.cache")
 #: Share of the whole work that each stage usually takes, for the progress bar.
 SHARES = {
     "surface": 0.1,
-    "map": 0.4,
+    "map": 0.35,
     "pattern": 0.1,
     "fit": 0.2,
     "panels": 0.05,
     "quality": 0.15,
+    "components": 0.02,
+    "support": 0.03,
 }
 
 

@@ -46,7 +46,13 @@ def solve(report: Report, surface: bytes, wanted: Wanted, caching: CacheSettings
 def run_stages(sent: SentSurface, wanted: Wanted, runner: CachingRunner) -> pipeline.Solution:
     """A sent surface and what is wanted of it → the solution. Raises HexwrapError."""
     return pipeline.solve(
-        lambda: take_in(sent), wanted.boundary, wanted.pattern, wanted.panels, runner, source=sent
+        lambda: take_in(sent),
+        wanted.boundary,
+        wanted.pattern,
+        wanted.panels,
+        runner,
+        source=sent,
+        with_support=wanted.support,
     )
 
 

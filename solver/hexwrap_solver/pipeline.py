@@ -16,6 +16,7 @@ from hexwrap_solver.conformal import conformal_map
 from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap
 from hexwrap_solver.panels import fit_panels, make_components, measure, quantize, support
 from hexwrap_solver.panels.fit import FitKey
+from hexwrap_solver.panels.quantize import SizeKey
 from hexwrap_solver.panels.types import Components, Panels, PanelSettings, Quality, Support
 from hexwrap_solver.pattern import lay_pattern
 from hexwrap_solver.pattern.types import Pattern, PatternSettings
@@ -64,11 +65,13 @@ def solve(
     run: StageRunner | None = None,
     *,
     source: Any = None,
+    with_support: bool = False,
 ) -> Solution:
-    """Surface → conformal map → pattern → panels → quality.
+    """Surface → conformal map → pattern → panels → quality, and components and support where asked for.
 
     take_in: makes the annulus from whatever was sent (``surface_from_mesh`` or ``surface_from_nurbs``).
-    source: what the surface depends on, for runners that remember. Raises HexwrapError.
+    source: what the surface depends on, for runners that remember. with_support: also without components,
+    then as axes and beams without depth. Raises HexwrapError.
     """
     run = run or PlainRunner()
     surface = run("surface", source, lambda progress: take_in())
@@ -76,15 +79,17 @@ def solve(
     if pattern is None:
         return Solution(cmap, run("quality", None, lambda progress: measure(cmap, None, None)))
     laid = run("pattern", pattern, lambda progress: lay_pattern(cmap, pattern, progress))
-    if panels is None:
-        return Solution(cmap, run("quality", None, lambda progress: measure(cmap, laid, None)), laid)
-    # Two stages, so that a change of the size classes alone reuses the poses and limits.
-    fitted = run("fit", FitKey.of(panels), lambda progress: fit_panels(cmap, laid, panels, progress))
-    made = run("panels", panels, lambda progress: quantize(fitted, panels))
+    made = None
+    if panels is not None:
+        # Two stages, so that a change of the size classes alone reuses the poses and limits.
+        fitted = run("fit", FitKey.of(panels), lambda progress: fit_panels(cmap, laid, panels, progress))
+        made = run("panels", SizeKey.of(panels), lambda progress: quantize(fitted, panels))
     quality = run("quality", None, lambda progress: measure(cmap, laid, made, progress))
-    wanted = panels.components
-    if wanted is None:
-        return Solution(cmap, quality, laid, made)
-    parts = run("components", wanted, lambda progress: make_components(made, wanted))
-    frame = run("support", wanted.depth, lambda progress: support(laid, wanted.depth, progress))
+    parts, frame = None, None
+    wanted = panels.components if panels is not None else None
+    if made is not None and wanted is not None:
+        parts = run("components", wanted, lambda progress: make_components(made, wanted))
+    if with_support or wanted is not None:
+        depth = wanted.depth if wanted is not None else 0.0
+        frame = run("support", depth, lambda progress: support(laid, depth, progress))
     return Solution(cmap, quality, laid, made, parts, frame)

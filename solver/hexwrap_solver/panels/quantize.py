@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from hexwrap_solver.arrays import Floats, Ints, Ragged
@@ -13,11 +15,25 @@ from hexwrap_solver.panels.types import FittedPanels, Panels, PanelSettings, Tra
 TRADE_OFF_CLASSES = 40
 
 
+@dataclass(frozen=True)
+class SizeKey:
+    """The settings that ``quantize`` depends on."""
+
+    sizes: int | None
+    size_cost: str
+    edge_range: tuple[float, float] | None
+    increment: float
+
+    @classmethod
+    def of(cls, settings: PanelSettings) -> SizeKey:
+        return cls(settings.sizes, settings.size_cost, settings.edge_range, settings.increment)
+
+
 def quantize(fitted: FittedPanels, settings: PanelSettings) -> Panels:
     """Chooses the size classes and makes the polygons.
 
-    Depends on the settings' sizes, size_cost, edge_range and increment. Raises PanelsError where the
-    increment is longer than a panel may be.
+    Depends on the settings in ``SizeKey`` only. Raises PanelsError where the increment is longer than a panel
+    may be.
     """
     regular = fitted.regular
     limit = fitted.limit[regular]
