@@ -17,7 +17,7 @@ def check_span(u: Floats, cone_angle: float) -> None:
     if span > MAX_SPAN:
         raise ConvergenceError(
             f"Under this boundary condition (cone angle {np.degrees(cone_angle):.4g}°) the map would shrink "
-            f"some parts of the surface about 10^{span / np.log(10):.0f} times as much as others, more than the "
-            "16 digits of a coordinate can tell apart; ask for a smaller cone angle, or cut the surface where "
-            "it is long and thin."
+            f"some parts of the surface about 10^{span / np.log(10):.0f} times as much as others, more than "
+            "the 16 digits of a coordinate can tell apart; ask for a smaller cone angle, or cut the surface "
+            "where it is long and thin."
         )
