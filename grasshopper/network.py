@@ -19,16 +19,15 @@ VALUE_LIST = UUID("00027467-0d24-4fa7-b178-8dc0ac5f42ec")
 GROUP = UUID("c552a431-af5b-46a9-a8a4-0fcbc27ef596")
 #: .NET ticks of 2026-01-01: a real date would make every build differ.
 DATE = 639_028_224_000_000_000
-ROW, ICON, LETTER = 20.0, 24.0, 6.2
+ROW, ICON, LETTER = 20.0, 24.0, 6.9
 
 Box = tuple[float, float, float, float]
 
-GUIDE = """1  Set the Mesh (right-click: Set one Mesh).
-2  Start the server.
-3  Run.
+GUIDE = """1  Start the server.
+2  Set the Mesh (right-click: Set one Mesh), Run.
 Sliders may move while it works.
 Corners: set points on the boundary and give
-their angles; Balance tells what is missing."""
+each its angle; Balance tells what is missing."""
 
 
 class Network:
@@ -173,45 +172,45 @@ def example(all_components: Sequence[Component]) -> Chunk:
     net = Network(all_components)
     server(net)
     settings(net)
-    net.geometry(MESH, "Mesh", "Mesh", "Mesh", 470, 60)
-    net.value_list("Mode", "Mode", ["straight", "angles", "isometric", "isometric optimal"], 390, 100)
-    net.toggle("Run", "Run", 430, 250)
-    wires = {"Mesh": "Mesh", "Mode": "Mode", "Angles": "BoundaryAngles.Angles", "Run": "Run"}
-    net.script("Send", 640, 60, wires | {"Pattern": "Pattern.Pattern", "Panels": "Panels.Panels"})
-    net.panel("Status", "Status", (860, 250, 170, 120), "Send.Status")
-    net.script("Collect", 880, 0, {"Job": "Send.Job"})
-    net.panel("Report", "Report", (1120, 180, 280, 200), "Collect.Report")
-    net.panel("Labels", "Labels", (1120, 0, 140, 150), "Collect.Labels")
-    net.script("Domain", 880, 420, {"Job": "Send.Job"})
-    net.panel("Summary", "Summary", (1120, 480, 200, 50), "Domain.Summary")
-    net.group("Server", (110, 170, 190, 255), ["Start", "StartServer", "Answer"])
-    net.group("Settings", (110, 255, 200, 120), ["Corners", "Degrees", "Unit", "BoundaryAngles", "Balance"])
-    net.group("Send", (110, 140, 210, 190), ["Mesh", "Mode", "Run", "Send", "Status"])
-    net.group("Collect", (110, 140, 190, 230), ["Collect", "Report", "Labels"])
-    net.group("Unrolled", (110, 210, 190, 220), ["Domain", "Summary"])
+    net.geometry(MESH, "Mesh", "Mesh", "Mesh", 40, -70)
+    net.toggle("Run", "Run", 440, 480)
+    wires = {"Mesh": "Mesh", "Angles": "BoundaryAngles.Angles", "Run": "Run"}
+    net.script("Send", 650, -30, wires | {"Pattern": "Pattern.Pattern", "Panels": "Panels.Panels"})
+    net.panel("Status", "Status", (866, 60, 150, 120), "Send.Status")
+    net.script("Collect", 1070, -105, {"Job": "Send.Job"})
+    net.panel("Labels", "Labels", (1300, -105, 150, 100), "Collect.Labels")
+    net.panel("Report", "Report", (1300, 20, 270, 99), "Collect.Report")
+    net.script("Domain", 1070, 210, {"Job": "Send.Job"})
+    net.panel("Summary", "Summary", (1300, 280, 210, 54), "Domain.Summary")
+    corners = ["Mesh", "Corners", "Degrees", "Unit", "BoundaryAngles", "Balance"]
+    shape = ["Kind", "Around", "Pattern", "Sizes", "Target", "Panels", "Run"]
+    net.group("1  Server", (90, 120, 144, 220), ["Start", "StartServer", "Answer"])
+    net.group("2  Surface and settings", (90, 255, 183, 77), [*corners, *shape])
+    net.group("3  Send", (110, 102, 187, 160), ["Send", "Status"])
+    net.group("4  Collect", (110, 100, 181, 246), ["Collect", "Labels", "Report"])
+    net.group("The unrolled domain", (90, 179, 157, 219), ["Domain", "Summary"])
     return net.archive()
 
 
 def server(net: Network) -> None:
     """What starts the server, and a word on how to begin."""
-    net.panel("Guide", "Start here", (20, -190, 300, 130), text=GUIDE)
-    net.toggle("Start", "Start", 360, -170)
-    net.script("StartServer", 520, -190, {"Start": "Start"})
-    net.panel("Answer", "Server", (720, -190, 260, 60), "StartServer.Status")
+    net.panel("Guide", "Start here", (20, -290, 290, 130), text=GUIDE)
+    net.toggle("Start", "Start", 370, -262)
+    net.script("StartServer", 530, -276, {"Start": "Start"})
+    net.panel("Answer", "Server", (740, -276, 270, 64), "StartServer.Status")
 
 
 def settings(net: Network) -> None:
     """Boundary corners, pattern and panels."""
     net.geometry(POINT, "Point", "Corners", "Corners", 40, 0)
-    net.panel("Degrees", "Angles", (20, 30, 100, 60), text="240")
-    net.value_list("Unit", "Unit", ["deg", "60", "90", "rad"], 20, 105)
-    net.script(
-        "BoundaryAngles", 200, 0, {"Points": "Corners", "Angle": "Degrees", "Unit": "Unit", "Mesh": "Mesh"}
-    )
-    net.panel("Balance", "Balance", (200, 100, 170, 60), "BoundaryAngles.Balance")
-    net.value_list("Kind", "Kind", ["hex", "triangle", "quad"], 20, 200)
-    net.slider("Around", "Around", 24, 6, 96, 20, 235)
-    net.script("Pattern", 260, 200, {"Kind": "Kind", "Around": "Around"})
-    net.slider("Sizes", "Sizes", 11, 1, 40, 20, 400)
-    net.value_list("Target", "Target", ["inscribed", "best", "shortest", "mean"], 20, 430)
-    net.script("Panels", 260, 390, {"Sizes": "Sizes", "Target": "Target"})
+    net.panel("Degrees", "Angles", (30, 34, 100, 46), text="240")
+    net.value_list("Unit", "Unit", ["deg", "60", "90", "rad"], 30, 96)
+    wires = {"Points": "Corners", "Angle": "Degrees", "Unit": "Unit", "Mesh": "Mesh"}
+    net.script("BoundaryAngles", 225, 0, wires)
+    net.panel("Balance", "Balance", (420, 40, 170, 64), "BoundaryAngles.Balance")
+    net.value_list("Kind", "Kind", ["hex", "triangle", "quad"], 30, 158)
+    net.slider("Around", "Around", 24, 6, 96, 30, 194)
+    net.script("Pattern", 265, 150, {"Kind": "Kind", "Around": "Around"})
+    net.slider("Sizes", "Sizes", 11, 1, 40, 30, 356)
+    net.value_list("Target", "Target", ["inscribed", "best", "shortest", "mean"], 30, 390)
+    net.script("Panels", 265, 350, {"Sizes": "Sizes", "Target": "Target"})

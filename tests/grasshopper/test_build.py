@@ -15,7 +15,7 @@ from uuid import UUID
 
 import pytest
 
-from grasshopper import archive, build, components, icons
+from grasshopper import archive, build, components, draw, icons
 from grasshopper.archive import Chunk
 from grasshopper.components import Component
 
@@ -228,7 +228,7 @@ def test_example_wires_start_at_parameters_that_are_there(objects: list[Chunk]) 
             if "SourceCount" in names:
                 assert chunk["SourceCount"] == len(sources)
             wires += [(source, chunk["NickName"]) for source in sources]
-    assert len(wires) >= 18
+    assert len(wires) >= 17
     named = {(starts[source], end) for source, end in wires}  # KeyError: a wire from nowhere
     for wire in [
         ("Mesh", "Mesh"), ("Run", "Run"), ("Angles", "Angles"), ("Pattern", "Pattern"), ("Panels", "Panels"),
@@ -248,6 +248,12 @@ def test_example_objects_have_names_of_their_own_and_do_not_overlap(objects: lis
     for i, (name, (x, y, w, h)) in enumerate(boxes):
         for other, (a, b, c, d) in boxes[:i]:
             assert x >= a + c or a >= x + w or y >= b + d or b >= y + h, f"{name} lies on {other}"
+
+
+def test_picture_in_the_readme_is_drawn_from_the_example() -> None:
+    drawn = draw.picture(archive.from_xml(draw.EXAMPLE.read_text(encoding="utf-8")))
+    assert draw.PICTURE.read_text(encoding="utf-8") == drawn, "run 'python grasshopper/draw.py'"
+    assert "docs/grasshopper.svg" in (draw.ROOT / "README.md").read_text(encoding="utf-8")
 
 
 def test_example_holds_every_component_of_the_figure(objects: list[Chunk]) -> None:
