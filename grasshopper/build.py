@@ -26,7 +26,7 @@ authors:
 - the hexwrap authors
 description: >-
   Seamless hexagonal, quad and triangle panels on tube-like surfaces by periodic discrete conformal maps.
-  Needs the hexwrap server on the same computer ('pipx install hexwrap').
+  Needs the program hexwrap on the same computer.
 keywords:
 - panelization
 - facade

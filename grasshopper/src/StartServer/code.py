@@ -5,8 +5,8 @@ import os
 
 WAIT = 30.0  # seconds that a server may take to come up
 HOW_TO_INSTALL = (
-    "No program 'hexwrap' was found. Install it once: in a terminal run 'pipx install hexwrap' (or 'pip install "
-    "hexwrap') with Python 3.11 or newer. If it is installed elsewhere, wire its full path to Program."
+    "No program 'hexwrap' was found. Install it once: with Python 3.11 or newer, run 'pipx install .' in a terminal "
+    "in hexwrap's own folder. If it is installed elsewhere, wire the full path of the program to Program."
 )
 
 

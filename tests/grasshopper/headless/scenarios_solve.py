@@ -396,6 +396,17 @@ def curves_are_lifted_across_the_cut():
     assert lift.solve().Lifted.branches and not lift.document.scheduled
 
 
+def support_of_a_tower():
+    panels = Component("Panels").set(BeamDepth=0.3, Sizes=8)
+    send = done(Panels=panels.Panels)
+    support = collected("Support", Job=send.Job)
+    assert not support.messages, support.messages
+    assert len(support.Nodes) == len(support.Axes) == len(support.Tilt) > 100
+    assert len(support.Beams) == len(support.Lines) == len(support.Torsion) > 100
+    assert all(beam.IsClosed and len(beam.points) == 5 for beam in support.Beams)
+    assert max(abs(t) for t in support.Torsion) < 1e-3
+
+
 def a_decimal_comma_changes_nothing():
     set_german()
     try:
@@ -466,5 +477,6 @@ world.run([
     domain_of_a_cylinder,
     domain_with_corners,
     curves_are_lifted_across_the_cut,
+    support_of_a_tower,
     a_decimal_comma_changes_nothing,
 ])  # fmt: skip
