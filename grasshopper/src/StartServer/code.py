@@ -41,10 +41,10 @@ def launch(program, port):
     except ImportError:
         import subprocess
 
-        with open(os.devnull, "rb") as silence, open(os.devnull, "wb") as nothing:
-            subprocess.Popen(
-                [program, "serve", "--port", str(port)], stdin=silence, stdout=nothing, stderr=nothing
-            )
+        # Not closed again: Jython passes the server's words on by threads that go on after this.
+        silence, nothing = open(os.devnull, "rb"), open(os.devnull, "wb")
+        command = [program, "serve", "--port", str(port)]
+        subprocess.Popen(command, stdin=silence, stdout=nothing, stderr=nothing)
         return
     start = ProcessStartInfo(program, "serve --port %d" % port)
     start.UseShellExecute = False

@@ -19,6 +19,7 @@ try:
 except ImportError:
     from queue import Empty
 
+FREEZE = 2.0  # seconds; a job that keeps the canvas from moving takes longer
 BUILT = os.environ["HEXWRAP_BUILT"]  # folder with Name.py and Name.json, unpacked from the built files
 
 
@@ -136,7 +137,7 @@ class Component(object):
         return [text for kind, text in self.messages if kind == level]
 
 
-def pump(components, until, seconds=30.0):
+def pump(components, until, seconds=60.0):
     """Runs the user interface's thread until a condition holds."""
     end = time.time() + seconds
     while not until():
@@ -147,7 +148,7 @@ def pump(components, until, seconds=30.0):
         try:
             start = time.time()
             Rhino.RhinoApp.waiting.get(timeout=0.05)()
-            assert time.time() - start < 0.5, "the canvas froze"
+            assert time.time() - start < FREEZE, "the canvas froze"
         except Empty:
             pass
         for component in components:
@@ -160,7 +161,7 @@ def pump(components, until, seconds=30.0):
                 component.solve()
 
 
-def settle(component, solved, seconds=30.0):
+def settle(component, solved, seconds=60.0):
     """Until the component was solved again by itself."""
     pump([component], lambda: component.solved >= solved, seconds)
     return component

@@ -25,7 +25,7 @@ def server_down():
     send = Component("Send").set(Mesh=world.tube(), Run=True, Port=port)
     start = time.time()
     settle(send, 2)
-    assert time.time() - start < 5 and send.solved == 2
+    assert time.time() - start < 15 and send.solved == 2
     assert len(send.said("error")) == 1
     assert "hexwrap serve" in send.said("error")[0] and str(port) in send.said("error")[0]
     send.solve()  # no endless loop of tries, and still the same words
@@ -47,7 +47,7 @@ def server_dies_in_mid_job():
     server.kill()
     start = time.time()
     settle(send, 4)
-    assert time.time() - start < 20
+    assert time.time() - start < 40
     assert len(send.said("error")) == 1 and "stopped answering" in send.said("error")[0]
     assert send.Job == good, "the last good job is held"
     # another one takes its place, which has never seen the mesh: it is sent once more
@@ -143,7 +143,7 @@ def servers_are_started_through_dotnet():
         port = world.free_port()
         start = Component("StartServer").set(Start=True, Port=port, Program=os.path.abspath(world.__file__))
         settle(start, 2)
-        assert started[0][1:] == ["serve", "--port", str(port)]
+        assert [words[1:] for words in started] == [["serve", "--port", str(port)]], started
         assert "could not be started" in start.said("error")[0]
         assert "access denied" in start.said("error")[0]
     finally:

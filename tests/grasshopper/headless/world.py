@@ -76,8 +76,10 @@ def with_fin(mesh):
 def free_port():
     listener = socket.socket()
     listener.bind(("127.0.0.1", 0))
+    listener.listen(1)  # only now does Jython choose
     port = listener.getsockname()[1]
     listener.close()
+    assert port > 0
     return port
 
 
@@ -107,11 +109,12 @@ class Server(object):
         environment = dict(os.environ)
         environment.update({"HEXWRAP_PORT": str(port), "HEXWRAP_DATA": data, "HEXWRAP_WORKERS": "1"})
         self.port = port
-        with open(os.devnull, "rb") as silence, open(os.devnull, "wb") as nothing:
-            self.process = subprocess.Popen(
-                [PYTHON, "-c", SERVE], stdin=silence, stdout=nothing, stderr=nothing, env=environment
-            )
-        end = time.time() + 30
+        # Jython passes the server's words on by threads: nothing may be closed behind them.
+        silence, self.nothing = open(os.devnull, "rb"), open(os.devnull, "wb")
+        self.process = subprocess.Popen(
+            [PYTHON, "-c", SERVE], stdin=silence, stdout=self.nothing, stderr=self.nothing, env=environment
+        )
+        end = time.time() + 90
         while not answers(port):
             assert time.time() < end and self.process.poll() is None, "the server did not come up"
             time.sleep(0.1)
