@@ -84,7 +84,7 @@ ANGLE_HELP = (
     "target angle at a boundary vertex, for --boundary angles; PLACE is an index of the sent mesh or X,Y,Z "
     "(any number of times)"
 )
-SUPPORT_HELP = "add the torsion-free support structure"
+SUPPORT_HELP = "add the torsion-free support structure, with beams where there is a --depth"
 #: Sections of which 'none' makes null.
 SECTIONS = (("pattern", "kind"), ("panels", "mode"))
 

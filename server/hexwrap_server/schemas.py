@@ -323,8 +323,15 @@ def _panels(body: Body) -> PanelSettings | None:
         method=asked.method,
         weights=Weights(**asked.weights.model_dump()),
         increment=asked.increment,
-        components=ComponentSettings(**asked.components.model_dump()) if asked.components else None,
+        components=_components(body, asked),
     )
+
+
+def _components(body: Body, asked: Panels) -> ComponentSettings | None:
+    """Asked for by themselves, or as far as a support structure needs them."""
+    if asked.components is None:
+        return ComponentSettings() if body.support else None
+    return ComponentSettings(**asked.components.model_dump())
 
 
 def _vertices_exist(boundary: Boundary, n: int) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import rhino3dm
 
 from hexwrap_server import __version__, samples
 from hexwrap_server.cli import ENDINGS, file_kind, main
@@ -71,6 +72,17 @@ def test_options_reach_the_request(tube: Path, tmp_path: Path) -> None:
     result = json.loads(out.read_text(encoding="utf-8"))
     assert result["pattern"]["kind"] == "quad"
     assert result["map"]["cone_angle"] == pytest.approx(0, abs=1e-9)
+
+
+def test_support_is_made_with_and_without_a_depth(tube: Path, tmp_path: Path) -> None:
+    for options, beams in ((["--support"], False), (["--support", "--depth", "0.1"], True)):
+        out, model = tmp_path / "s.json", tmp_path / "s.3dm"
+        given = ["solve", str(tube), "--around", "8", "-q", "-o", str(out), "-o", str(model)]
+        assert main([*given, *options]) == 0
+        assert len(json.loads(out.read_text(encoding="utf-8"))["support"]["axes"]) > 0
+        layers = {layer.Index: layer.FullPath for layer in rhino3dm.File3dm.Read(str(model)).Layers}
+        assert "support::axes" in layers.values()
+        assert ("support::beams" in layers.values()) == beams
 
 
 def test_a_request_file_and_a_bare_surface_are_both_inputs(tube: Path, tmp_path: Path) -> None:

@@ -103,14 +103,19 @@ def _add_components(model: rhino3dm.File3dm, components: Components, names: list
 
 
 def _add_support(model: rhino3dm.File3dm, support: Support) -> None:
-    """Beams as one mesh of ruled strips with corners of their own; node axes as lines of the beams' depth."""
+    """Beams as one mesh of ruled strips with corners of their own; node axes as lines of the beams' depth,
+    or of a quarter of the beams' length where they have no depth."""
     top = _layer(model, "support", SUPPORT)
-    strips = Ragged.from_table(support.strips)
-    corners: Ints = np.arange(len(strips.values)).reshape(-1, 4)
-    beams = _attributes(_layer(model, "beams", SUPPORT, top), "beams")
-    model.Objects.AddMesh(_mesh(strips.values.tolist(), corners.tolist()), beams)
-    axes = _attributes(_layer(model, "axes", SUPPORT, top), "node axis")
     depth = np.linalg.norm(support.strips[:, 3] - support.strips[:, 0], axis=1).max(initial=0.0)
+    if depth > 0:
+        strips = Ragged.from_table(support.strips)
+        corners: Ints = np.arange(len(strips.values)).reshape(-1, 4)
+        beams = _attributes(_layer(model, "beams", SUPPORT, top), "beams")
+        model.Objects.AddMesh(_mesh(strips.values.tolist(), corners.tolist()), beams)
+    else:
+        ends = support.nodes[support.edges]
+        depth = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).mean() / 4
+    axes = _attributes(_layer(model, "axes", SUPPORT, top), "node axis")
     ends = support.nodes - depth * support.axes
     for start, end in zip(support.nodes.tolist(), ends.tolist(), strict=True):
         model.Objects.AddLine(rhino3dm.Point3d(*start), rhino3dm.Point3d(*end), axes)
