@@ -22,7 +22,17 @@ VIEWER = ROOT / "server" / "viewer"
 STATIC = ROOT / "server" / "hexwrap_server" / "static"
 
 
-def _chromium() -> str | None:
+#: Draws without a graphics card, asks nobody on the network.
+BROWSER_FLAGS = [
+    "--no-sandbox",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-background-networking",
+]
+
+
+def chromium() -> str | None:
     for name in ("chromium", "chromium-browser", "google-chrome"):
         if found := shutil.which(name):
             return found
@@ -36,7 +46,7 @@ except ImportError:  # the browser tests are the only ones that need it
 
 pytestmark = [
     pytest.mark.skipif(sync_playwright is None, reason="playwright is not installed (pip install '.[test]')"),
-    pytest.mark.skipif(_chromium() is None, reason="no Chromium on this machine (apt-get install chromium)"),
+    pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine (apt-get install chromium)"),
     # Playwright's own event loop leaves its sockets to the garbage collector.
     pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning"),
 ]
@@ -91,14 +101,8 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
 def browser() -> Iterator[object]:
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(
-            executable_path=_chromium(),
-            args=[
-                "--no-sandbox",
-                "--use-gl=angle",
-                "--use-angle=swiftshader",
-                "--enable-unsafe-swiftshader",
-                "--disable-background-networking",
-            ],
+            executable_path=chromium(),
+            args=BROWSER_FLAGS,
         )
         yield browser
         browser.close()

@@ -102,7 +102,8 @@ export function colour(result: Result, mode: Mode): Colouring {
   if (mode === "size" && result.sizes?.length) {
     const table = new Map(result.sizes.map((s) => [s.size, rgb(s.color)]));
     for (let i = 0; i < n; i++) colors.set(table.get(result.panels!.size[i]) ?? UNSIZED, 3 * i);
-    const rows = result.sizes.map((s) => ({ color: s.color, label: number(s.edge_length), count: s.count }));
+    const lengths = result.sizes.map((s) => s.edge_length);
+    const rows = result.sizes.map((s) => ({ color: s.color, label: number(s.edge_length, digitsApart(lengths)), count: s.count }));
     const unsized = result.panels!.size.filter((s) => s < 0).length;
     if (unsized) rows.push({ color: `rgb(${UNSIZED.join(" ")})`, label: "cut to fit", count: unsized });
     return { colors, legend: { kind: "classes", rows } };
@@ -125,6 +126,12 @@ export function colour(result: Result, mode: Mode): Colouring {
   const { label, unit } = MODES.find((m) => m.mode === mode)!;
   const title = unit === "relative" ? `${label} / edge` : unit === "length" ? `${label} (model units)` : label;
   return { colors, legend: { kind: "ramp", title, low: number(low), high: number(high) } };
+}
+
+/** Significant digits that tell neighbouring sizes apart. */
+function digitsApart(lengths: number[]): number {
+  for (let digits = 4; digits < 10; digits++) if (new Set(lengths.map((x) => number(x, digits))).size === lengths.length) return digits;
+  return 10;
 }
 
 /** A figure as people read it: four significant digits, no needless zeros. */

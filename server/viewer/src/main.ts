@@ -347,9 +347,11 @@ function drawAngles(): void {
   }));
   const { loops, total } = balance(state.corners);
   const closed = Math.abs(total) < 0.05;
-  $("balance").textContent = `Σκ: loop 0 ${number(loops[0])}°, loop 1 ${number(loops[1])}°; ${closed ? "balanced" : `${number(total)}° too much`}`;
+  $("balance").textContent = `Σκ: loop 0 ${degrees(loops[0])}, loop 1 ${degrees(loops[1])}; ${closed ? "balanced" : `${degrees(total)} too much`}`;
   $("balance").classList.toggle("open", !closed);
 }
+
+const degrees = (x: number) => `${number(Math.round(1e4 * x) / 1e4)}°`;
 
 function anglesChanged(): void {
   if (Math.abs(balance(state.corners).total) < 0.05) solveSoon();

@@ -285,15 +285,20 @@ export class View3D {
     this.boundary = null;
     if (vertices) {
       const list = loops.flat();
-      const geometry = new THREE.BufferGeometry();
-      geometry.setAttribute("position", new THREE.Float32BufferAttribute(list.flatMap((v) => this.local(vertices[v])), 3));
-      geometry.setAttribute("color", new THREE.Float32BufferAttribute(list.flatMap((v) => (marked.has(v) ? [0.84, 0.32, 0.05] : [0.12, 0.44, 0.47])), 3));
-      this.boundary = new THREE.Points(geometry, new THREE.PointsMaterial({ size: 8, sizeAttenuation: false, vertexColors: true, depthTest: false, transparent: true }));
-      this.boundary.renderOrder = 15;
+      this.boundary = this.dots(list.map((v) => vertices[v]), 0x1f6f78, 4);
       this.boundary.userData.list = list;
+      this.boundary.add(this.dots([...marked].map((v) => vertices[v]), 0xe05206, 11));
       this.content.add(this.boundary);
     }
     this.invalidate();
+  }
+
+  private dots(points: Vec3[], color: number, size: number): THREE.Points {
+    const geometry = new THREE.BufferGeometry();
+    geometry.setAttribute("position", new THREE.Float32BufferAttribute(points.flatMap((p) => this.local(p)), 3));
+    const dots = new THREE.Points(geometry, new THREE.PointsMaterial({ color, size, sizeAttenuation: false, depthTest: false, transparent: true }));
+    dots.renderOrder = 15;
+    return dots;
   }
 
   /** The boundary vertex within 14 pixels of (x, y), nearest to the eye among them. */
