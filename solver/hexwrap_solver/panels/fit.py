@@ -11,15 +11,17 @@ from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.errors import PanelsError
 from hexwrap_solver.panels import limits
 from hexwrap_solver.panels.best import jointly_largest
-from hexwrap_solver.panels.energy import minimise_singly, minimise_watertight
+from hexwrap_solver.panels.energy import minimise_watertight
 from hexwrap_solver.panels.halfedges import HalfEdges, half_edges
-from hexwrap_solver.panels.polygons import edge_lengths, fan_areas, mean_edges, means, row_minima
-from hexwrap_solver.panels.regular import Poses, nearest_regular, nearest_regular_in_plane
+from hexwrap_solver.panels.polygons import fan_areas, mean_edges, means
+from hexwrap_solver.panels.poses import fit_poses, target_lengths
+from hexwrap_solver.panels.regular import Poses
 from hexwrap_solver.panels.separation import Separation, separating_planes
 from hexwrap_solver.panels.trimmed import flatten_and_clear, plane_normals
 from hexwrap_solver.panels.types import FittedPanels, PanelSettings, Weights
 from hexwrap_solver.pattern.types import Pattern
 from hexwrap_solver.surface.closest import TriangleTree
+from hexwrap_solver.surface.types import Surface
 
 #: Corners of a whole cell of each kind.
 CORNERS = {"hex": 6, "quad": 4, "triangle": 3}
@@ -65,21 +67,19 @@ def fit_panels(
     Depends on the settings in ``FitKey`` only. Raises PanelsError where no whole cell has room for a panel.
     """
     progress(0.0, "fitting panels")
-    pull = settings.weights.surface > 0 and (settings.method == "energy" or settings.mode == "watertight")
-    surface = TriangleTree.build(cmap.surface.vertices, cmap.surface.faces) if pull else None
     if settings.mode == "watertight":
-        return _fit_watertight(pattern, settings, surface, progress)
-    return _fit_split(pattern, settings, surface, progress)
+        return _fit_watertight(cmap.surface, pattern, settings, progress)
+    return _fit_split(cmap.surface, pattern, settings, progress)
 
 
 def _fit_split(
-    pattern: Pattern, settings: PanelSettings, surface: TriangleTree | None, progress: Progress
+    surface: Surface, pattern: Pattern, settings: PanelSettings, progress: Progress
 ) -> FittedPanels:
     cells = _corner_points(pattern)
     p = CORNERS[pattern.kind]
     regular: Bools = pattern.whole & (pattern.faces.lengths == p)
     points = _table(cells, regular, p)
-    poses, energy, notes = _poses(pattern, points, regular, settings, surface, progress)
+    poses, energy, notes = fit_poses(surface, points, settings, progress)
     edges = half_edges(pattern)
     normal = plane_normals(cells)
     normal[regular] = poses.normal
@@ -109,11 +109,12 @@ def _fit_split(
 
 
 def _fit_watertight(
-    pattern: Pattern, settings: PanelSettings, surface: TriangleTree | None, progress: Progress
+    surface: Surface, pattern: Pattern, settings: PanelSettings, progress: Progress
 ) -> FittedPanels:
     """All cells, trimmed ones too, as polygons over shared corners."""
-    target = _target_lengths(_corner_points(pattern), settings)
-    moved, energy = minimise_watertight(pattern, target, settings.weights, surface, progress)
+    target = target_lengths(_corner_points(pattern), settings)
+    tree = TriangleTree.build(surface.vertices, surface.faces) if settings.weights.surface > 0 else None
+    moved, energy = minimise_watertight(pattern, target, settings.weights, tree, progress)
     shapes = Ragged(moved[pattern.faces.values.astype(np.int64)], pattern.faces.offsets)
     return FittedPanels(
         mode="watertight",
@@ -131,13 +132,6 @@ def _fit_watertight(
     )
 
 
-def _target_lengths(cells: Ragged, settings: PanelSettings) -> Floats:
-    """ℓ_P of the energies: the shortest edge of each cell, or its mean edge."""
-    if settings.target == "shortest":
-        return row_minima(edge_lengths(cells), cells.offsets)
-    return mean_edges(cells)
-
-
 def _corner_points(pattern: Pattern) -> Ragged:
     return Ragged(pattern.vertices[pattern.faces.values.astype(np.int64)], pattern.faces.offsets)
 
@@ -145,45 +139,6 @@ def _corner_points(pattern: Pattern) -> Ragged:
 def _table(cells: Ragged, chosen: Bools, p: int) -> Floats:
     """(r, p, 3) corner points of the chosen cells, which have p corners each."""
     return np.asarray(cells.values[cells.offsets[:-1][chosen][:, None] + np.arange(p)], dtype=np.float64)
-
-
-def _poses(
-    pattern: Pattern,
-    points: Floats,
-    regular: Bools,
-    settings: PanelSettings,
-    surface: TriangleTree | None,
-    progress: Progress,
-) -> tuple[Poses, Floats | None, tuple[str, ...]]:
-    """Regular polygons for the whole cells; with method ``energy`` those nearest to the minimisers, the
-    energy curve, and how near they are."""
-    energy: Floats | None = None
-    notes: tuple[str, ...] = ()
-    shape = points
-    if settings.method == "energy":
-        target = _target_lengths(Ragged.from_table(points), settings)
-        shape, energy = minimise_singly(points, target, settings.weights, surface, progress)
-    poses = _nearest(pattern, shape, regular, settings)
-    if settings.method == "energy":
-        p = points.shape[1]
-        ideal = poses.center[:, None] + poses.free_length[:, None, None] * poses.spokes(p)
-        miss = float((np.linalg.norm(shape - ideal, axis=2).max(axis=1) / target).max(initial=0.0))
-        if miss > 1e-9:
-            notes = (
-                f"The minimisers of the energy differ from regular panels by up to {miss:.1e} of the edge"
-                " length; the panels are the regular ones nearest to them.",
-            )
-    return poses, energy, notes
-
-
-def _nearest(pattern: Pattern, shape: Floats, regular: Bools, settings: PanelSettings) -> Poses:
-    if settings.orientation == "fit":
-        return nearest_regular(shape)
-    corner = pattern.faces.values.astype(np.int64)[
-        pattern.faces.offsets[:-1][regular][:, None] + np.arange(shape.shape[1])
-    ]
-    normal = pattern.normals[corner].mean(axis=1)
-    return nearest_regular_in_plane(shape, normal / np.linalg.norm(normal, axis=1)[:, None])
 
 
 def _limits(

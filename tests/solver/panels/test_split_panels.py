@@ -12,13 +12,18 @@ from scipy.spatial.transform import Rotation
 
 from hexwrap_solver.errors import PanelsError
 from hexwrap_solver.panels import fit_panels, measure, quantize, rationalize
+from hexwrap_solver.panels.tangents import surface_normals
 from hexwrap_solver.panels.types import PanelSettings
+from hexwrap_solver.surface import surface_from_nurbs
+from hexwrap_solver.surface.closest import TriangleTree
+from hexwrap_solver.surface.types import NurbsSurface
 from tests.solver.panels.cells import (
     catenoid,
     cylinder,
     grid_map,
     hex_pattern,
     inverted,
+    normals,
     quad_pattern,
     sphere,
     torus,
@@ -92,9 +97,41 @@ def test_joint_is_left_open():
 
 
 def test_tangent_panels_lie_in_tangent_planes():
-    pattern, panels, _ = panelize(torus, orientation="tangent")
-    mean = pattern.normals[pattern.faces.values].reshape(-1, 6, 3).mean(axis=1)
-    assert np.allclose(panels.normal, mean / np.linalg.norm(mean, axis=1)[:, None], atol=1e-12)
+    """The normals of a fine mesh differ from the surface's by the square of its edge length."""
+    pattern, cmap = hex_pattern(torus, 24, 8, -0.6), grid_map(torus, 192, 120, -0.7, 1.8)
+    panels = rationalize(cmap, pattern, PanelSettings(orientation="tangent"))
+    middle = pattern.uv[pattern.faces.values].reshape(-1, 6)
+    x = np.angle(np.exp(1j * middle.real).mean(axis=1))
+    expected = normals(torus, x, middle.imag.mean(axis=1))
+    angle = np.degrees(np.arccos(np.clip(np.einsum("qd,qd->q", panels.normal, expected), -1, 1)))
+    fitted = rationalize(cmap, pattern, PanelSettings()).normal
+    assert angle.max() < 0.5
+    assert np.degrees(np.arccos(np.einsum("qd,qd->q", fitted, expected))).max() > 2 * angle.max()
+
+
+def test_tangents_of_a_nurbs_surface_are_its_own():
+    surface = surface_from_nurbs(cylinder_of_radius(3.0))
+    rng = np.random.default_rng(0)
+    angle = rng.uniform(0, 2 * np.pi, 200)
+    points = np.stack([3 * np.cos(angle), 3 * np.sin(angle), rng.uniform(0.5, 3.5, 200)], axis=1)
+    tree = TriangleTree.build(surface.vertices, surface.faces)
+    found = surface_normals(surface, points * [0.99, 0.99, 1.0], tree)
+    radial = points * [1 / 3, 1 / 3, 0]
+    assert np.allclose(np.abs(np.einsum("kd,kd->k", found, radial)), 1, atol=1e-9)
+    outside = np.einsum("kd,kd->k", surface.normals, surface.vertices * [1, 1, 0]).mean()
+    assert (np.einsum("kd,kd->k", found, radial) * outside > 0).all()
+
+
+def cylinder_of_radius(r: float) -> NurbsSurface:
+    """Nine rational control points around, two along the axis."""
+    corner = np.array([[1, 0], [1, 1], [0, 1], [-1, 1], [-1, 0], [-1, -1], [0, -1], [1, -1], [1, 0]]) * r
+    weight = np.where(np.arange(9) % 2, np.sqrt(0.5), 1.0)
+    points = np.zeros((9, 2, 4))
+    points[:, :, :2] = corner[:, None]
+    points[:, 1, 2] = 4.0
+    points[:, :, 3] = weight[:, None]
+    around = np.array([0, 0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 4]) / 4.0
+    return NurbsSurface((2, 1), (around, np.array([0.0, 0, 1, 1])), points, (True, False))
 
 
 def test_sizes_follow_a_rigid_motion_and_a_change_of_scale():

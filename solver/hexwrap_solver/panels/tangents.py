@@ -1,0 +1,31 @@
+"""Tangent planes of the surface at panel centres (paper, section 4: orientation by the master surface)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hexwrap_solver.arrays import Floats
+from hexwrap_solver.surface.closest import TriangleTree
+from hexwrap_solver.surface.projection import project, start_parameters
+from hexwrap_solver.surface.types import Surface
+
+
+def surface_normals(surface: Surface, points: Floats, tree: TriangleTree) -> Floats:
+    """(k, 3) unit normals, on the outside, where the surface is nearest to the points (k, 3).
+
+    From the tangents of the NURBS surface where there is one, else interpolated between the mesh's normals.
+    """
+    nearest = tree.nearest(points)
+    corners = surface.normals[surface.faces[nearest.face]]
+    interpolated = np.einsum("kc,kcd->kd", nearest.barycentric, corners)
+    if surface.nurbs is None:
+        return _unit(interpolated)
+    start = start_parameters(surface, nearest.face, nearest.barycentric)
+    _, _, exact = project(surface.nurbs, points, start)
+    side = np.einsum("kd,kd->k", exact, interpolated)
+    # Where the parameterization is singular the cross product of the tangents vanishes.
+    return _unit(np.where((side == 0)[:, None], interpolated, np.sign(side)[:, None] * exact))
+
+
+def _unit(vectors: Floats) -> Floats:
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=1)[:, None])
