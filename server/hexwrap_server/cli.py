@@ -22,6 +22,7 @@ from hexwrap_server.curves import WRITERS as CURVE_WRITERS
 from hexwrap_server.demo import ALL, DemoError, run_demo
 from hexwrap_server.files import WRITERS, Meta, write
 from hexwrap_server.files.text import length
+from hexwrap_server.finished import map_in_result
 from hexwrap_server.local import Task, UsageError, only_map, solve_here, task
 from hexwrap_server.options import add_request_options, is_option_at_fault
 from hexwrap_server.problems import FormError
@@ -92,7 +93,11 @@ def make_parser() -> argparse.ArgumentParser:
     add_request_options(solve)
     solve.set_defaults(command=_solve)
     lift = commands.add_parser("lift", help="carry own points and curves from the domain onto the surface")
-    lift.add_argument("input", metavar="INPUT", help=f"{INPUT}; the boundary options say how it is mapped")
+    lift.add_argument(
+        "input",
+        metavar="INPUT",
+        help=f"a finished result (JSON, NPZ); or {INPUT}, mapped as the boundary options say",
+    )
     lift.add_argument(
         "points", metavar="POINTS", help=f"drawing in the unrolled domain ({', '.join(READERS)})"
     )
@@ -170,11 +175,13 @@ def _lift(asked: argparse.Namespace) -> int:
     if not Path(asked.points).is_file():
         raise UsageError(f"{asked.points}: there is no such file.")
     curves = read_curves(Path(asked.points))
-    solution, _ = solve_with_progress(only_map(task(asked.input, asked)), asked.quiet)
+    cmap = map_in_result(Path(asked.input))
+    if cmap is None:
+        cmap = solve_with_progress(only_map(task(asked.input, asked)), asked.quiet)[0].map
     carry = flatten_curves if asked.flatten else lift_curves
-    carried = carry(solution.map, curves, asked.step)
+    carried = carry(cmap, curves, asked.step)
     if not carried.curves:
-        return _refuse(1, "no point of the drawing lies in the domain; see domain.svg for where that is.")
+        return _refuse(1, "no point of the drawing lies in the domain; see domain.dxf for where that is.")
     save(asked.output, write_curves(ending, carried.curves))
     console = Console(quiet=asked.quiet, soft_wrap=True, highlight=False)
     if carried.outside:

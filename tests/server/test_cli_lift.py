@@ -12,6 +12,8 @@ import pytest
 from hexwrap_server.carrying import flatten_curves, lift_curves, one_piece
 from hexwrap_server.cli import main
 from hexwrap_server.curves import READERS, Curve, DrawingError, read_curves, refined, write_curves
+from hexwrap_server.files import Meta, write
+from hexwrap_server.finished import map_in_result
 from hexwrap_solver.conformal.types import Deck
 from tests.server.analytic import cylinder
 
@@ -147,6 +149,27 @@ def test_the_command_there_and_back(tube: Path, tmp_path: Path, capsys: pytest.C
     curve = json.loads(back.read_text())["curves"][0]
     assert curve["points"][0] == pytest.approx(middle.tolist(), abs=1e-6)
     assert len(curve["points"]) == 5
+
+
+@pytest.mark.parametrize("name", ["result.json", "result.npz"])
+def test_a_finished_result_lifts_as_its_map_does(name: str, tmp_path: Path) -> None:
+    solution = cylinder()
+    (tmp_path / name).write_bytes(write(name, solution, Meta()))
+    found = map_in_result(tmp_path / name)
+    assert found is not None
+    drawn = [Curve(np.array([[2.0, 3.0], [17.0, 5.0], [25.0, 8.0]]))]
+    ours, theirs = (lift_curves(cmap, drawn, 0.2).curves[0].points for cmap in (found, solution.map))
+    assert ours == pytest.approx(theirs, abs=1e-12)
+    assert np.array_equal(found.surface.loops[1], solution.map.surface.loops[1])
+
+
+def test_a_result_without_its_mesh_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    result = json.loads(write("result.json", cylinder(), Meta()))
+    (tmp_path / "part.json").write_text(json.dumps({"map": result["map"]}))
+    (tmp_path / "d.csv").write_text("1,1")
+    given = ["lift", str(tmp_path / "part.json"), str(tmp_path / "d.csv"), "-o", str(tmp_path / "x.csv")]
+    assert main(given) == 2
+    assert "the result is incomplete" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
