@@ -13,6 +13,7 @@ import time
 import uuid
 from collections import OrderedDict
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any, TypeVar
@@ -51,6 +52,8 @@ class StageCache:
         self.memory_bytes = memory_bytes
         self._kept: OrderedDict[str, tuple[Any, int]] = OrderedDict()
         self._used = 0
+        # beside the next stage; one thread, so that stages do not pile up in memory
+        self._writer = ThreadPoolExecutor(1, thread_name_prefix="hexwrap-cache")
 
     def get(self, key: str) -> tuple[Any, str] | None:
         """The stage and where it was found (``memory`` or ``disk``), or None."""
@@ -66,11 +69,19 @@ class StageCache:
     def put(self, key: str, value: Any) -> None:
         self._keep(key, value)
         if self.folder is not None:
-            try:
-                self.folder.mkdir(parents=True, exist_ok=True)
-                write_whole(self._path(key), encode(value))
-            except OSError as error:  # a full disk costs speed, not the job
-                log.warning("a stage could not be written to the cache: %s", error)
+            self._writer.submit(self._write, key, value)
+
+    def settle(self) -> None:
+        """Until everything that was put is on the disk."""
+        self._writer.submit(int).result()
+
+    def _write(self, key: str, value: Any) -> None:
+        try:
+            path = self._path(key)
+            path.parent.mkdir(parents=True, exist_ok=True)
+            write_whole(path, encode(value))
+        except OSError as error:  # a full disk costs speed, not the job
+            log.warning("a stage could not be written to the cache: %s", error)
 
     def _keep(self, key: str, value: Any) -> None:
         size = size_of(value)
@@ -107,7 +118,7 @@ class CachingRunner:
     def __init__(self, cache: StageCache, report: Callable[[str, float, str], None]) -> None:
         self.timings: dict[str, float] = {}
         self.found: dict[str, str] = {}
-        self._cache = cache
+        self.cache = cache
         self._report = report
         self._key = solver_version()
         self._done = 0.0
@@ -122,10 +133,10 @@ class CachingRunner:
 
         progress(0.0, "")
         self._key = digest(self._key, stage, settings)
-        hit = self._cache.get(self._key)
+        hit = self.cache.get(self._key)
         if hit is None:
             result = compute(progress)
-            self._cache.put(self._key, result)
+            self.cache.put(self._key, result)
             self.found[stage] = "computed"
         else:
             result, self.found[stage] = hit

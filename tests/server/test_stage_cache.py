@@ -96,6 +96,7 @@ def stages(run: CachingRunner, settings: tuple[int, int]) -> int:
 
     run("map", settings[0], lambda progress: compute("map"))
     run("pattern", settings[1], lambda progress: compute("pattern"))
+    run.cache.settle()
     return len(computed)
 
 
