@@ -49,6 +49,7 @@ def test_result_has_every_part_and_the_parts_agree(client: Live, done: str) -> N
     assert np.shape(result["map"]["uv"]) == (n, 2)
     assert np.shape(result["map"]["sheet"]) == (m, 3)
     panels = result["panels"]
+    assert set(panels.pop("outside")) <= set(range(len(panels["polygons"])))
     assert {len(v) for v in panels.values() if isinstance(v, list)} == {len(panels["polygons"])}
     assert sum(size["count"] for size in result["sizes"]) == len(panels["polygons"])
     assert len(set(panels["label"])) == len(panels["label"])
