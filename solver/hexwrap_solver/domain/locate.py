@@ -49,6 +49,7 @@ class TriangleIndex:
         self.corners = corners
         low = np.stack([corners.real.min(axis=1), corners.imag.min(axis=1)], axis=1)
         high = np.stack([corners.real.max(axis=1), corners.imag.max(axis=1)], axis=1)
+        self.low, self.high = low, high
         self.origin = low.min(axis=0)
         size = np.maximum((high - low).max(axis=1), 1e-9 * float((high.max(axis=0) - self.origin).max()))
         level = np.ceil(np.log2(size)).astype(np.int64)
@@ -79,6 +80,11 @@ class TriangleIndex:
             start, end = (np.searchsorted(level.key, key, side=side) for side in ("left", "right"))
             place, step = runs(end - start)
             triangle = level.triangle[start[place] + step]
+            at, margin = places[place], 1e-6 * level.side
+            low, high = self.low[triangle], self.high[triangle]
+            near = (at.real >= low[:, 0] - margin) & (at.real <= high[:, 0] + margin)
+            near &= (at.imag >= low[:, 1] - margin) & (at.imag <= high[:, 1] + margin)
+            place, triangle = place[near], triangle[near]
             inside = barycentric(self.corners[triangle], places[place])
             least = inside.min(axis=1)
             order = np.lexsort((triangle, -least, place))

@@ -55,26 +55,24 @@ def whole_cells(lattice: Lattice, motion: Motion, links: Links) -> tuple[Ints, I
     """
     order = lattice.order
     start = np.flatnonzero(links.head.ravel() >= 0)
-    lowest = start
     node, way, turns = start // order, start % order, np.zeros(len(start), dtype=np.int64)
-    alive = np.ones(len(start), dtype=bool)
     corner_of, way_of, turns_of = [], [], []
     for _ in range(lattice.sides):
         corner_of.append(node)
         way_of.append(way)
         turns_of.append(turns)
-        lowest = np.minimum(lowest, node * order + way)
         across = links.turns[node, way]
         node = links.head[node, way]
         way = (way - motion.rotation(across) + lattice.turn) % order
         turns = turns + across
-        alive &= node >= 0
-    chosen = alive & (node * order + way == start) & (turns == 0) & (lowest == start)
-    return (
-        np.stack(corner_of, axis=1)[chosen],
-        np.stack(turns_of, axis=1)[chosen],
-        np.stack(way_of, axis=1)[chosen],
-    )
+        # Each cell once, from its lowest side on; a walk that comes to a lower one is another's, or none.
+        going = (node >= 0) & (node * order + way >= start)
+        start, node, way, turns = start[going], node[going], way[going], turns[going]
+        for past in (corner_of, way_of, turns_of):
+            past[:] = [x[going] for x in past]
+    closed = (node * order + way == start) & (turns == 0)
+    corner, sheet, direction = (np.stack(x, axis=1)[closed] for x in (corner_of, turns_of, way_of))
+    return corner, sheet, direction
 
 
 def link_twins(lattice: Lattice, motion: Motion, links: Links, corner: Ints, direction: Ints) -> Ints:

@@ -167,9 +167,12 @@ class Motion:
 
     def carry(self, places: Complexes, s: Ints) -> Complexes:
         """G^s for places of the plane."""
-        at_zero = self.apply(np.zeros((*np.shape(s), 2), dtype=np.int64), np.asarray(s))
-        angle = 2 * np.pi / self.lattice.order * self.rotation(s)
-        return np.asarray(np.exp(1j * angle) * places + self.lattice.position(at_zero))
+        s = np.asarray(s)
+        period = len(self._shifts)
+        if period == 1:
+            return np.asarray(places + s * complex(self.lattice.position(np.array(self.shift))))
+        turned = np.exp(1j * self.lattice.quantum * self.rotation(np.arange(period)))
+        return np.asarray(turned[s % period] * places + self.lattice.position(self._shifts)[s % period])
 
     def apply(self, points: Ints, s: Ints) -> Ints:
         """G^s(points), s broadcast over the points."""

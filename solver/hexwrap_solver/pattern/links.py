@@ -65,7 +65,19 @@ def _follow(layout: Layout, nodes: Nodes, links: Links, node: Ints, direction: I
 
 
 def _departure(layout: Layout, nodes: Nodes, node: Ints, direction: Ints) -> tuple[Ints, Ints, Bools]:
-    """The sighting from which a walk starts into its triangle, the direction there, and whether none does."""
+    """The sighting from which a walk starts into its triangle, the direction there, and whether it leads
+    straight out of the domain."""
+    seen, way = nodes.own[node], direction.copy()
+    blocked = np.zeros(len(node), dtype=bool)
+    several = np.flatnonzero(np.diff(nodes.starts)[node] > 1)
+    if len(several):
+        best = _best_sighting(layout, nodes, node[several], direction[several])
+        seen[several], way[several], blocked[several] = best
+    return seen, way, blocked
+
+
+def _best_sighting(layout: Layout, nodes: Nodes, node: Ints, direction: Ints) -> tuple[Ints, Ints, Bools]:
+    """For nodes on edges or vertices: the triangle into which a direction leads."""
     lattice, motion, order = layout.lattice, layout.motion, layout.lattice.order
     count = np.diff(nodes.starts)[node]
     walker, step = runs(count)
