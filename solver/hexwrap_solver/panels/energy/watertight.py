@@ -18,8 +18,8 @@ from hexwrap_solver.surface.closest import TriangleTree
 #: Gauss–Newton steps for each weight of the plane distances.
 STEPS_PER_STAGE = 12
 
-#: From stage to stage the plane distances weigh tenfold more, so that flatness wins in the end.
-STAGES = 6
+#: Weight of the plane distances in the first stage; from stage to stage tenfold more, so that flatness wins.
+FIRST_FLATNESS, STAGES = 1e3, 5
 
 #: Plane distances / ℓ below this count as flat.
 FLAT = 1e-9
@@ -28,7 +28,7 @@ FLAT = 1e-9
 DECREASE = 1e-4
 
 #: Weight of the squared movement / ℓ²: energies that only know shapes would move the mesh by whole edges.
-ANCHOR = 1.0
+ANCHOR = 10.0
 
 #: Damping relative to 1/ℓ², and how it changes after a good and after a bad step.
 DAMPING, EASE, TIGHTEN = 1e-3, 0.2, 8.0
@@ -70,11 +70,11 @@ def minimise_watertight(
     curve = [problem.energy(points, 0.0)]
     damping = DAMPING
     for stage in range(STAGES if weights.planarity > 0 else 1):
-        flatness = weights.planarity * 10.0**stage
+        flatness = weights.planarity * FIRST_FLATNESS * 10.0**stage
         energy = problem.energy(points, flatness)
         for step in range(STEPS_PER_STAGE):
             done = (stage + step / STEPS_PER_STAGE) / STAGES
-            progress(done, f"planarity weight 1e{stage}, energy {energy:.3e}")
+            progress(done, f"flatness weight {flatness:.0e}, energy {energy:.3e}")
             tried = points + problem.step(points, flatness, damping)
             reached = problem.energy(tried, flatness)
             damping = max(damping * (EASE if reached < energy else TIGHTEN), 1e-9)
