@@ -103,7 +103,7 @@ def run_scenarios(request: pytest.FixtureRequest, unpacked: Path) -> Runner:
     def run(name: str, environment: dict[str, str]) -> None:
         done = subprocess.run(
             [*command, str(HEADLESS / f"{name}.py")],
-            env=os.environ | {"HEXWRAP_BUILT": str(unpacked), "HEXWRAP_PYTHON": sys.executable} | environment,
+            env=os.environ | QUICK_JAVA | settings | environment,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
