@@ -48,9 +48,12 @@ def _place_by_sides(
     tried = place_by_sides(cmap, lattice, settings, turns, loops)
     if tried.distortion <= BEARABLE:
         return tried
+    cost = f"distort cells by {tried.distortion:.2f}, more than {BEARABLE:g}"
+    if not np.isfinite(tried.distortion):
+        cost = "fold the layout over"
     told = (
-        f"To align loop {' and loop '.join(map(str, loops))} at this size would distort cells by "
-        f"{tried.distortion:.2f}, more than {BEARABLE:g}: smaller cells, or corners elsewhere, fit better."
+        f"To align loop {' and loop '.join(map(str, loops))} at this size would {cost}: smaller cells, or "
+        "corners elsewhere, fit better."
     )
     turned = abs(np.rad2deg(turn_between_loops(cmap, lattice, loops)))
     if turned > 1:
