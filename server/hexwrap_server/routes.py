@@ -28,6 +28,7 @@ from hexwrap_server.problems import HttpError, dumped, not_found
 from hexwrap_server.requests import Intake, ParsedRequest
 from hexwrap_server.schemas import parse_points
 from hexwrap_server.service import Service
+from hexwrap_server.settings import MIB
 from hexwrap_server.store import Job
 
 #: Bodies up to this size are read in a thread, larger ones in a process: reading holds the interpreter.
@@ -166,6 +167,7 @@ async def post_surface(
             kind,
             name or "",
             settings.max_vertices,
+            int(settings.max_body_mib * MIB),
             caching,
         )
         intake: Intake = await service.errand("hexwrap_server.uploads:read_upload", *arguments)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
+import zipfile
 from typing import Any
 
 import python_multipart
@@ -32,11 +34,13 @@ def read_upload(
     content_type: str,
     name: str,
     max_vertices: int,
+    max_bytes: int,
     caching: CacheSettings,
 ) -> Intake:
     """A file sent raw (with its name) or in a form → checked surface. Raises UploadError, SurfaceError."""
     if content_type.lower().startswith("multipart/"):
         name, body = only_file(body, content_type)
+    _no_bomb(body, max_bytes)
     read = read_surface(body, name)
     if isinstance(read, NurbsSurface):
         return checked(
@@ -48,6 +52,19 @@ def read_upload(
             "coarser mesh, or start the server with a larger --max-vertices."
         )
     return checked(report, SentSurface(mesh=read), caching)
+
+
+def _no_bomb(body: bytes, max_bytes: int) -> None:
+    """An archive may not unpack to more than a body may have."""
+    if not zipfile.is_zipfile(io.BytesIO(body)):
+        return
+    with contextlib.suppress(zipfile.BadZipFile), zipfile.ZipFile(io.BytesIO(body)) as archive:
+        unpacked = sum(member.file_size for member in archive.infolist())
+        if unpacked > max_bytes:
+            raise UploadError(
+                f"The archive would unpack to {unpacked} bytes, this server takes at most {max_bytes}; send a "
+                "coarser mesh, or start the server with a larger --max-body-mib."
+            )
 
 
 def only_file(body: bytes, content_type: str) -> tuple[str, bytes]:

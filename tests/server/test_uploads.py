@@ -1,0 +1,111 @@
+"""Files sent to the service: read in a worker, refused there when broken, too large or of another kind."""
+
+from __future__ import annotations
+
+import io
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hexwrap_server.requests import Outcome, Wanted
+from hexwrap_server.store import Job, Store, Work
+from hexwrap_solver.conformal.types import BoundaryCondition
+from tests.server.bodies import tube
+from tests.server.live import Live, running
+
+
+@pytest.fixture(scope="module")
+def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Live]:
+    data = tmp_path_factory.mktemp("data")
+    with running(data, workers=1, max_vertices=5000, max_body_mib=4.0, job_mib=1500.0) as live:
+        yield live
+
+
+def obj() -> bytes:
+    surface = tube()
+    lines = ["v {} {} {}".format(*p) for p in surface["vertices"]]
+    lines += ["f {} {} {}".format(*(i + 1 for i in f)) for f in surface["faces"]]
+    return "\n".join(lines).encode()
+
+
+def npz(**changes: np.ndarray) -> bytes:
+    surface = tube()
+    arrays = {"vertices": np.array(surface["vertices"]), "faces": np.array(surface["faces"])} | changes
+    file = io.BytesIO()
+    np.savez_compressed(file, **arrays)
+    return file.getvalue()
+
+
+def test_file_in_a_form_is_the_surface_sent_as_json(client: Live) -> None:
+    as_json = client.post("/v1/surfaces", json=tube()).json()
+    for name, data in (("tube.obj", obj()), ("TUBE.NPZ", npz())):
+        answer = client.post("/v1/surfaces", files={"file": (name, data)})
+        assert answer.status_code == 201, answer.text
+        assert answer.json() == as_json
+        raw = client.post("/v1/surfaces", params={"name": name}, content=data)
+        assert raw.json() == as_json
+
+
+@pytest.mark.parametrize(
+    ("name", "data"),
+    [
+        ("tube.exe", b"MZ"),
+        ("tube", obj()),
+        ("tube.npz", b"PK\x03\x04 broken"),
+        ("tube.3dm", b"not a Rhino file"),
+        ("tube.ply", b"ply\nformat ascii 1.0\nelement vertex 3\nend_header\n"),
+        ("tube.stl", b""),
+        ("tube.npz", npz(vertices=np.array([{"a": 1}], dtype=object))),
+        ("tube.npz", npz(faces=np.array([[0, 1, 99_999]]))),
+        ("../../etc/passwd", b"root:x:0:0"),
+    ],
+)
+def test_files_that_cannot_be_read_are_refused(client: Live, name: str, data: bytes) -> None:
+    answer = client.post("/v1/surfaces", files={"file": (name, data)})
+    assert answer.status_code == 422, answer.text
+    assert answer.json()["detail"]
+    assert client.get("/health").status_code == 200
+
+
+def test_forms_hold_exactly_one_file(client: Live) -> None:
+    two = client.post("/v1/surfaces", files=[("a", ("a.obj", obj())), ("b", ("b.obj", obj()))])
+    assert (two.status_code, two.json()["type"]) == (422, "/problems/upload")
+    broken = client.post("/v1/surfaces", content=b"--x\r\n", headers={"Content-Type": "multipart/form-data"})
+    assert broken.status_code == 422
+
+
+def test_zip_bombs_are_refused(client: Live) -> None:
+    bomb = npz(vertices=np.zeros((2_000_000, 3)))
+    assert len(bomb) < 1_000_000
+    answer = client.post("/v1/surfaces", params={"name": "bomb.npz"}, content=bomb)
+    assert (answer.status_code, answer.json()["type"]) == (422, "/problems/upload")
+    assert "unpack" in answer.json()["detail"]
+
+
+def test_files_with_too_many_vertices_are_refused(client: Live) -> None:
+    large = tube(100, 60)
+    data = npz(vertices=np.array(large["vertices"]), faces=np.array(large["faces"]))
+    answer = client.post("/v1/surfaces", files={"file": ("large.npz", data)})
+    assert (answer.status_code, answer.json()["type"]) == (422, "/problems/too-many-vertices")
+
+
+def test_old_and_superfluous_results_are_forgotten(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    outcome = Outcome(b"r" * 1000, {}, 1000, b"s" * 1000, {}, {})
+    for i in range(4):
+        identity = f"{i}" * 64
+        store.keep_surface("a" * 64, b"surface")
+        job = Job(f"job{i}", identity, "", created=time.time(), finished=time.time(), status="done")
+        store.add(job, Work(identity, "a" * 64, Wanted(BoundaryCondition(), None, None)))
+        store.keep_outcome(identity, outcome)
+        store.finish_work(identity, outcome)
+        time.sleep(0.01)
+    assert store.finished_work("0" * 64) is not None  # asked for: now the last used
+    assert len(store.prune_rows(days=1, result_bytes=4500)) == 2
+    assert [job.id for job in store.jobs(10)] == ["job3", "job0"]
+    assert store.prune_rows(days=0, result_bytes=1e9) == {}
+    assert store.jobs(10) == []
+    store.close()
