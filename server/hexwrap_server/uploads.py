@@ -62,8 +62,8 @@ def _no_bomb(body: bytes, max_bytes: int) -> None:
         unpacked = sum(member.file_size for member in archive.infolist())
         if unpacked > max_bytes:
             raise UploadError(
-                f"The archive would unpack to {unpacked} bytes, this server takes at most {max_bytes}; send a "
-                "coarser mesh, or start the server with a larger --max-body-mib."
+                f"The archive would unpack to {unpacked} bytes, this server takes at most {max_bytes}; send "
+                "a coarser mesh, or start the server with a larger --max-body-mib."
             )
 
 
