@@ -63,7 +63,10 @@ def place_by_sides(
     around = round(cmap.circumference * abs(best.scale) / width)
     if turns == 0:
         around = int(lattice.cells_around(np.array(best.motion.shift)))
-    return Placement(place, best.motion, angle, around, distortion_of(cmap, best.motion, place), ())
+    notes = (
+        ("phase has no effect: lattice lines on all sides leave no freedom.",) if any(settings.phase) else ()
+    )
+    return Placement(place, best.motion, angle, around, distortion_of(cmap, best.motion, place), notes)
 
 
 def _best_at(

@@ -53,6 +53,8 @@ def place_on_cylinder(
     along = complex(lattice.position(T))
     around = int(lattice.cells_around(T))
     notes = _told(lattice, settings, angle, around, along)
+    if loops and settings.phase[1]:
+        notes.append("phase moves the pattern only around: its rows are bound to the boundary.")
     scale = abs(along) / strip.length
     x = strip.place.real * scale + settings.phase[0] * width_per_cell(lattice, angle) * lattice.edge
     y = _heights(strip, rows, settings, loops, scale * stretch)

@@ -17,10 +17,11 @@ from hexwrap_solver.pattern.sides import sides_of
 from hexwrap_solver.pattern.types import PatternSettings
 from tests.solver.pattern import annuli
 from tests.solver.pattern.test_lay import check_closed
-from tests.solver.pattern.test_trim import cell_areas, euler
+from tests.solver.pattern.test_trim import cell_areas, domain_area, euler
 
 #: Boundary vertices of a grid with 48 columns and 16 rows, and their angles in units of π.
 CASES = {
+    "quads": ([0, 24], [0, 24], [3 / 2] * 2, [1 / 2] * 2, -np.pi),
     "cone": ([0, 16, 32], [0, 16, 32], [4 / 3] * 3, [2 / 3] * 3, -np.pi),
     "entrance": ([10, 14, 18], [], [4 / 3, 1 / 3, 4 / 3], [], 0.0),
     "two entrances": ([2, 5, 8, 25, 29, 33], [], [4 / 3, 1 / 3, 4 / 3] * 2, [], 0.0),
@@ -44,10 +45,15 @@ def bell(case: str) -> ConformalMap:
 MAPS = {case: bell(case) for case in CASES}
 
 
-@pytest.mark.parametrize("case", list(CASES))
+HEX_CASES = [case for case in CASES if case != "quads"]
+
+
+@pytest.mark.parametrize(
+    ("case", "kind"),
+    [("quads", "quad"), *((case, kind) for case in HEX_CASES for kind in ("hex", "triangle"))],
+)
 @pytest.mark.parametrize("align", ["first", "both"])
 @pytest.mark.parametrize("rotation", ["edge", "vertex"])
-@pytest.mark.parametrize("kind", ["hex", "triangle"])
 def test_every_side_lies_on_a_lattice_line(case, align, rotation, kind):
     cmap = MAPS[case]
     assert cmap.deck.angle == pytest.approx(CASES[case][4], abs=1e-9)
@@ -71,7 +77,7 @@ def test_every_side_lies_on_a_lattice_line(case, align, rotation, kind):
     assert placed.distortion < 0.3
 
 
-@pytest.mark.parametrize("case", list(CASES))
+@pytest.mark.parametrize("case", HEX_CASES)
 def test_patterns_with_corners_close_and_fill_the_deformed_domain(case):
     cmap = MAPS[case]
     check_closed(lay_pattern(cmap, PatternSettings(around=60)))
@@ -91,6 +97,23 @@ def test_distortion_falls_with_the_size_of_the_cells():
         return max(place_lattice(MAPS["entrance"], LATTICES["hex"], r).distortion for r in requests)
 
     assert worst([320, 352, 384]) < worst([40, 44, 48]) / 2
+
+
+def test_quads_fill_a_domain_of_right_angles_without_a_remainder():
+    pattern = lay_pattern(MAPS["quads"], PatternSettings(kind="quad", around=60, boundary="trim"))
+    assert pattern.whole.all()
+    check_closed(pattern)
+    area = cell_areas(MAPS["quads"], pattern)
+    assert area.sum() == pytest.approx(domain_area(MAPS["quads"]), rel=1e-9)
+
+
+def test_phase_without_freedom_is_told():
+    shifted = PatternSettings(around=60, phase=(0.5, 0.5))
+    assert any("phase" in note for note in lay_pattern(MAPS["entrance"], shifted).notes)
+    tube = annuli.revolution(np.cosh, np.linspace(-1, 1, 15), 40)
+    assert any("phase" in note for note in lay_pattern(tube, shifted).notes)
+    free = lay_pattern(tube, PatternSettings(around=60, phase=(0.5, 0.5), align="none"))
+    assert not any("phase" in note for note in free.notes)
 
 
 def test_alignment_that_cannot_be_is_told():

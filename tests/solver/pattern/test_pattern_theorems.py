@@ -127,16 +127,19 @@ def test_hexagon_angles_tend_to_120_degrees():
     grid=st.tuples(st.integers(7, 60), st.integers(2, 14)),
     phase=st.tuples(st.floats(-2, 2), st.floats(-2, 2)),
     boundary=st.sampled_from(["whole", "trim"]),
+    align=st.sampled_from(["none", "first", "both"]),
 )
-@settings(max_examples=60, deadline=None)
-def test_every_pattern_closes_or_is_refused(k, kind, around, rotation, grid, phase, boundary):
+@settings(max_examples=120, deadline=None)
+def test_every_pattern_closes_or_is_refused(k, kind, around, rotation, grid, phase, boundary, align):
     angle = k * QUANTUM[kind]
     columns, rows = max(grid[0], 3 * abs(k) + 5), grid[1]
     if k == 0:
         cmap = annuli.revolution(wavy, np.linspace(-1, 1.5, rows + 1), columns)
     else:
         cmap = annuli.flat_cone(angle, 1.0, 2.0, columns, rows, cut=columns // 3)
-    request = PatternSettings(kind=kind, around=around, rotation=rotation, phase=phase, boundary=boundary)
+    request = PatternSettings(
+        kind=kind, around=around, rotation=rotation, align=align, phase=phase, boundary=boundary
+    )
     try:
         pattern = lay_pattern(cmap, request)
     except PatternError:
