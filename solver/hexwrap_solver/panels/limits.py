@@ -11,7 +11,7 @@ from itertools import combinations
 
 import numpy as np
 
-from hexwrap_solver.arrays import Floats, Ints
+from hexwrap_solver.arrays import Bools, Floats, Ints
 from hexwrap_solver.panels.regular import Poses
 
 #: Multipliers of a dual vertex count as non-negative down to this (their sum is of order 1).
@@ -19,6 +19,9 @@ DUAL_TOLERANCE = 1e-12
 
 #: A panel found this much shorter (relatively) than the programme allows is looked for again.
 SHORTFALL = 1e-9
+
+#: Figures that differ by less (relatively) leave the panel's place open.
+LOOSE = 1e-6
 
 
 def reach(poses: Poses, direction: Floats) -> Floats:
@@ -48,23 +51,31 @@ def inscribed(poses: Poses, direction: Floats, offset: Floats) -> tuple[Floats, 
         best = np.where(better, value, best)
         chosen[better] = triple
     shift = _touching_centre(flat, h, room, chosen)
-    short = np.flatnonzero(_room_length(shift, flat, h, room) < best - SHORTFALL * np.abs(best))
-    shift[short] = _best_vertex(flat[short], h[short], room[short], shift[short])
+    short = _room_length(shift, flat, h, room) < best - SHORTFALL * np.abs(best)
+    again = np.flatnonzero(short | _is_loose(flat, chosen))
+    shift[again] = _middle_vertex(flat[again], h[again], room[again])
     center = poses.center + np.einsum("qe,qed->qd", shift, axes)
     # The length is taken from the centre found, so that rounding in the centre cannot break a constraint.
     return length_at(center, direction, offset, h), center
 
 
-def _best_vertex(flat: Floats, h: Floats, room: Floats, shift: Floats) -> Floats:
-    """The same optimum by trying every triple's touching point: for cells with nearly parallel sides, whose
-    dual vertices rounding cannot tell apart."""
-    length = _room_length(shift, flat, h, room)
-    for triple in combinations(range(flat.shape[1]), 3):
-        tried = _touching_centre(flat, h, room, np.tile(triple, (len(flat), 1)))
-        reached = _room_length(tried, flat, h, room)
-        better = reached > length
-        shift[better], length[better] = tried[better], reached[better]
-    return shift
+def _is_loose(flat: Floats, triple: Ints) -> Bools:
+    """Where two of the three planes are as good as parallel, so that the panel can slide between them."""
+    a, b, c = np.moveaxis(flat[np.arange(len(flat))[:, None], triple], 1, 0)
+    weight = np.abs([_cross(b, c), _cross(c, a), _cross(a, b)])
+    return np.asarray(weight.min(axis=0) < LOOSE * weight.max(axis=0))
+
+
+def _middle_vertex(flat: Floats, h: Floats, room: Floats) -> Floats:
+    """(q, 2) the same optimum by trying every triple's touching point, and the mean of all that are as good.
+
+    For cells with nearly parallel sides, whose dual vertices rounding cannot tell apart.
+    """
+    triples = list(combinations(range(flat.shape[1]), 3))
+    tried = np.array([_touching_centre(flat, h, room, np.tile(triple, (len(flat), 1))) for triple in triples])
+    length = np.array([_room_length(shift, flat, h, room) for shift in tried])
+    as_good = length >= length.max(axis=0) - LOOSE * np.abs(length.max(axis=0))
+    return np.asarray(np.einsum("tq,tqe->qe", as_good, tried) / as_good.sum(axis=0)[:, None])
 
 
 def _room_length(shift: Floats, flat: Floats, h: Floats, room: Floats) -> Floats:

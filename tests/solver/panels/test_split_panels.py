@@ -12,6 +12,8 @@ from scipy.spatial.transform import Rotation
 
 from hexwrap_solver.errors import PanelsError
 from hexwrap_solver.panels import fit_panels, measure, quantize, rationalize
+from hexwrap_solver.panels.limits import inscribed
+from hexwrap_solver.panels.regular import nearest_regular
 from hexwrap_solver.panels.tangents import surface_normals
 from hexwrap_solver.panels.types import PanelSettings
 from hexwrap_solver.surface import surface_from_nurbs
@@ -164,6 +166,20 @@ def test_edge_range_is_reported_and_held():
     assert panels.edge_length.max() <= high
     assert set(panels.outside) == set(np.flatnonzero(free.limit < low))
     assert len(panels.notes) == 2
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.3, 1.1])
+def test_a_panel_that_can_slide_is_put_in_the_middle_whatever_rounding_does(turn):
+    """A stretched hexagon is held by two parallel sides only."""
+    angle = np.arange(6) * np.pi / 3 + turn
+    cell = np.stack([np.cos(angle), np.sin(angle), np.zeros(6)], axis=1)
+    direction = cell + np.roll(cell, -1, axis=0)
+    direction /= np.linalg.norm(direction, axis=1)[:, None]
+    offset = np.einsum("kd,kd->k", direction, cell) * np.array([1.0, 1.2, 1.2, 1.0, 1.2, 1.2])
+    poses = nearest_regular(cell[None])
+    length, center = inscribed(poses, direction[None], offset[None])
+    assert length[0] == pytest.approx(1.0, rel=1e-12)
+    assert np.allclose(center, 0.0, atol=1e-12)
 
 
 def test_trade_off_falls_and_ends_where_nothing_more_is_gained():

@@ -6,6 +6,7 @@ import numpy as np
 
 from hexwrap_solver.arrays import Floats, Progress, no_progress
 from hexwrap_solver.panels.energy.residuals import ANCHOR, jacobian, residuals, surface_residuals
+from hexwrap_solver.panels.regular import nearest_regular
 from hexwrap_solver.panels.types import Weights
 from hexwrap_solver.surface.closest import TriangleTree
 
@@ -13,6 +14,9 @@ MOST_STEPS = 60
 
 #: A panel is finished when a step moves it by less than this, relative to its edge.
 STEP_TOLERANCE = 1e-11
+
+#: Energy of a panel above which its minimum may be a local one.
+STUCK = 1e-6
 
 #: Damping of the first step, and how it changes after a good and after a bad step (Marquardt 1963).
 DAMPING, EASE, TIGHTEN = 1e-3, 0.2, 8.0
@@ -32,7 +36,29 @@ def minimise_singly(
     returned; with it panels could still slide along it, and are anchored weakly. Returns the polygons (q,
     p, 3) and the total energy after each step.
     """
-    points = cells.copy()
+    points, energy, curve = _descend(cells, cells, length, weights, surface, progress)
+    # Badly bent cells can end in a local minimum; those start again from the nearest regular polygon.
+    stuck = np.flatnonzero(energy > STUCK)
+    if len(stuck):
+        poses = nearest_regular(cells[stuck])
+        start = poses.center[:, None] + length[stuck, None, None] * poses.spokes(cells.shape[1])
+        tried, reached, _ = _descend(start, cells[stuck], length[stuck], weights, surface, progress)
+        better = reached < energy[stuck]
+        points[stuck[better]], energy[stuck[better]] = tried[better], reached[better]
+        curve.append(float(energy.sum()))
+    return (points if surface is not None else _aligned(points, cells)), np.array(curve)
+
+
+def _descend(
+    start: Floats,
+    cells: Floats,
+    length: Floats,
+    weights: Weights,
+    surface: TriangleTree | None,
+    progress: Progress,
+) -> tuple[Floats, Floats, list[float]]:
+    """Polygons, the energy of each, and the total after each step."""
+    points = start.copy()
     damping = np.full(len(cells), DAMPING)
     active = np.arange(len(cells))
     r, j = _system(points, cells, length, weights, surface)
@@ -54,7 +80,7 @@ def minimise_singly(
         size = np.abs(move).max(axis=(1, 2)) / length[active]
         going = size > STEP_TOLERANCE
         active, r, j = active[going], r[going], j[going]
-    return (points if surface is not None else _aligned(points, cells)), np.array(curve)
+    return points, energy, curve
 
 
 def _system(
