@@ -25,6 +25,8 @@ from hexwrap_solver.errors import ConvergenceError
 #: An edge passes whose cosines add up to more than −TOLERANCE times the terms that they are made of: rounding
 #: must not flip it to and fro.
 TOLERANCE = 2e-14
+#: Height over base of a triangle whose lengths are those of a flat one to rounding.
+FLATTEST = 1e-14
 #: Rounds of independent flips before something must be wrong; meshes seen so far need some dozens.
 MAX_ROUNDS = 4_000
 
@@ -231,7 +233,7 @@ def _apex(base: Floats, left: Floats, right: Floats) -> Complexes:
     one = np.ones_like(a)
     small, mid, big = np.sort(np.stack([one, a, b]), axis=0)  # Kahan: subtract close lengths first
     square = (big + (mid + small)) * (small - (big - mid)) * (small + (big - mid)) * (big + (mid - small))
-    return np.asarray(x + 0.5j * np.sqrt(np.maximum(square, 0.0)))
+    return np.asarray(x + 1j * np.maximum(0.5 * np.sqrt(np.maximum(square, 0.0)), FLATTEST))
 
 
 def _along(slope: Floats) -> Floats:

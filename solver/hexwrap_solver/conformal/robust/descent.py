@@ -18,6 +18,7 @@ from hexwrap_solver.conformal.robust.delaunay import make_delaunay
 from hexwrap_solver.conformal.robust.metric import Metric, angle_sums, edge_weights, measure
 from hexwrap_solver.conformal.robust.mirror import MirrorMesh
 from hexwrap_solver.conformal.span import MAX_SPAN
+from hexwrap_solver.errors import ConvergenceError
 
 MAX_STEPS = 200
 #: No single step may change u along an edge by more than this: Newton leaps where the Hessian is nearly
@@ -28,8 +29,9 @@ OVERSHOOT = 0.1
 MAX_TRIALS = 40
 #: The largest entry of the gradient bottoms out at rounding, about this times √(number of unknowns).
 ROUNDING = 1e-14
-#: Added to the diagonal, relative to it and to 1, where rounding has made the Hessian indefinite.
-LIFT = 1e-9
+#: Added to the diagonal, relative to it and to 1, one after the other until the Hessian is definite: in exact
+#: arithmetic it always is.
+LIFTS = (0.0, 1e-9, 1e-6)
 #: Newton may overshoot, but not by so much, where the answer lies within MAX_SPAN.
 RUNAWAY = 2.0
 #: Above this the answer is not accepted. Needles of 1e-4 degrees have rounding of 1e-9 in their angles.
@@ -97,11 +99,16 @@ class _System:
         both = np.concatenate([self.low, self.high]) + 1
         diagonal = _sums(both, np.tile(weight, 2), self.n + 1)[1:]
         off_diagonal = -_sums(self.pair, weight[self.inside], self.n_pairs)
-        try:
-            self.factorisation.factorise(diagonal, off_diagonal)
-        except np.linalg.LinAlgError:  # semidefinite to rounding
-            self.factorisation.factorise(diagonal * (1 + LIFT) + LIFT, off_diagonal)
-        return self.factorisation.solve(right)
+        for lift in LIFTS:
+            try:
+                self.factorisation.factorise(diagonal * (1 + lift) + lift, off_diagonal)
+            except np.linalg.LinAlgError:
+                continue
+            return self.factorisation.solve(right)
+        raise ConvergenceError(
+            "Newton's method with flips met a matrix that double precision cannot solve: the surface has "
+            "edges or angles too small for it; remesh it more evenly."
+        )
 
 
 def descend(energy: FlipEnergy, start: Floats, progress: Progress) -> Descent:

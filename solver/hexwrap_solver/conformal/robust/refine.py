@@ -19,6 +19,8 @@ from hexwrap_solver.surface.types import Surface
 FULLEST = 0.95 * np.pi
 #: Where triangles have turned over, boundary vertices get so many that their mean angle is below this.
 WIDE = 0.45 * np.pi
+#: After so many attempts half of it.
+HASTE = 3
 #: Edges are split between these places of their length.
 WITHIN = (0.02, 0.98)
 #: Opposite angles that add up to more than this call for a split, radians.
@@ -227,11 +229,12 @@ def _crowded(surface: Surface, targets: Targets, most: float, among: Ints) -> In
     return 3 * (corner // 3) + (corner % 3 + 1) % 3
 
 
-def split_places(surface: Surface, targets: Targets, wrong: Ints) -> tuple[Ints, Floats]:
+def split_places(surface: Surface, targets: Targets, wrong: Ints, attempt: int) -> tuple[Ints, Floats]:
     """(half-edges, places) to split where the faces ``wrong`` have turned over.
 
     The longest edge of each, at the foot of its altitude; and around boundary vertices of theirs with few
-    triangles for their target, the opposite edges: a wide angle wants a fan.
+    triangles for their target, the opposite edges: a wide angle wants a fan, and the finer a fan the more
+    attempts have failed, else splits may spiral into the vertex for ever.
     """
     corner = surface.vertices[surface.faces[wrong]]
     along = np.roll(corner, -1, axis=1) - corner
@@ -241,6 +244,7 @@ def split_places(surface: Surface, targets: Targets, wrong: Ints) -> tuple[Ints,
     edge = along[rows, longest]
     apex = corner[rows, (longest + 2) % 3] - corner[rows, longest]
     foot = np.einsum("kd,kd->k", apex, edge) / length[rows, longest] ** 2
-    fan = _crowded(surface, targets, WIDE, np.unique(surface.faces[wrong]))
+    wide = WIDE / (1 + attempt / HASTE)
+    fan = _crowded(surface, targets, wide, np.unique(surface.faces[wrong]))
     places = np.concatenate([np.full(len(fan), 0.5), np.clip(foot, *WITHIN)])
     return np.concatenate([fan, 3 * wrong + longest]), places

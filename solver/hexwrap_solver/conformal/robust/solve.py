@@ -55,7 +55,7 @@ def solve_with_flips(
         np.arange(len(surface.faces)),
     )
     iterations, fewest = 0, len(surface.faces)
-    for _ in range(MAX_ROUNDS):
+    for attempt in range(MAX_ROUNDS):
         problem = _uncollapse(problem)
         found = _attempt(problem, progress)
         iterations += found.iterations
@@ -64,7 +64,7 @@ def solve_with_flips(
             return _told(found, surface, iterations)
         problem = replace(problem, u=found.log_scale)
         before = len(problem.surface.vertices)
-        problem = split_edges(problem, *split_places(problem.surface, problem.targets, wrong))
+        problem = split_edges(problem, *split_places(problem.surface, problem.targets, wrong, attempt))
         if len(wrong) >= fewest:
             problem = spread(problem, before)
         fewest = min(fewest, len(wrong))
