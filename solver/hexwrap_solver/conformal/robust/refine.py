@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hexwrap_solver.arrays import Bools, Floats, Ints
+from hexwrap_solver.conformal.energy import corner_angles, opposite_lengths
 from hexwrap_solver.conformal.robust.retriangulate import angle_sums_opposite, flatten_out
 from hexwrap_solver.conformal.types import Targets
 from hexwrap_solver.surface.topology import half_edges, twins
@@ -23,6 +24,9 @@ WIDE = 0.45 * np.pi
 HASTE = 3
 #: Edges are split between these places of their length.
 WITHIN = (0.02, 0.98)
+MIDDLE = (0.3, 0.7)
+#: From this ratio of target and angle on, a boundary vertex counts as opened wide.
+OPENED = 1.5
 #: Opposite angles that add up to more than this call for a split, radians.
 FLAT = np.deg2rad(210.0)
 #: Rounds of it between two solutions.
@@ -232,19 +236,31 @@ def _crowded(surface: Surface, targets: Targets, most: float, among: Ints) -> In
 def split_places(surface: Surface, targets: Targets, wrong: Ints, attempt: int) -> tuple[Ints, Floats]:
     """(half-edges, places) to split where the faces ``wrong`` have turned over.
 
-    The longest edge of each, at the foot of its altitude; and around boundary vertices of theirs with few
-    triangles for their target, the opposite edges: a wide angle wants a fan, and the finer a fan the more
-    attempts have failed, else splits may spiral into the vertex for ever.
+    One edge of each, at the foot of its altitude: the longest; but the one opposite to a corner that the map
+    opens wide, since splits at the edges of such a corner would repeat themselves on ever smaller scales. And
+    around boundary vertices of theirs with few triangles for their target all opposite edges: a wide angle
+    wants a fan, and the finer a fan the more attempts have failed.
     """
     corner = surface.vertices[surface.faces[wrong]]
     along = np.roll(corner, -1, axis=1) - corner
     length = np.linalg.norm(along, axis=2)
-    longest = length.argmax(axis=1)
+    opened = _opened(surface, targets)[surface.faces[wrong]]
+    side = np.where(opened.sum(axis=1) == 1, (opened.argmax(axis=1) + 1) % 3, length.argmax(axis=1))
     rows = np.arange(len(wrong))
-    edge = along[rows, longest]
-    apex = corner[rows, (longest + 2) % 3] - corner[rows, longest]
-    foot = np.einsum("kd,kd->k", apex, edge) / length[rows, longest] ** 2
+    edge = along[rows, side]
+    apex = corner[rows, (side + 2) % 3] - corner[rows, side]
+    foot = np.einsum("kd,kd->k", apex, edge) / length[rows, side] ** 2
+    foot = np.where(opened.any(axis=1), np.clip(foot, *MIDDLE), np.clip(foot, *WITHIN))
     wide = WIDE / (1 + attempt / HASTE)
     fan = _crowded(surface, targets, wide, np.unique(surface.faces[wrong]))
-    places = np.concatenate([np.full(len(fan), 0.5), np.clip(foot, *WITHIN)])
-    return np.concatenate([fan, 3 * wrong + longest]), places
+    return np.concatenate([fan, 3 * wrong + side]), np.concatenate([np.full(len(fan), 0.5), foot])
+
+
+def _opened(surface: Surface, targets: Targets) -> Bools:
+    """(n,) boundary vertices whose target is well above their angle on the surface."""
+    angles = corner_angles(opposite_lengths(surface.vertices, surface.faces)).angle
+    sums = np.bincount(surface.faces.T.ravel(), weights=angles.ravel(), minlength=len(surface.vertices))
+    opened = (targets.tie < 0) & (targets.angle > OPENED * sums)
+    inner = np.ones(len(sums), dtype=bool)
+    inner[np.concatenate(surface.loops)] = False
+    return np.asarray(opened & ~inner)
