@@ -127,7 +127,7 @@ def _write_inside(space: Modelspace, laid: Ragged, panels: Panels, names: list[s
     for row, ((x, y), r, edge) in enumerate(
         zip(centre.tolist(), inradius.tolist(), panels.edge_length.tolist(), strict=True)
     ):
-        kind = "cut" if sizes[row] < 0 else f"{sizes[row]:02d}"
+        kind = "–" if sizes[row] < 0 else f"{sizes[row]:02d}"
         for words, high, up in ((names[row], LABEL, 0.10), (f"{kind} / {length(edge)}", SIZE, -0.14)):
             _write(space, "labels", words, high * r, (x, y + up * r), 0.0)
 

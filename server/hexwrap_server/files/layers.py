@@ -18,8 +18,8 @@ class Layer:
 
 
 def size_name(size: int) -> str:
-    """What a size class is called in files: ``size-03``, or ``cut`` for panels without one."""
-    return "cut" if size < 0 else f"size-{size:02d}"
+    """What a size class is called in files: ``size-03``, or ``no-size`` for panels without one."""
+    return "no-size" if size < 0 else f"size-{size:02d}"
 
 
 def size_layers(panels: Panels) -> dict[int, Layer]:

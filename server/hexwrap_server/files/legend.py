@@ -50,8 +50,8 @@ def _legend(axes: Axes, height: int, panels: Panels, meta: Meta) -> None:
     title = text.one_line(meta.name)
     title = title if len(title) <= 28 else title[:27] + "…"
     axes.text(0, top - 96, title.replace("$", r"\$"), size=25, color=INK, va="center", weight="bold")
-    sizes = "1 size" if n_sizes == 1 else f"{n_sizes} sizes"
-    axes.text(0, top - 48, f"{panels.n_panels:,} panels, {sizes}", size=17, color=GREY, va="center")
+    sizes = {0: "", 1: ", 1 size"}.get(n_sizes, f", {n_sizes:,} sizes")
+    axes.text(0, top - 48, f"{panels.n_panels:,} panels{sizes}", size=17, color=GREY, va="center")
     if n_sizes <= ROWS:
         _swatches(axes, top, panels)
     else:
@@ -59,7 +59,7 @@ def _legend(axes: Axes, height: int, panels: Panels, meta: Meta) -> None:
     if cut:
         y = top + ROW * (rows + 0.5)
         axes.add_patch(RegularPolygon((22, y), 6, radius=20, orientation=np.pi / 6, color=colours.UNSIZED))
-        axes.text(64, y, "cut at the boundary", size=17, color=GREY, va="center")
+        axes.text(64, y, "of no size class", size=17, color=GREY, va="center")
         axes.text(WIDTH - 60, y, f"{cut:,}", size=17, color=GREY, va="center", ha="right")
 
 

@@ -29,10 +29,12 @@ def panels_scene(solution: Solution) -> Scene:
     middle = (surface.vertices.max(axis=0) + surface.vertices.min(axis=0)) / 2
     outline = Ragged(panels.polygons.values - middle, panels.polygons.offsets)
     sunk = surface.vertices - middle - SINK * _typical(panels.edge_length) * surface.normals
+    # A watertight mesh has no joints to look through, and may lie far from the surface.
+    faces = surface.faces if panels.mode == "split" else surface.faces[:0]
     return Scene(
         Polygons.of(outline),
         colours.panel_colours(panels.size, len(panels.class_length)),
-        Polygons.of(Ragged.from_table(sunk[surface.faces])),
+        Polygons.of(Ragged.from_table(sunk[faces])),
         viewpoint(solution.map),
     )
 

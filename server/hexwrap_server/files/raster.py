@@ -58,7 +58,7 @@ class Polygons:
         anchor = np.stack([np.bincount(rows, points[:, i], n) for i in range(3)], axis=1) / count
         arms = points - anchor[rows]
         turn = np.cross(arms, arms[outline.next()])
-        normal = np.stack([np.bincount(rows, turn[:, i], n) for i in range(3)], axis=1)
+        normal = np.stack([np.bincount(rows, turn[:, i], n) for i in range(3)], axis=1).astype(float)
         size = np.linalg.norm(normal, axis=1, keepdims=True)
         return cls(outline, np.divide(normal, size, out=np.zeros_like(normal), where=size > 0), anchor)
 

@@ -28,6 +28,8 @@ SUNLIGHT, SKYLIGHT, GLOSS, GLOSS_EXPONENT = 0.70, 0.52, 0.10, 40.0
 HOLLOWS = ((6.0, 0.03, 2), (40.0, 0.25, 8))
 #: The backs of the panels keep this much of their colour.
 SHELL, BACK, BACK_COLOUR = "#4a4f58", "#b3b0ab", 0.25
+#: How far behind the shell a panel is still seen, in parts of its radius.
+DIP = 0.6
 #: What is left of the light on an outline; the panel width in pixels from which outlines have full strength.
 OUTLINE, OUTLINE_FULL = 0.25, 22.0
 #: Darkest shadow on the ground; it fades towards the rim of the picture over this many pixels.
@@ -54,9 +56,10 @@ def render(scene: Scene) -> Floats:
     camera = _camera(points, radius, scene.view)
     # From inside one sees the backs of the panels; the shell shows only its outside.
     facing = np.sum(scene.shell.normal * (camera.position - scene.shell.anchor), axis=1) > 0
-    drawn = scene.panels.join(scene.shell.take(facing))
+    shell = scene.shell.take(facing)
+    drawn = scene.panels.join(shell)
     n_panels = scene.panels.outline.n_rows
-    owner, nearest = draw(camera, drawn)
+    owner, nearest = _visible(camera, scene.panels, shell)
     sun = _sun(scene, points, radius)
     direct, sky = _light(scene, drawn, camera, sun)
     middle = owner[FINE // 2 :: FINE, FINE // 2 :: FINE]
@@ -73,6 +76,22 @@ def render(scene: Scene) -> Floats:
             light = tables[0][of] * lights[0] + tables[1][of] * lights[1]
             image += light * outline[i::FINE, j::FINE, None]
     return encoded(image.astype(np.float64) / FINE**2)
+
+
+def _visible(camera: Camera, panels: Polygons, shell: Polygons) -> tuple[NDArray[np.int32], Floats]:
+    """As ``draw`` of panels and shell together, but a panel may dip into the shell by part of its size."""
+    owner, nearest = draw(camera, panels)
+    behind, depth = draw(camera, shell)
+    arms = np.asarray(panels.outline.values) - panels.anchor[panels.outline.row]
+    reach = np.zeros(panels.outline.n_rows)
+    np.maximum.at(reach, panels.outline.row, DIP * np.linalg.norm(arms, axis=1))
+    both = np.flatnonzero((owner.ravel() >= 0) & (behind.ravel() >= 0))
+    sunk = 1 / nearest.ravel()[both] - 1 / depth.ravel()[both]
+    shown = (behind >= 0) & (owner < 0)
+    shown.ravel()[both[sunk > reach[owner.ravel()[both]]]] = True
+    owner[shown] = behind[shown] + panels.outline.n_rows
+    nearest[shown] = depth[shown]
+    return owner, nearest
 
 
 def _camera(points: Floats, radius: float, view: Floats) -> Camera:
@@ -129,7 +148,7 @@ def _sun(scene: Scene, points: Floats, radius: float) -> Sun:
     direction = SUN[0] * right + SUN[1] * up + SUN[2] * np.cross(right, up)
     direction /= np.linalg.norm(direction)
     camera = _aim(points, direction * radius * SUN_DISTANCE, (SUN_MAP, SUN_MAP), 8, 1)
-    _, nearest = draw(camera, scene.panels.join(scene.shell))
+    _, nearest = draw(camera, scene.panels)
     return Sun(camera, nearest, direction)
 
 
