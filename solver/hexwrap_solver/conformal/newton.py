@@ -19,8 +19,9 @@ from hexwrap_solver.conformal.factor import Factorisation
 MAX_STEPS = 60
 #: No single step may change a length by more than this factor's logarithm: broken triangles make Newton leap.
 MAX_CHANGE = 8.0
-#: The largest entry of the gradient bottoms out at rounding, about this times √(number of unknowns).
-ROUNDING = 4e-15
+#: Angle sums resolve this much, radians, or the rounding of the largest target (a tie's is a sum over a whole
+#: loop). Stopping earlier would show: layout errors are the residual times the vertices along the way.
+ROUNDING = 2e-14
 #: A residual up to this is accepted (the boundary angles are promised to 1e-9); from there on, a step that
 #: leaves more than STAGNATION of it is the last one: slivers stop at a higher level of rounding.
 ACCEPTED, STAGNATION = 3e-10, 0.5
@@ -78,7 +79,7 @@ def minimise(energy: Energy, start: Floats | None = None, progress: Progress = n
     """
     factorisation = Factorisation(energy.points, energy.rows, energy.columns)
     point = _Point.at(energy, np.zeros(energy.n_dof) if start is None else energy.unknowns_of(start))
-    tolerance = ROUNDING * np.sqrt(energy.n_dof)
+    tolerance = max(ROUNDING, np.finfo(float).eps * _largest(energy.target))
     iterations, factorisations, small = 0, 0, False
     while point.residual > tolerance and iterations < MAX_STEPS:
         progress(
