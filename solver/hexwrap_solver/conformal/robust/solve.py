@@ -33,6 +33,8 @@ from hexwrap_solver.surface.types import Surface
 
 #: Rounds of refinement; meshes seen so far need up to a handful.
 MAX_ROUNDS = 40
+#: Refinement that makes more than so many times the vertices, and so many more, does not come to an end.
+MOST, MOST_MORE = 2, 1000
 REFINED = "The mesh was refined:"
 
 
@@ -68,9 +70,11 @@ def solve_with_flips(
         if len(wrong) >= fewest:
             problem = spread(problem, before)
         fewest = min(fewest, len(wrong))
+        if len(problem.surface.vertices) > MOST * len(surface.vertices) + MOST_MORE:
+            break
     inserted = len(problem.surface.vertices) - len(surface.vertices)
     raise ConvergenceError(
-        f"After {MAX_ROUNDS} rounds of refinement with {inserted} new vertices {len(wrong)} triangles still "
+        f"After {attempt + 1} rounds of refinement with {inserted} new vertices {len(wrong)} triangles still "
         "turn over in the domain: the surface is finer in places than double precision can hold; remesh it "
         "more evenly.",
         vertices=_sent(problem.surface, wrong),
