@@ -84,9 +84,7 @@ def _json(schema: dict[str, Any]) -> dict[str, Any]:
     return {"application/json": {"schema": schema}}
 
 
-def _route(
-    answers: dict[str, Any], body: dict[str, Any] | None = None, parameters: bool = False
-) -> dict[str, Any]:
+def _route(answers: dict[str, Any], body: dict[str, Any] | None = None) -> dict[str, Any]:
     content = {"requestBody": {"required": True, "content": body}} if body else {}
     return {"responses": answers} | content
 
