@@ -54,18 +54,21 @@ def server_port(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]:
     with socket.socket() as listener:
         listener.bind(("127.0.0.1", 0))
         port = int(listener.getsockname()[1])
-    settings = {"HEXWRAP_PORT": str(port), "HEXWRAP_DATA": str(tmp_path_factory.mktemp("data"))}
-    process = subprocess.Popen(
-        [sys.executable, "-c", SERVE],
-        env=os.environ | settings,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
+    folder = tmp_path_factory.mktemp("server")
+    settings = {"HEXWRAP_PORT": str(port), "HEXWRAP_DATA": str(folder / "data")}
+    log = folder / "server.log"
+    with log.open("wb") as said:
+        process = subprocess.Popen(
+            [sys.executable, "-c", SERVE],
+            env=os.environ | settings,
+            stdin=subprocess.DEVNULL,
+            stdout=said,
+            stderr=said,
+        )
     try:
         deadline = time.monotonic() + 60
         while not is_ready(port):
-            assert process.poll() is None, "the server did not start"
+            assert process.poll() is None, f"the server did not start:\n{log.read_text()}"
             assert time.monotonic() < deadline, "the server did not come up"
             time.sleep(0.1)
         yield port
