@@ -42,6 +42,8 @@ def surface_id(token, slot, server, key, geometry):
     known = slot.get("surface")
     if known and known["key"] == (server, key):
         return known["id"]
+    # First something small: a server that refuses a large body unread may close before its reason is heard.
+    call_json(server, "GET", "/v1/jobs?limit=1")
     token.say("reading the mesh")
     mesh, normals = as_mesh(geometry)
     points, faces = mesh_arrays(mesh)
@@ -49,7 +51,13 @@ def surface_id(token, slot, server, key, geometry):
     token.check()
     token.say("sending %d vertices" % len(points))
     slot["sent"] = (points, faces)
-    answer = json.loads(call(server, "POST", "/v1/surfaces", body, timeout=SLOW).decode("utf-8"))
+    try:
+        answer = json.loads(call(server, "POST", "/v1/surfaces", body, timeout=SLOW).decode("utf-8"))
+    except Offline:
+        raise Refusal(
+            "The server at %s broke off while the mesh was sent (%d MiB). If it still runs, start it with a larger "
+            "--max-body-mib, or send a coarser mesh." % (server, len(body) // 1048576 + 1)
+        )
     slot["surface"] = {"key": (server, key), "id": answer["id"]}
     slot["repairs"] = answer.get("repairs") or []
     return answer["id"]
