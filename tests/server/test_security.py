@@ -114,8 +114,8 @@ def test_gzip_goes_both_ways(client: Live) -> None:
     ("body", "encoding", "status"),
     [
         (b"not gzip", "gzip", 400),
-        (gzip.compress(b"{}")[:-6], "gzip", 400),
-        (gzip.compress(b"{}") + b"rest", "gzip", 400),
+        (gzip.compress(b"{}", mtime=0)[:-6], "gzip", 400),
+        (gzip.compress(b"{}", mtime=0) + b"rest", "gzip", 400),
         (zlib.compress(b"{}"), "deflate", 415),
         (b"{}", "br", 415),
         (b"", "identity", 400),

@@ -6,6 +6,7 @@ import numpy as np
 
 from hexwrap_solver.arrays import Floats
 from hexwrap_solver.conformal.types import Targets
+from hexwrap_solver.errors import BoundaryError
 from hexwrap_solver.surface.types import Surface
 
 #: A cone angle this near to a multiple of π/6 (that holds all quanta) is that multiple: sums of many angles
@@ -78,9 +79,20 @@ def nearest_multiple(angle: float, quantum: float) -> float:
 def spread_evenly(angles: Floats, curvature: float) -> Floats:
     """(k,) the loop's angles with the same amount added to each, so that Σκ is ``curvature`` (the paper).
 
-    Where that would take more than half of a vertex's angle, it gives half, and the others share the rest.
+    Where that would take more than half of a vertex's angle, it gives half, and the others share the rest;
+    where every vertex would have to give more than half, all give the same part of their angle.
+    Raises BoundaryError where nothing would be left of them.
     """
     missing = cone_angle(angles) - curvature
+    total = float(angles.sum())
+    if missing <= -total / 2:
+        if missing <= -total:
+            raise BoundaryError(
+                f"The angles of a boundary loop of {len(angles)} vertices sum to {total:.4g} rad, too little to "
+                f"round its cone angle by {-missing:.4g} rad; send a finer mesh, or ask for another quantum.",
+                field=("boundary", "quantum"),
+            )
+        return np.asarray(angles * (1 + missing / total))
     change = np.zeros_like(angles)
     open_ = np.ones(len(angles), dtype=bool)
     while open_.any():

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from hexwrap_solver.arrays import Floats
 from hexwrap_solver.conformal import boundary, conformal_map
 from hexwrap_solver.conformal.types import BoundaryCondition
+from hexwrap_solver.errors import BoundaryError
 from tests.solver.conformal.annuli import bump, grid, revolution
 
 TOWER = bump(24, 8)
@@ -19,6 +20,7 @@ angles = st.lists(st.floats(0.02, 6.0), min_size=3, max_size=40).map(lambda x: n
 @settings(max_examples=100, deadline=None)
 @given(angles, st.floats(-0.5, 0.5))
 def test_spreading_adds_the_same_to_every_angle(given_angles: Floats, difference: float) -> None:
+    assume(difference > -given_angles.sum() / 2)
     wanted = boundary.cone_angle(given_angles) - difference
     spread = boundary.spread_evenly(given_angles, wanted)
     assert boundary.cone_angle(spread) == pytest.approx(wanted, abs=1e-11)
@@ -28,6 +30,19 @@ def test_spreading_adds_the_same_to_every_angle(given_angles: Floats, difference
     if whole.any():
         assert np.ptp(change[whole]) < 1e-12
         assert (change[~whole] >= change[whole].max() - 1e-12).all()
+
+
+def test_where_little_is_left_all_give_the_same_part() -> None:
+    few = np.array([0.5, 0.25, 0.125])
+    spread = boundary.spread_evenly(few, boundary.cone_angle(few) + 0.5)
+    assert spread.sum() == pytest.approx(0.375, abs=1e-14)
+    assert np.ptp(spread / few) < 1e-14
+
+
+def test_a_loop_cannot_give_more_than_it_has() -> None:
+    few = np.array([0.2, 0.1, 0.1])
+    with pytest.raises(BoundaryError, match=r"sum to 0\.4 rad"):
+        boundary.spread_evenly(few, boundary.cone_angle(few) + 0.5)
 
 
 @settings(max_examples=100, deadline=None)
