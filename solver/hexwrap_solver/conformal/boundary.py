@@ -88,8 +88,8 @@ def spread_evenly(angles: Floats, curvature: float) -> Floats:
     if missing <= -total / 2:
         if missing <= -total:
             raise BoundaryError(
-                f"The angles of a boundary loop of {len(angles)} vertices sum to {total:.4g} rad, too little "
-                f"to round its cone angle by {-missing:.4g} rad; send a finer mesh, or ask for another quantum.",
+                f"The angles of a boundary loop of {len(angles)} vertices sum to {total:.4g} rad, too "
+                f"little to turn by {-missing:.4g} rad to a quantized cone angle; send a finer mesh.",
                 field=("boundary", "quantum"),
             )
         return np.asarray(angles * (1 + missing / total))
