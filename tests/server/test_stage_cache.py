@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 from hexwrap_server import codec
-from hexwrap_server.cache import CachingRunner, StageCache, prune, size_of, write_whole
+from hexwrap_server.cache import SHARES, CachingRunner, StageCache, prune, size_of, write_whole
 from hexwrap_server.codec import CodecError, decode, digest, encode
 from hexwrap_solver.arrays import Ragged
 from hexwrap_solver.conformal.types import BoundaryCondition, Deck
@@ -136,7 +136,7 @@ def test_progress_never_goes_back() -> None:
             progress(fraction, "")
         return 1
 
-    for stage in ("surface", "map", "pattern", "fit", "panels", "quality"):
+    for stage in SHARES:
         run(stage, None, compute)
     assert heard == sorted(heard)
     assert (heard[0], heard[-1]) == (0.0, pytest.approx(1.0))
