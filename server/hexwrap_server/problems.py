@@ -8,6 +8,7 @@ HexwrapError            (hexwrap_solver.errors) refused by the solver: 422
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import Any, ClassVar
 
@@ -18,6 +19,8 @@ from hexwrap_solver.errors import HexwrapError
 MEDIA_TYPE = "application/problem+json"
 #: Statuses of the errors that are not 422.
 STATUS = {"not-json": 400, "gone": 410, "worker-died": 503, "internal": 500}
+#: A pointer into the arrays of a sent mesh.
+_ELEMENT = re.compile(r"(?:/surface)?/(vertices|faces)/(\d+)")
 #: More faults than these are not listed, the first ones tell enough.
 MOST_LISTED = 100
 
@@ -40,8 +43,14 @@ class FormError(HexwrapError):
 
     @classmethod
     def at(cls, pointer: str, detail: str, kind: type[HexwrapError] | None = None) -> FormError:
-        """One fault. kind: the solver's error for the same fault; a client need not tell the two apart."""
+        """One fault. kind: the solver's error for the same fault; a client need not tell the two apart.
+
+        A fault in the arrays of the mesh names its vertex or face by index too.
+        """
         error = cls([(pointer, detail)])
+        element = _ELEMENT.match(pointer)
+        if element:
+            setattr(error, element[1], [int(element[2])])
         if kind is not None:
             error.__dict__.update(slug=kind.slug, title=kind.title)
         return error

@@ -135,8 +135,11 @@ class Panels(Model):
 
     @model_validator(mode="after")
     def range_in_order(self) -> Panels:
-        if self.edge_range is not None and not 0 <= self.edge_range[0] <= self.edge_range[1]:
-            raise ValueError("'edge_range' must be [min, max] with 0 ≤ min ≤ max")
+        if self.edge_range is None:
+            return self
+        low, high = self.edge_range
+        if not (0 <= low <= high and high > 0):
+            raise ValueError("'edge_range' must be [min, max] with 0 ≤ min ≤ max and max > 0")
         return self
 
 
@@ -348,7 +351,7 @@ def _known(given: dict[str, object], names: Sequence[str], root: str) -> None:
     if unknown:
         known = ", ".join(f"'{n}'" for n in names)
         raise FormError(
-            [(f"{root}/{_escaped(name)}", f"unknown field; known here: {known}") for name in unknown]
+            [(f"{root}/{escaped(name)}", f"unknown field; known here: {known}") for name in unknown]
         )
 
 
@@ -373,9 +376,10 @@ def _pointer(given: object, place: tuple[int | str, ...], kind: str) -> str:
         except (KeyError, IndexError, TypeError):
             if not (kind == "missing" and i == len(place) - 1):
                 continue
-        parts.append(_escaped(str(step)))
+        parts.append(escaped(str(step)))
     return "".join(f"/{part}" for part in parts)
 
 
-def _escaped(step: str) -> str:
+def escaped(step: str) -> str:
+    """A name as a step of a JSON pointer."""
     return step.replace("~", "~0").replace("/", "~1")

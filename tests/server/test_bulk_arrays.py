@@ -9,7 +9,8 @@ import numpy as np
 import orjson
 import pytest
 
-from hexwrap_server.problems import FormError
+from hexwrap_server.parsing import NotJsonError, loads
+from hexwrap_server.problems import FormError, problem
 from hexwrap_server.schemas import parse_points, parse_request
 from tests.server.bodies import request, tube
 
@@ -90,6 +91,7 @@ def test_faults_of_surfaces_are_pointed_at(surface: Any, pointer: str) -> None:
         ({"panels": {"sizes": 0}}, "/panels/sizes"),
         ({"panels": {"sizes": True}}, "/panels/sizes"),
         ({"panels": {"edge_range": [2, 1]}}, "/panels"),
+        ({"panels": {"edge_range": [0, 0]}}, "/panels"),
         ({"panels": {"joint": -0.1}}, "/panels/joint"),
         ({"panels": {"weights": {"angle": -1}}}, "/panels/weights/angle"),
         ({"panels": {"components": {"inset": None}}}, "/panels/components/inset"),
@@ -167,21 +169,46 @@ def test_numbers_too_large_for_a_float_are_refused() -> None:
         parse_points(orjson.loads(text), 2, 10)
 
 
+@pytest.mark.parametrize("number", ["1e999", "-1e400", "NaN", "-Infinity", "1" + 400 * "0"])
+def test_numbers_that_no_float_is_are_named_by_vertex(number: str) -> None:
+    sent = {"name": "[NaN", "surface": {"vertices": [[1, 0.125, 2], [1, 0.5, 3]], "faces": FACES}}
+    text = json.dumps(sent).replace("0.5", number)
+    with pytest.raises(FormError) as caught:
+        loads(text.encode())
+    assert caught.value.faults[0][0] == "/surface/vertices/1/1"
+    told = problem(caught.value)
+    assert (told["type"], told["status"], told["vertices"]) == ("/problems/not-finite", 422, [1])
+
+
+@pytest.mark.parametrize("text", [b"[1e999", b'{"surface": NaN}', b"[" * 100_000, b"[[1, 2], x]", b"\xff["])
+def test_other_broken_texts_are_no_json(text: bytes) -> None:
+    with pytest.raises(NotJsonError):
+        loads(text)
+
+
+def test_a_byte_order_mark_is_passed_over() -> None:
+    assert loads(b'\xef\xbb\xbf{"points": []}') == {"points": []}
+
+
 def test_too_many_points_are_refused() -> None:
     with pytest.raises(FormError, match="at most 1"):
         parse_points({"points": [[0, 1], [1, 2]]}, 2, 1)
 
 
 @pytest.mark.parametrize(
-    ("surface", "slug"),
+    ("surface", "slug", "elements"),
     [
-        ({"vertices": VERTICES, "faces": [[0, 1, 9]]}, "index-out-of-range"),
-        ({"vertices": VERTICES, "faces": [[0, 1]]}, "polygon-size"),
-        ({"vertices": [[0, 0, float("inf")]], "faces": FACES}, "not-finite"),
-        ({"vertices": 1, "faces": FACES}, "invalid-request"),
+        ({"vertices": VERTICES, "faces": [[0, 1, 2], [0, 1, 9]]}, "index-out-of-range", (None, [1])),
+        ({"vertices": VERTICES, "faces": [[0, 1]]}, "polygon-size", (None, [0])),
+        ({"vertices": [[0, 0, float("inf")]], "faces": FACES}, "not-finite", ([0], None)),
+        ({"vertices": 1, "faces": FACES}, "invalid-request", (None, None)),
     ],
 )
-def test_faults_that_the_solver_knows_have_its_slug(surface: Any, slug: str) -> None:
+def test_faults_that_the_solver_knows_have_its_slug(
+    surface: Any, slug: str, elements: tuple[list[int] | None, list[int] | None]
+) -> None:
     with pytest.raises(FormError) as caught:
         parse_request({"surface": surface}, 1000, 1000)
     assert caught.value.slug == slug
+    named = problem(caught.value)
+    assert (named.get("vertices"), named.get("faces")) == elements
