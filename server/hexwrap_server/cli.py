@@ -9,6 +9,7 @@ import argparse
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from math import inf
 from pathlib import Path
 
 import httpx
@@ -151,8 +152,10 @@ def _serve(asked: argparse.Namespace) -> int:
 def _solve(asked: argparse.Namespace) -> int:
     kinds = {out: file_kind(out) for out in asked.outputs}
     _check_folders(asked.outputs)
-    if asked.sheet is not None and min(asked.sheet) <= 0:
-        raise UsageError(f"--sheet {asked.sheet[0]:g} {asked.sheet[1]:g}: both sides must be greater than 0.")
+    if asked.sheet is not None and not all(0 < side < inf for side in asked.sheet):
+        raise UsageError(
+            f"--sheet {asked.sheet[0]:g} {asked.sheet[1]:g}: both sides must be finite and greater than 0."
+        )
     todo = task(asked.input, asked)
     solution, timings = solve_with_progress(todo, asked.quiet)
     meta = Meta(todo.name or "hexwrap", timings, tuple(asked.sheet) if asked.sheet else None)
@@ -239,6 +242,8 @@ def _check_folders(outputs: Sequence[str]) -> None:
     for out in outputs:
         if not Path(out).resolve().parent.is_dir():
             raise UsageError(f"-o {out}: there is no folder {Path(out).resolve().parent}.")
+        if Path(out).is_dir():
+            raise UsageError(f"-o {out}: this is a folder; name a file.")
 
 
 def save(out: str, data: bytes) -> None:

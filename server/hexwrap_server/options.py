@@ -80,6 +80,8 @@ MESHING = (
 )
 ANGLES: Path = ("boundary", "angles")
 SUPPORT: Path = ("support",)
+#: Fields of which a request gives one.
+SIZES: tuple[Path, Path] = (("pattern", "around"), ("pattern", "edge_length"))
 ANGLE_HELP = (
     "target angle at a boundary vertex, for --boundary angles; PLACE is an index of the sent mesh or X,Y,Z "
     "(any number of times)"
@@ -113,9 +115,12 @@ def add_request_options(parser: argparse.ArgumentParser) -> None:
 def asked_body(arguments: argparse.Namespace, body: dict[str, Any]) -> dict[str, Any]:
     """The request body with what was asked on the command line. Raises FormError for a malformed --angle."""
     asked = dict(body)
-    for option in OPTIONS:
-        if hasattr(arguments, _name(option)):
-            _put(asked, option.path, getattr(arguments, _name(option)))
+    given = {o.path: getattr(arguments, _name(o)) for o in OPTIONS if hasattr(arguments, _name(o))}
+    for size, other in (SIZES, SIZES[::-1]):
+        if given.get(size) is not None:  # takes the place of the size that the request may have
+            _put(asked, other, None)
+    for path, value in given.items():
+        _put(asked, path, value)
     if hasattr(arguments, "angles"):
         _put(asked, ANGLES, [_angle(text) for text in arguments.angles])
         asked["boundary"].setdefault("mode", "angles")

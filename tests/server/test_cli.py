@@ -10,8 +10,9 @@ import pytest
 import rhino3dm
 
 from hexwrap_server import __version__, samples
-from hexwrap_server.cli import ENDINGS, file_kind, main
+from hexwrap_server.cli import ENDINGS, file_kind, main, make_parser
 from hexwrap_server.files import WRITERS
+from hexwrap_server.local import task
 from hexwrap_server.options import ANGLES, OPTIONS, SUPPORT, field_paths
 from hexwrap_server.schemas import parse_request
 
@@ -125,6 +126,8 @@ def refusal(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[i
         (["-o", "x.docx"], "ending must be one of"),
         (["-o", "no/such/folder/x.obj"], "there is no folder"),
         (["--sheet", "0", "1"], "greater than 0"),
+        (["--sheet", "inf", "1"], "finite"),
+        (["--sheet", "1", "nan"], "finite"),
     ],
 )
 def test_usage_is_status_2(
@@ -133,6 +136,26 @@ def test_usage_is_status_2(
     status, told = refusal(["solve", str(tube), "-o", str(tmp_path / "x.obj"), *options], capsys)
     assert status == 2
     assert words in told
+
+
+def test_an_output_that_is_a_folder_is_refused_before_the_work(
+    tube: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "x.obj").mkdir()
+    status, told = refusal(["solve", str(tube), "-o", str(tmp_path / "x.obj")], capsys)
+    assert status == 2
+    assert "this is a folder" in told
+
+
+def test_a_size_asked_for_takes_the_place_of_the_requests(tmp_path: Path) -> None:
+    given = samples.load("facade")
+    assert given["pattern"]["edge_length"] is not None
+    path = tmp_path / "facade.json"
+    path.write_bytes(b"\xef\xbb\xbf" + json.dumps(given).encode())  # as some editors save it
+    asked = make_parser().parse_args(["solve", str(path), "-o", "x.obj", "--around", "60"])
+    wanted = task(str(path), asked).wanted.pattern
+    assert wanted is not None
+    assert (wanted.around, wanted.edge_length) == (60, None)
 
 
 @pytest.mark.parametrize(
