@@ -104,7 +104,7 @@ def _fit_split(
         whole=pattern.whole[face],
         cell_area=fan_areas(cells)[face],
         energy=energy,
-        notes=notes + _dropped_note(int((~regular & ~cut).sum())),
+        notes=notes + _joint_note(settings) + _dropped_note(int((~regular & ~cut).sum())),
     )
 
 
@@ -187,6 +187,15 @@ def _room_note(empty: Ints, others: int, joint: float) -> tuple[str, ...]:
             data={"cells": empty[:100].tolist()},
         )
     return (f"{some} have no room for a regular panel beside joints of {joint:g} and were left open.",)
+
+
+def _joint_note(settings: PanelSettings) -> tuple[str, ...]:
+    if settings.target != "mean" or settings.joint <= 0:
+        return ()
+    return (
+        f"Panels of mean size overlap, so joints of {settings.joint:g} are not kept; a target of shortest,"
+        " inscribed or best keeps them.",
+    )
 
 
 def _trimmed(

@@ -86,6 +86,13 @@ def test_targets_are_ordered():
     assert limit["shortest"].mean() < limit["inscribed"].mean() < limit["mean"].mean()
 
 
+def test_joints_that_mean_panels_cannot_keep_are_told():
+    _, told, _ = panelize(catenoid, target="mean", joint=0.01)
+    assert any("joints of 0.01 are not kept" in note for note in told.notes)
+    _, quiet, _ = panelize(catenoid, target="inscribed", joint=0.01)
+    assert not any("joint" in note for note in quiet.notes)
+
+
 def test_mean_panels_overlap_and_the_measurement_sees_it():
     _, _, quality = panelize(catenoid, target="mean", sizes=None)
     assert quality.overlaps > 100
