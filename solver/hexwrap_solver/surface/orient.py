@@ -11,7 +11,8 @@ from hexwrap_solver.surface.topology import half_edges, spanning_tree
 def flipped(faces: Ints, twin: Ints, weight: Floats) -> tuple[Bools, Ints]:
     """Which faces of a connected mesh are to be turned over, so that the fewest (by weight, (m,)) are.
 
-    Also the half-edges across which no choice of orientations agrees: none, unless the surface is one-sided.
+    Also the edges, one half-edge each, across which no choice of orientations agrees: none, unless the
+    surface is one-sided.
     """
     disagree = _disagreeing(faces, twin)
     odd = np.zeros(len(faces), dtype=bool)
@@ -22,7 +23,8 @@ def flipped(faces: Ints, twin: Ints, weight: Floats) -> tuple[Bools, Ints]:
         odd = ~odd
     inner = np.flatnonzero(twin >= 0)
     across = odd[inner // 3] ^ odd[twin[inner] // 3]
-    return odd, inner[across != disagree[inner]]
+    clash = inner[across != disagree[inner]]
+    return odd, clash[clash < twin[clash]]
 
 
 def _disagreeing(faces: Ints, twin: Ints) -> Bools:

@@ -165,6 +165,7 @@ def test_a_moebius_band(welded: bool) -> None:
             quads[quads == old] = new
     error = refused(mesh(vertices, quads), NotOrientableError)
     assert len(error.edges) >= 1
+    assert len({frozenset(edge) for edge in error.edges}) == len(error.edges)
 
 
 def test_a_closed_surface() -> None:
