@@ -192,11 +192,24 @@ async def flatten(request: Request, id: JobId) -> Response:
 
 
 @router.get("/v1/jobs/{id}/files/{name}", openapi_extra=describe.FILES)
-async def get_file(request: Request, id: JobId, name: Annotated[str, Path(max_length=64)]) -> Response:
+async def get_file(
+    request: Request,
+    id: JobId,
+    name: Annotated[str, Path(max_length=64)],
+    sheet: Annotated[
+        str | None,
+        Query(
+            pattern=r"^[0-9]+(\.[0-9]+)?[xX][0-9]+(\.[0-9]+)?$",
+            max_length=64,
+            description="flat.dxf: width and height of its sheets in model units, such as 2500x1250",
+        ),
+    ] = None,
+) -> Response:
     """The finished work as a file."""
     if name not in FILES:
         raise not_found("file", f"There is no file '{name[:64]}'; there are {', '.join(FILES)}.")
     service = service_of(request)
+    size = None if sheet is None else _sheet(sheet)
     job = service.manager.get(id)
     _finished(job)
     if name == "result.json":
@@ -204,7 +217,7 @@ async def get_file(request: Request, id: JobId, name: Annotated[str, Path(max_le
         data = await asyncio.to_thread(unpacked, packed, work, None)
     else:
         path = str(service.store.solution_path(job.identity))
-        data = await service.errand("hexwrap_server.work:write_file", path, name, job.name, job.timings)
+        data = await service.errand("hexwrap_server.work:write_file", path, name, job.name, job.timings, size)
     headers = {"Content-Disposition": f'attachment; filename="{name}"'}
     return await packed_response(request, data, FILES[name], headers)
 
@@ -287,15 +300,26 @@ def _parts(include: str | None) -> list[str] | None:
         return None
     known, unknown = names(include)
     if unknown or not known:
-        detail = f"'include' names parts of the Result: {', '.join(PARTS)}."
-        raise HttpError(
-            422,
-            "invalid-request",
-            "The request does not have the right form",
-            detail,
-            errors=[{"pointer": "", "parameter": "include", "detail": detail}],
-        )
+        raise _bad_parameter("include", f"'include' names parts of the Result: {', '.join(PARTS)}.")
     return known
+
+
+def _sheet(text: str) -> tuple[float, float]:
+    """Width and height of ``2500x1250``."""
+    width, height = (float(side) for side in text.lower().split("x"))
+    if width <= 0 or height <= 0:
+        raise _bad_parameter("sheet", f"Both sides of the sheet must be greater than 0, not {text}.")
+    return width, height
+
+
+def _bad_parameter(name: str, detail: str) -> HttpError:
+    return HttpError(
+        422,
+        "invalid-request",
+        "The request does not have the right form",
+        detail,
+        errors=[{"pointer": "", "parameter": name, "detail": detail}],
+    )
 
 
 def _timing(job: Job) -> dict[str, str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections import OrderedDict
 from functools import cache
 from pathlib import Path
@@ -84,9 +85,16 @@ def checked(report: Report, sent: SentSurface, caching: CacheSettings) -> Intake
     return Intake(codec.digest(sent), codec.encode(sent), answer)
 
 
-def write_file(report: Report, path: str, name: str, title: str, timings: dict[str, float]) -> bytes:
+def write_file(
+    report: Report,
+    path: str,
+    name: str,
+    title: str,
+    timings: dict[str, float],
+    sheet: tuple[float, float] | None,
+) -> bytes:
     """The finished work as a file. Raises HexwrapError where it cannot be made."""
-    return WRITERS[name](solution_at(path), Meta(name=title or "hexwrap", timings=timings))
+    return WRITERS[name](solution_at(path), Meta(name=title or "hexwrap", timings=timings, sheet=sheet))
 
 
 @cache
@@ -102,6 +110,8 @@ def solution_at(path: str) -> pipeline.Solution:
         try:
             _SOLUTIONS[path] = codec.decode(Path(path).read_bytes())
         except (OSError, codec.CodecError):
+            with contextlib.suppress(OSError):
+                Path(path).unlink()  # so that the job is run again when it is sent again
             raise GoneError(
                 "The work of this job is no longer kept on the server; send the job again."
             ) from None

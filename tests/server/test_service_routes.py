@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterator
 
+import ezdxf.filemanagement
 import numpy as np
 import pytest
+from ezdxf.entities import LWPolyline
 
 from tests.server.bodies import request, tube
 from tests.server.live import Live, finished, running
@@ -169,6 +172,19 @@ def test_files_are_written(client: Live, done: str, name: str) -> None:
     assert answer.status_code == 200
     assert answer.headers["content-disposition"] == f'attachment; filename="{name}"'
     assert len(answer.content) > 1000
+
+
+def test_sheets_of_flat_drawings_have_the_size_asked_for(client: Live, done: str) -> None:
+    path = f"/v1/jobs/{done}/files/flat.dxf"
+    drawing = ezdxf.filemanagement.read(io.StringIO(client.get(path, params={"sheet": "9x7.5"}).text))
+    rim = drawing.modelspace().query('LWPOLYLINE[layer=="sheets"]').first
+    assert isinstance(rim, LWPolyline)
+    assert [tuple(p) for p in rim.get_points("xy")] == [(0, 0), (9, 0), (9, 7.5), (0, 7.5)]
+    for sheet in ("", "9", "x", "9x", "-9x7", "0x7", "9x7x5", "nanxinf", "1e9x5", "٣x٤"):
+        answer = client.get(path, params={"sheet": sheet})
+        assert (answer.status_code, answer.json()["errors"][0]["parameter"]) == (422, "sheet"), sheet
+    small = client.get(path, params={"sheet": "0.01x0.01"})
+    assert (small.status_code, small.json()["type"]) == (422, "/problems/sheet")
 
 
 def test_result_file_is_the_result(client: Live, done: str) -> None:
