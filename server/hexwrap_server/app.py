@@ -45,7 +45,7 @@ class PortTakenError(Exception):
 def create_app(settings: Settings | None = None, engine: Engine | None = None) -> FastAPI:
     """The application. engine: where jobs run, if not as the settings say.
 
-    Raises FolderInUseError, OSError where the data folder cannot be used.
+    Raises FolderInUseError, DamagedError, OSError where the data folder cannot be used.
     """
     settings = settings or Settings.from_environment()
     service = Service(settings, engine)
@@ -83,7 +83,7 @@ def create_app(settings: Settings | None = None, engine: Engine | None = None) -
 
 
 def serve(settings: Settings) -> None:
-    """Serve until Ctrl-C or SIGTERM. Raises PortTakenError, FolderInUseError, OSError."""
+    """Serve until Ctrl-C or SIGTERM. Raises PortTakenError, FolderInUseError, DamagedError, OSError."""
     set_up_logging(settings.log_level)
     # uvicorn raises the signal again once it has shut down; that shall end the program quietly
     signal.signal(signal.SIGTERM, lambda number, frame: None)

@@ -136,7 +136,7 @@ def _kinds() -> list[str]:
 
 def _serve(asked: argparse.Namespace) -> int:
     from hexwrap_server.app import PortTakenError, serve  # the web framework takes a second to import
-    from hexwrap_server.store import FolderInUseError
+    from hexwrap_server.store import DamagedError, FolderInUseError
 
     try:
         settings = Settings.from_arguments(asked)
@@ -144,7 +144,7 @@ def _serve(asked: argparse.Namespace) -> int:
         raise UsageError(str(error)) from None
     try:
         serve(settings)
-    except (PortTakenError, FolderInUseError, OSError) as error:
+    except (PortTakenError, FolderInUseError, DamagedError, OSError) as error:
         return _refuse(1, str(error))
     return 0
 

@@ -36,14 +36,21 @@ def encode(value: Any) -> bytes:
     return _HEAD.pack(_MAGIC, len(header), zlib.crc32(body)) + body
 
 
-def decode(data: bytes) -> Any:
-    """What was encoded; arrays are read-only views of data. Raises CodecError."""
+def is_whole(data: bytes) -> bool:
+    """Whether the bytes are as ``encode`` wrote them."""
     if len(data) < _HEAD.size:
-        raise CodecError("too short")
+        return False
     magic, length, checksum = _HEAD.unpack_from(data)
     body = memoryview(data)[_HEAD.size :]
-    if magic != _MAGIC or length > len(body) or zlib.crc32(body) != checksum:
+    return bool(magic == _MAGIC and length <= len(body) and zlib.crc32(body) == checksum)
+
+
+def decode(data: bytes) -> Any:
+    """What was encoded; arrays are read-only views of data. Raises CodecError."""
+    if not is_whole(data):
         raise CodecError("damaged, or of another version")
+    _, length, _ = _HEAD.unpack_from(data)
+    body = memoryview(data)[_HEAD.size :]
     try:
         header = json.loads(bytes(body[:length]))
         return _join(header["value"], _arrays(header["arrays"], body, length))

@@ -21,7 +21,7 @@ from hexwrap_server.parts import chosen
 from hexwrap_server.problems import FormError, HttpError, not_found, plain, problem
 from hexwrap_server.requests import CacheSettings, Outcome, ParsedRequest
 from hexwrap_server.settings import MIB, Settings
-from hexwrap_server.store import Job, Store, Work
+from hexwrap_server.store import GZIP_WINDOW, Job, Store, Work
 from hexwrap_server.version import service_version
 from hexwrap_server.worker import InternalError, WorkError
 from hexwrap_solver.errors import HexwrapError
@@ -32,8 +32,6 @@ MAX_ATTEMPTS = 3
 PRUNE_INTERVAL = 600.0
 #: Results kept in memory as they go over the wire.
 HOT_RESULT_BYTES = 64 * MIB
-#: zlib's way to say: a gzip header, and the largest window.
-GZIP_WINDOW = 31
 log = logging.getLogger("hexwrap.jobs")
 
 
@@ -172,7 +170,7 @@ class JobManager:
         while True:
             job = self.get(id)
             yield job
-            if job.is_over:
+            if job.is_over or self._closing.is_set():
                 return
             while True:
                 try:
@@ -181,8 +179,6 @@ class JobManager:
                     break
                 except TimeoutError:
                     yield None
-            if self._closing.is_set():
-                return
 
     async def delete(self, id: str) -> None:
         """Stop a job that waits or runs, forget one that is over."""
@@ -205,11 +201,12 @@ class JobManager:
         """The packed Result, and where its parts stand. Raises HttpError where there is none."""
         work = self.store.finished_work(job.identity)
         if work is None:
-            raise HttpError(
-                410, "gone", "The result is no longer kept", "The result was pruned; send the job again."
-            )
+            raise _gone()
         if job.identity not in self._hot:
-            self._heat(job.identity, await asyncio.to_thread(self.store.result_path(job.identity).read_bytes))
+            packed = await asyncio.to_thread(self.store.result, job.identity)
+            if packed is None:
+                raise _gone()
+            self._heat(job.identity, packed)
         self._hot.move_to_end(job.identity)
         return self._hot[job.identity], work
 
@@ -226,15 +223,16 @@ class JobManager:
     def _resume(self, job: Job) -> None:
         work = self.store.work(job.identity)
         if work is None or not self.store.has_surface(work.surface):
-            lost = InternalError("The surface of this job was lost while the server was down; send it again.")
+            lost = InternalError("What this job needs was lost while the server was down; send it again.")
             self._end([_failed(job, lost)])
-        elif work.parts is not None and self.store.result_path(job.identity).exists():
+        elif work.parts is not None and self.store.has_outcome(job.identity):
             self._end([_reused(job, work)])
         elif work.attempts >= MAX_ATTEMPTS:
             gave_up = AttemptsError(
                 f"The server died {work.attempts} times while this job was running, so it is not tried "
                 "again; make the mesh or the pattern coarser."
             )
+            self.store.settle(job.identity)
             self._end([_failed(job, gave_up)])
         else:
             self.store.update([job])
@@ -264,9 +262,11 @@ class JobManager:
             self.store.take_back(identity)
             raise
         except HexwrapError as error:
+            self.store.settle(identity)
             self._end([_failed(job, error) for job in item.jobs.values()])
         except Exception as error:
             log.exception("a job failed unexpectedly")
+            self.store.settle(identity)
             fault = InternalError(f"The server could not finish the job ({type(error).__name__}: {error}).")
             self._end([_failed(job, fault) for job in item.jobs.values()])
         finally:
@@ -277,6 +277,8 @@ class JobManager:
 
     async def _compute(self, item: _Item) -> Outcome:
         surface = await asyncio.to_thread(self.store.surface, item.work.surface)
+        if surface is None:
+            raise FormError.at("/surface/id", "the surface is no longer kept here; send it again")
 
         def report(stage: str, fraction: float, what: str) -> None:
             self._change(item, stage=stage, progress=round(max(0.0, min(1.0, fraction)), 4))
@@ -341,6 +343,12 @@ def unpacked(packed: bytes, work: Work, include: list[str] | None) -> bytes:
     """The Result as JSON, or some of its parts."""
     text = isal_zlib.decompress(packed, GZIP_WINDOW)
     return text if include is None else chosen(text, work.parts or {}, include)
+
+
+def _gone() -> HttpError:
+    return HttpError(
+        410, "gone", "The result is no longer kept", "The result was pruned; send the job again."
+    )
 
 
 def _done(job: Job, outcome: Outcome) -> Job:

@@ -31,7 +31,7 @@ class Service:
     nobody = staticmethod(nobody)
 
     def __init__(self, settings: Settings, engine: Engine | None = None) -> None:
-        """Raises FolderInUseError, OSError."""
+        """Raises FolderInUseError, DamagedError, OSError."""
         self.settings = settings
         self.store = open_store(settings)
         self.metrics = Metrics()

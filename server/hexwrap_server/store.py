@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import contextlib
 import json
+import logging
 import re
 import sqlite3
 import time
-from collections.abc import Iterable
+import zlib
+from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -23,6 +25,9 @@ from hexwrap_server.cache import prune, write_whole
 from hexwrap_server.requests import Outcome, Wanted
 
 Status = Literal["queued", "running", "done", "failed", "cancelled"]
+#: zlib's way to say: a gzip header, and the largest window.
+GZIP_WINDOW = 31
+log = logging.getLogger("hexwrap.store")
 HEX_ID = re.compile(r"[0-9a-f]{64}")
 
 _SCHEMA = """
@@ -89,11 +94,15 @@ class FolderInUseError(Exception):
     """Another server works in this folder."""
 
 
+class DamagedError(Exception):
+    """The folder's list of jobs cannot be read or written."""
+
+
 class Store:
     """All methods are short; those that read or write whole files say so."""
 
     def __init__(self, folder: Path) -> None:
-        """Raises FolderInUseError, OSError."""
+        """Raises FolderInUseError, DamagedError, OSError."""
         self.folder = folder
         self.surfaces = folder / "surfaces"
         self.results = folder / "results"
@@ -102,10 +111,15 @@ class Store:
             path.mkdir(parents=True, exist_ok=True)
         self._last_surface = ("", b"")
         self._lock = _locked(folder / "lock.sqlite3")
-        self._db = sqlite3.connect(folder / "hexwrap.sqlite3", check_same_thread=False, isolation_level=None)
-        self._db.execute("PRAGMA journal_mode = WAL")
-        self._db.execute("PRAGMA synchronous = NORMAL")
-        self._db.executescript(_SCHEMA)
+        path = folder / "hexwrap.sqlite3"
+        try:
+            self._db = sqlite3.connect(path, check_same_thread=False, isolation_level=None)
+            self._db.execute("PRAGMA journal_mode = WAL")
+            self._db.execute("PRAGMA synchronous = NORMAL")
+            self._db.executescript(_SCHEMA)
+        except sqlite3.DatabaseError as error:
+            self._lock.close()
+            raise _unusable(path, error) from None
 
     def close(self) -> None:
         self._db.close()
@@ -117,7 +131,7 @@ class Store:
         """Writes a file; the last one sent is also kept at hand, since a job is going to ask for it."""
         self._last_surface = (id, data)
         path = self._surface(id)
-        if path.exists():
+        if path.exists() and path.read_bytes() == data:
             path.touch()
         else:
             write_whole(path, data)
@@ -125,10 +139,10 @@ class Store:
     def has_surface(self, id: str) -> bool:
         return HEX_ID.fullmatch(id) is not None and self._surface(id).exists()
 
-    def surface(self, id: str) -> bytes:
-        """Raises OSError."""
+    def surface(self, id: str) -> bytes | None:
+        """Reads a file; None where it is gone or damaged, and then it is forgotten."""
         last, data = self._last_surface
-        return data if last == id else self._surface(id).read_bytes()
+        return data if last == id else _whole(self._surface(id), codec.is_whole)
 
     # works
 
@@ -140,19 +154,17 @@ class Store:
         if row is None:
             return None
         identity, surface, wanted, attempts, parts, timings = row
-        return Work(
-            identity,
-            surface,
-            codec.decode(wanted),
-            attempts,
-            json.loads(parts or "null"),
-            json.loads(timings),
-        )
+        try:
+            asked = codec.decode(wanted)
+        except codec.CodecError as error:
+            log.warning("a work of another version cannot be read: %s", error)
+            return None
+        return Work(identity, surface, asked, attempts, json.loads(parts or "null"), json.loads(timings))
 
     def finished_work(self, identity: str) -> Work | None:
         """The work, if its result is there."""
         work = self.work(identity)
-        if work is None or work.parts is None or not self.result_path(identity).exists():
+        if work is None or work.parts is None or not self.has_outcome(identity):
             return None
         self._db.execute("UPDATE works SET used = ? WHERE identity = ?", (time.time(), identity))
         return work
@@ -161,6 +173,13 @@ class Store:
         """The files of a result; ``done`` comes after. Raises OSError."""
         write_whole(self.solution_path(identity), outcome.solution)
         write_whole(self.result_path(identity), outcome.result)
+
+    def result(self, identity: str) -> bytes | None:
+        """Reads a packed result; None where it is gone or damaged, and then it is forgotten."""
+        return _whole(self.result_path(identity), _is_packed)
+
+    def has_outcome(self, identity: str) -> bool:
+        return self.result_path(identity).exists() and self.solution_path(identity).exists()
 
     def result_path(self, identity: str) -> Path:
         return self.results / f"{identity}.json.gz"
@@ -181,11 +200,17 @@ class Store:
             self._db.execute(f"INSERT INTO jobs ({_COLUMNS}) VALUES ({marks})", _row(job))
 
     def start_work(self, identity: str) -> None:
-        self._db.execute("UPDATE works SET attempts = attempts + 1 WHERE identity = ?", (identity,))
+        self._db.execute(
+            "UPDATE works SET attempts = attempts + 1, parts = NULL WHERE identity = ?", (identity,)
+        )
 
     def take_back(self, identity: str) -> None:
         """The server stops before the work is done, through no fault of the work."""
         self._db.execute("UPDATE works SET attempts = MAX(attempts - 1, 0) WHERE identity = ?", (identity,))
+
+    def settle(self, identity: str) -> None:
+        """The work ended without a result; whoever asks for it again starts from the first attempt."""
+        self._db.execute("UPDATE works SET attempts = 0 WHERE identity = ?", (identity,))
 
     def finish_work(self, identity: str, outcome: Outcome) -> None:
         size = len(outcome.result) + len(outcome.solution)
@@ -262,18 +287,54 @@ class Store:
         return self.surfaces / f"{id}.surface"
 
 
+def _whole(path: Path, is_whole: Callable[[bytes], bool]) -> bytes | None:
+    """What a file holds. A damaged one is deleted, so that its work is done again when asked for."""
+    try:
+        data = path.read_bytes()
+    except OSError:
+        return None
+    if is_whole(data):
+        return data
+    log.warning("a damaged file was deleted: %s", path.name)
+    with contextlib.suppress(OSError):
+        path.unlink()
+    return None
+
+
+def _is_packed(data: bytes) -> bool:
+    """Whether gzip data is complete and its checksum right."""
+    try:
+        gunzip = zlib.decompressobj(GZIP_WINDOW)
+        gunzip.decompress(data)
+        return gunzip.eof
+    except zlib.error:
+        return False
+
+
 def _locked(path: Path) -> sqlite3.Connection:
     """A lock that every system frees when the process ends, in whatever way."""
-    lock = sqlite3.connect(path, timeout=0, check_same_thread=False, isolation_level=None)
+    try:
+        lock = sqlite3.connect(path, timeout=0, check_same_thread=False, isolation_level=None)
+    except sqlite3.DatabaseError as error:
+        raise _unusable(path, error) from None
     try:
         lock.execute("PRAGMA locking_mode = EXCLUSIVE")
         lock.execute("BEGIN EXCLUSIVE")
-    except sqlite3.OperationalError:
+    except sqlite3.DatabaseError as error:
         lock.close()
+        if error.sqlite_errorcode != sqlite3.SQLITE_BUSY:
+            raise _unusable(path, error) from None
         raise FolderInUseError(
             f"Another hexwrap server works in {path.parent}; give this one its own --data."
         ) from None
     return lock
+
+
+def _unusable(path: Path, error: sqlite3.DatabaseError) -> DamagedError:
+    return DamagedError(
+        f"{path} cannot be used ({error}). If the folder can be written, the file is damaged: move it "
+        "away to start with an empty list of jobs, or give another --data."
+    )
 
 
 def _row(job: Job) -> tuple[Any, ...]:

@@ -1,0 +1,122 @@
+"""A data folder that was damaged: nothing wrong is told, and what was lost is made again."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from hexwrap_server.store import DamagedError, FolderInUseError, Store
+from tests.server.bodies import request
+from tests.server.live import Live, finished, running
+
+Damage = Callable[[bytes], bytes]
+
+
+def cut_short(data: bytes) -> bytes:
+    return data[: len(data) // 2]
+
+
+def garbled(data: bytes) -> bytes:
+    middle = len(data) // 2
+    return data[:middle] + bytes(255 - byte for byte in data[middle : middle + 50]) + data[middle + 50 :]
+
+
+def emptied(data: bytes) -> bytes:
+    return b""
+
+
+def solved(client: Live, **changes: Any) -> tuple[str, dict[str, Any]]:
+    id = client.post("/v1/jobs", json=request(**changes)).json()["id"]
+    assert finished(client, id)["status"] == "done"
+    result: dict[str, Any] = client.get(f"/v1/jobs/{id}/result").json()
+    return id, result
+
+
+@pytest.mark.parametrize("damage", [cut_short, garbled, emptied])
+def test_damaged_files_are_told_and_made_again(tmp_path: Path, damage: Damage) -> None:
+    with running(tmp_path, workers=1) as client:
+        id, result = solved(client)
+    for path in (p for folder in ("results", "surfaces", "stages") for p in (tmp_path / folder).iterdir()):
+        path.write_bytes(damage(path.read_bytes()))
+    with running(tmp_path, workers=1) as client:
+        for what in ("files/panels.obj", "result", "files/result.json", "files/panels.csv"):
+            answer = client.get(f"/v1/jobs/{id}/{what}")
+            assert (answer.status_code, answer.json()["type"]) == (410, "/problems/gone"), what
+        again, same = solved(client)
+        assert result | {"timings": None} == same | {"timings": None}
+        assert client.get(f"/v1/jobs/{again}/files/panels.obj").status_code == 200
+        assert client.get(f"/v1/jobs/{id}/result").status_code == 200
+
+
+def test_damaged_surface_is_asked_for_again(tmp_path: Path) -> None:
+    with running(tmp_path, workers=1) as client:
+        surface = {"id": client.post("/v1/surfaces", json=request()["surface"]).json()["id"]}
+    for path in (tmp_path / "surfaces").iterdir():
+        path.write_bytes(cut_short(path.read_bytes()))
+    with running(tmp_path, workers=1) as client:
+        for _ in range(2):
+            answer = client.post("/v1/solve", json={"surface": surface})
+            assert (answer.status_code, answer.json()["errors"][0]["pointer"]) == (422, "/surface/id")
+        assert client.post("/v1/surfaces", json=request()["surface"]).json()["id"] == surface["id"]
+        assert (
+            client.post("/v1/solve", json={"surface": surface, "pattern": {"around": 8}}).status_code == 200
+        )
+
+
+def test_lost_solution_is_made_again(tmp_path: Path) -> None:
+    with running(tmp_path, workers=1) as client:
+        id, _ = solved(client)
+        for path in (tmp_path / "results").glob("*.solution"):
+            path.unlink()
+        assert client.get(f"/v1/jobs/{id}/files/panels.obj").status_code == 410
+        again, _ = solved(client)
+        assert client.get(f"/v1/jobs/{again}/files/panels.obj").status_code == 200
+
+
+def test_failed_work_starts_from_the_first_attempt_again(tmp_path: Path) -> None:
+    open_disk = {"vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "faces": [[0, 1, 2]]}
+    with running(tmp_path, workers=1) as client:
+        for _ in range(3):
+            id = client.post("/v1/jobs", json={"surface": open_disk}).json()["id"]
+            assert finished(client, id)["status"] == "failed"
+        store = client.service.store
+        job = store.job(id)
+        assert job is not None
+        work = store.work(job.identity)
+        assert work is not None
+        assert work.attempts == 0
+
+
+def test_list_of_jobs_that_is_none_is_told(tmp_path: Path) -> None:
+    (tmp_path / "hexwrap.sqlite3").write_bytes(b"no list at all" * 300)
+    command = [sys.executable, "-m", "hexwrap_server.cli", "serve", "--port", "0", "--data", str(tmp_path)]
+    told = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert told.returncode == 1
+    assert "hexwrap.sqlite3 cannot be used" in told.stderr
+    assert "Traceback" not in told.stderr
+
+
+def test_lock_that_cannot_be_opened_is_not_taken_for_another_server(tmp_path: Path) -> None:
+    (tmp_path / "lock.sqlite3").mkdir()
+    with pytest.raises(DamagedError, match="cannot be used"):
+        Store(tmp_path)
+    (tmp_path / "lock.sqlite3").rmdir()
+    first = Store(tmp_path)
+    with pytest.raises(FolderInUseError):
+        Store(tmp_path)
+    first.close()
+
+
+def test_work_of_another_version_is_told_as_lost(tmp_path: Path) -> None:
+    with running(tmp_path, workers=1) as client:
+        id, _ = solved(client)
+        client.service.store._db.execute("UPDATE works SET wanted = ?", (b"of another version",))
+        client.service.store._db.execute("UPDATE jobs SET status = 'queued'")
+    with running(tmp_path, workers=1) as client:
+        told = client.get(f"/v1/jobs/{id}").json()
+        assert (told["status"], told["problem"]["type"]) == ("failed", "/problems/internal")
