@@ -120,3 +120,15 @@ def manifold_corners(cells: Cells) -> tuple[Ints, Ints]:
     point = np.zeros(n, dtype=np.int64)
     point[vertex] = cells.corner.values
     return vertex.astype(np.int64), point
+
+
+def is_simple(corner: Ragged, twin: Ints) -> bool:
+    """Whether shared vertices tell all sides apart: no cell comes to a vertex twice, and no two edges join
+    the same two vertices. Patterns of very few cells around fail it.
+    """
+    n = int(corner.values.max()) + 1
+    visits = corner.row * n + corner.values
+    following = corner.values[corner.next()]
+    pairs = np.minimum(corner.values, following) * n + np.maximum(corner.values, following)
+    n_edges = len(pairs) - int(np.count_nonzero(twin >= 0)) // 2
+    return len(np.unique(visits)) == len(visits) and len(np.unique(pairs)) == n_edges

@@ -15,7 +15,7 @@ from hexwrap_solver.domain.interpolate import surface_weights
 from hexwrap_solver.domain.lift import points_at
 from hexwrap_solver.domain.locate import barycentric
 from hexwrap_solver.errors import PatternError
-from hexwrap_solver.pattern.cells import largest_part, manifold_corners, only_whole_cells
+from hexwrap_solver.pattern.cells import is_simple, largest_part, manifold_corners, only_whole_cells
 from hexwrap_solver.pattern.lattice import LATTICES, Lattice
 from hexwrap_solver.pattern.links import link_nodes
 from hexwrap_solver.pattern.nodes import Layout, find_nodes
@@ -111,6 +111,12 @@ def _finish(
         raise _too_coarse(placement)
     cells = cut.cells.part(keep)
     corner, point = manifold_corners(cells)
+    if not is_simple(Ragged(corner, cells.corner.offsets), cells.twin):
+        raise PatternError(
+            f"With {placement.around} cells around, cells touch themselves or share two edges with the same "
+            "ends, which no mesh of shared vertices can tell apart: ask for more cells around, or a shorter "
+            "edge."
+        )
     triangle, place = cut.points.face[point], cut.points.place[point]
     weights = barycentric(layout.corners[triangle], place)
     uv = (weights * cmap.corners()[triangle]).sum(axis=1)

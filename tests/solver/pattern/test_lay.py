@@ -93,3 +93,13 @@ def test_too_many_and_too_large_cells_are_refused():
         lay_pattern(cmap, PatternSettings(around=2000, max_cells=10_000))
     with pytest.raises(PatternError):
         lay_pattern(cmap, PatternSettings(around=4, align="none"))
+
+
+@pytest.mark.parametrize("boundary", ["whole", "trim"])
+@pytest.mark.parametrize(
+    ("kind", "around"), [("triangle", 3), ("triangle", 4), ("quad", 1), ("quad", 2), ("hex", 1)]
+)
+def test_cells_that_shared_vertices_cannot_tell_apart_are_refused(kind, around, boundary):
+    cmap = annuli.revolution(np.cosh, np.linspace(-1, 1.5, 25), 40)
+    with pytest.raises(PatternError, match="more cells around"):
+        lay_pattern(cmap, PatternSettings(kind=kind, around=around, boundary=boundary))
