@@ -21,6 +21,23 @@ def positive(corners: Complexes) -> Bools:
     return np.asarray(area > ROUNDINGS * np.abs(corners).max(axis=1) * longest)
 
 
+def misdrawn(found: ConformalMap) -> Bools:
+    """(m,) triangles that are turned over; if there are none, those around vertices that they go around too
+    often or too seldom: one whose corner opens by more than 2π looks positive in the plane."""
+    faces, corners = found.surface.faces, found.corners()
+    turned = ~positive(corners)
+    if turned.any():
+        return np.asarray(turned)
+    told = np.full(len(found.surface.vertices), 2 * np.pi)
+    for loop, angles in zip(found.surface.loops, found.boundary_angles, strict=True):
+        told[loop] = angles
+    here, one, two = corners, np.roll(corners, -1, axis=1), np.roll(corners, -2, axis=1)
+    angle = np.angle(np.conj(one - here) * (two - here))
+    sums = np.bincount(faces.ravel(), angle.ravel(), len(told))
+    wound = np.abs(sums - told) > np.pi
+    return np.asarray(wound[faces].any(axis=1))
+
+
 def faithful(found: ConformalMap) -> bool:
     """Whether the angles drawn at the boundary add up to ``boundary_angles``."""
     faces = found.surface.faces

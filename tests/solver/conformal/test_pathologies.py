@@ -9,7 +9,8 @@ from hexwrap_solver.conformal import conformal_map
 from hexwrap_solver.conformal.types import BoundaryCondition
 from hexwrap_solver.surface.types import Surface
 from tests.solver.conformal.annuli import annulus, grid, irregular, revolution, ring, uneven
-from tests.solver.conformal.checks import faults
+from tests.solver.conformal.checks import asked_angles, faults
+from tests.solver.conformal.torture import random_flips
 
 CONE = revolution(lambda s: 1 + 2 * s, lambda s: s)
 
@@ -86,3 +87,37 @@ def test_corners_wherever_they_are(name: str, kind: str) -> None:
         sent = loop < len(wanted)  # the rest was inserted on straight sides
         np.testing.assert_allclose(angles[sent], wanted[loop[sent]], atol=1e-9)
         np.testing.assert_allclose(angles[~sent], np.pi, atol=1e-9)
+
+
+def wheel(around: int, first: int, second: int) -> Surface:
+    """A cone frustum one triangle wide, from a polygon to a triangle: two of its corners stand opposite to
+    the polygon's vertices ``first`` and ``second``, the third one to vertex 0."""
+    outer, inner = (np.exp(2j * np.pi * np.arange(n) / n) for n in (around, 3))
+    z = np.concatenate([2 * outer, 1.0 * inner])
+    height = np.repeat([0.0, 1.0], [around, 3])
+    k = np.arange(around)
+    hub = around + (k >= first) + (k >= second)
+    fans = np.stack([k, (k + 1) % around, hub], axis=1)
+    change = np.flatnonzero(np.roll(hub, -1) != hub)
+    between = np.stack([(change + 1) % around, np.roll(hub, -1)[change], hub[change]], axis=1)
+    loops = (k, around + np.array([2, 1, 0]))
+    return annulus(np.column_stack([z.real, z.imag, height]), np.concatenate([fans, between]), loops)
+
+
+def test_corners_wider_than_a_turn_are_gone_around_once_and_a_bit() -> None:
+    surface = wheel(155, 98, 109)
+    loops = surface.loops
+    angles = [np.pi - sign * 4 * np.pi / len(loop) for loop, sign in zip(loops, (1, -1), strict=True)]
+    condition = BoundaryCondition(
+        "angles", vertices=np.concatenate(loops), angles=np.repeat(angles, [len(loop) for loop in loops])
+    )
+    found = conformal_map(surface, condition)
+    assert faults(found, asked_angles(found, surface, condition)) == []
+
+
+def test_splits_do_not_go_around_a_vertex_for_ever() -> None:
+    random = np.random.default_rng(101)
+    tower = irregular(24, 14, uneven, seed=int(random.integers(1e6)))
+    faces = random_flips(tower.faces, len(tower.vertices), random, 6000)
+    found = conformal_map(annulus(tower.vertices, faces, tower.loops), BoundaryCondition())
+    assert faults(found) == []

@@ -256,6 +256,26 @@ def split_places(surface: Surface, targets: Targets, wrong: Ints, attempt: int) 
     return np.concatenate([fan, 3 * wrong + side]), np.concatenate([np.full(len(fan), 0.5), foot])
 
 
+def shells(surface: Surface, wrong: Ints, sent: int) -> tuple[Ints, Floats]:
+    """(half-edges, places) that cut all edges at one distance from each vertex below ``sent`` of the faces
+    ``wrong``: half its shortest edge.
+
+    Where triangles of different parents meet at such a vertex, splitting one of them at its altitude may call
+    for a split of the next, and so on around the vertex on ever smaller scales. Edges of equal length from it
+    end that, since their triangles are isosceles (the concentric shells of Ruppert's refinement).
+    """
+    corner = surface.faces[wrong]
+    centre = np.zeros(len(surface.vertices), dtype=bool)
+    centre[corner[corner < sent]] = True
+    tail, head = half_edges(surface.faces)
+    length = np.linalg.norm(surface.vertices[head] - surface.vertices[tail], axis=1)
+    radius = np.full(len(centre), np.inf)
+    np.minimum.at(radius, np.concatenate([tail, head]), np.tile(length / 2, 2))
+    out, into = np.flatnonzero(centre[tail]), np.flatnonzero(centre[head] & ~centre[tail])
+    place = np.concatenate([radius[tail[out]] / length[out], 1 - radius[head[into]] / length[into]])
+    return np.concatenate([out, into]), place
+
+
 def _opened(surface: Surface, targets: Targets) -> Bools:
     """(n,) boundary vertices whose target is well above their angle on the surface."""
     angles = corner_angles(opposite_lengths(surface.vertices, surface.faces)).angle

@@ -12,7 +12,7 @@ from hexwrap_solver.conformal.boundary import cone_angle_of
 from hexwrap_solver.conformal.cut import cut_open
 from hexwrap_solver.conformal.energy import Energy, opposite_lengths
 from hexwrap_solver.conformal.layout import normalise
-from hexwrap_solver.conformal.orientation import positive
+from hexwrap_solver.conformal.orientation import misdrawn
 from hexwrap_solver.conformal.robust.delaunay import make_delaunay
 from hexwrap_solver.conformal.robust.descent import ACCEPTED, FlipEnergy, descend
 from hexwrap_solver.conformal.robust.develop import develop
@@ -21,6 +21,7 @@ from hexwrap_solver.conformal.robust.mirror import mirror_mesh
 from hexwrap_solver.conformal.robust.refine import (
     Problem,
     collapsing,
+    shells,
     split_edges,
     split_places,
     spread,
@@ -33,6 +34,9 @@ from hexwrap_solver.surface.types import Surface
 
 #: Rounds of refinement; meshes seen so far need up to a handful.
 MAX_ROUNDS = 40
+#: From this round on, where no more than so many triangles still turn over, the mesh gets shells around their
+#: vertices every so many rounds; where there are more of them, it is no cascade around single vertices.
+PATIENCE, FEW, SHELLS = 8, 4, 4
 #: Refinement that makes more than so many times the vertices, and so many more, does not come to an end.
 MOST, MOST_MORE = 2, 1000
 REFINED = "The mesh was refined:"
@@ -61,12 +65,15 @@ def solve_with_flips(
         problem = _uncollapse(problem)
         found = _attempt(problem, progress)
         iterations += found.iterations
-        wrong = np.flatnonzero(~positive(found.corners()))
+        wrong = np.flatnonzero(misdrawn(found))
         if not len(wrong):
             return _told(found, surface, iterations)
         problem = replace(problem, u=found.log_scale)
         before = len(problem.surface.vertices)
-        problem = split_edges(problem, *split_places(problem.surface, problem.targets, wrong, attempt))
+        if attempt >= PATIENCE and attempt % SHELLS == 0 and len(wrong) <= FEW:
+            problem = split_edges(problem, *shells(problem.surface, wrong, len(surface.vertices)))
+        if len(problem.surface.vertices) == before:
+            problem = split_edges(problem, *split_places(problem.surface, problem.targets, wrong, attempt))
         if len(wrong) >= fewest:
             problem = spread(problem, before)
         fewest = min(fewest, len(wrong))
