@@ -181,6 +181,14 @@ def check_panels(result: Json, *, regular: bool = True, overlap_free: bool = Tru
         if p["size"][i] in table and abs(table[p["size"][i]] - length) > 1e-9 * length:
             bad.append(f"panel {p['label'][i]} has ℓ = {length}, its class {table[p['size'][i]]}")
             break
+    inward = 0
+    for i, polygon in enumerate(p["polygons"]):
+        q, n = np.array(polygon), np.array(p["normal"][i])
+        area = np.cross(q - q[0], np.roll(q, -1, 0) - q[0]).sum(0)
+        outside = np.array(result["pattern"]["normals"])[result["pattern"]["faces"][p["face"][i]]].sum(0)
+        inward += bool(area @ n <= 0 or n @ outside <= 0 or abs(np.linalg.norm(n) - 1) > 1e-9)
+    if inward:
+        bad.append(f"{inward} panels or their normals do not look outward")
     counts = Counter(p["size"])
     for s in result["sizes"]:
         if counts[s["size"]] != s["count"]:
@@ -190,6 +198,76 @@ def check_panels(result: Json, *, regular: bool = True, overlap_free: bool = Tru
     if overlap_free:
         bad += overlaps(result)
     return bad
+
+
+def check_quality(result: Json) -> list[str]:
+    """``quality`` against what the returned arrays themselves say."""
+    p, pattern, said = result["panels"], result["pattern"], result["quality"]
+    polygons = [np.array(polygon) for polygon in p["polygons"]]
+    planarity, edges, angles = [], [], []
+    for q in polygons:
+        edge = np.roll(q, -1, 0) - q
+        length = np.linalg.norm(edge, axis=1)
+        normal = np.linalg.svd(q - q.mean(0))[2][2]
+        planarity.append(np.abs((q - q.mean(0)) @ normal).max() / length.mean())
+        edges.append(np.abs(length / length.mean() - 1).max())
+        outward = np.cross(q - q[0], edge).sum(0)
+        back = -np.roll(edge, 1, 0)
+        turn = np.arctan2(np.cross(edge, back) @ outward / np.linalg.norm(outward), (edge * back).sum(1))
+        angles.append(np.abs(turn % (2 * np.pi) - (len(q) - 2) * np.pi / len(q)).max())
+    u = result["map"]["log_scale"]
+    cells = [np.array(pattern["vertices"])[face] for face in pattern["faces"]]
+    found = {
+        ("scale_ratio",): np.exp(max(u) - min(u)),
+        ("planarity", "max"): max(planarity),
+        ("planarity", "mean"): np.mean(planarity),
+        ("edge_deviation", "max"): max(edges),
+        ("angle_deviation", "max"): max(angles),
+        ("coverage",): sum(map(_area, polygons)) / sum(map(_area, cells)),
+        ("gap", "tangential", "min"): min(_gaps(result), default=None),
+    }
+    bad = []
+    for path, mine in found.items():
+        theirs: Any = said
+        for name in path:
+            theirs = theirs[name]
+        if (mine is None) != (theirs is None) or (mine is not None and abs(mine - theirs) > 1e-6):
+            bad.append(f"quality.{'.'.join(path)} is {theirs}, the panels say {mine}")
+    if (said["overlaps"] > 0) != bool(overlaps(result)):
+        bad.append(f"quality.overlaps is {said['overlaps']}, the panels say {overlaps(result) or 'none'}")
+    return bad
+
+
+def _area(q: np.ndarray) -> float:
+    """Of the triangles around the middle."""
+    middle = q.mean(0)
+    return float(np.linalg.norm(np.cross(q - middle, np.roll(q, -1, 0) - middle), axis=1).sum() / 2)
+
+
+def _gaps(result: Json) -> list[float]:
+    """Widths between facing edges of neighbours that do not overlap, seen along the mean of their normals."""
+    p, pattern = result["panels"], result["pattern"]
+    of = {f: i for i, f in enumerate(p["face"])}
+    widths = []
+    for f, row in enumerate(pattern["neighbours"]):
+        for k, h in enumerate(row):
+            if h < f or f not in of or h not in of:
+                continue
+            face, other = pattern["faces"][f], pattern["faces"][h]
+            a, b = face[k], face[(k + 1) % len(face)]
+            j = next((j for j, v in enumerate(other) if v == b and other[(j + 1) % len(other)] == a), None)
+            if j is None:  # no neighbour there, which check_pattern tells
+                continue
+            axis = np.array(p["normal"][of[f]]) + np.array(p["normal"][of[h]])
+            axis /= np.linalg.norm(axis)
+            e1 = np.linalg.svd(axis[None])[2][1]
+            frame = np.stack([e1, np.cross(axis, e1)], axis=1)
+            sides = []
+            for panel, corner in ((of[f], k), (of[h], j)):
+                q = np.array(p["polygons"][panel])
+                sides.append(shapely.LineString(q[[corner, (corner + 1) % len(q)]] @ frame))
+            widths.append(float(sides[0].distance(sides[1])))
+    return widths
 
 
 def overlaps(result: Json) -> list[str]:

@@ -59,6 +59,7 @@ def test_boundary_conditions_and_kinds_keep_the_contract(live: Live, boundary: o
         *contract.check_map(result),
         *contract.check_pattern(result),
         *contract.check_panels(result, regular=kind == "hex"),
+        *contract.check_quality(result),
     ]
     assert found == []
 
@@ -73,6 +74,7 @@ def test_the_checker_notices_what_is_wrong(live: Live) -> None:
     for polygon in result["panels"]["polygons"]:
         polygon[0][2] += 0.01
     assert contract.check_panels(result)
+    assert contract.check_quality(result)
     result["mesh"]["loops"].reverse()
     result["mesh"]["loops"][0].reverse()
     assert contract.check_mesh(result)
