@@ -196,6 +196,8 @@ def _lift(asked: argparse.Namespace) -> int:
 
 
 def _demo(asked: argparse.Namespace) -> int:
+    if not 0 < asked.port < 65536:
+        raise UsageError(f"--port {asked.port}: must be from 1 to 65535.")
     console = Console(soft_wrap=True)
     try:
         with _progress(quiet=False) as listen:

@@ -158,6 +158,13 @@ def test_a_size_asked_for_takes_the_place_of_the_requests(tmp_path: Path) -> Non
     assert (wanted.around, wanted.edge_length) == (60, None)
 
 
+@pytest.mark.parametrize("port", ["0", "-1", "70000"])
+def test_ports_that_there_are_not_are_status_2(port: str, capsys: pytest.CaptureFixture[str]) -> None:
+    status, told = refusal(["demo", "--port", port], capsys)
+    assert status == 2
+    assert "from 1 to 65535" in told
+
+
 @pytest.mark.parametrize(
     ("given", "words"),
     [
