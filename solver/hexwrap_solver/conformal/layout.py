@@ -146,7 +146,7 @@ def normalise(
     apex = deck.apex
     if apex is not None:
         distance = np.abs(uv - apex)
-        radius = float(np.sqrt(distance[loops[0]].mean() * distance[loops[1]].mean()))
+        radius = float(np.sqrt(distance[loops[0]].mean()) * np.sqrt(distance[loops[1]].mean()))
         far = distance.min() > FAR * np.abs(uv - foot).max()
         moved, deck = _upright(uv, deck, foot) if far else _about(apex, uv, deck, foot)
         return moved, deck, abs(deck.angle) * radius

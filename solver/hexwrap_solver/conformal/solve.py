@@ -14,7 +14,7 @@ from hexwrap_solver.conformal.layout import lay_out
 from hexwrap_solver.conformal.newton import Minimum, minimise
 from hexwrap_solver.conformal.orientation import faithful, positive
 from hexwrap_solver.conformal.robust import solve_with_flips, with_inserted
-from hexwrap_solver.conformal.span import check_span
+from hexwrap_solver.conformal.span import check_reach, check_span
 from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap, Deck, Targets
 from hexwrap_solver.surface.types import Surface
 
@@ -106,6 +106,7 @@ def _map(
         return found
     u = found.log_scale
     mean = _mean_on_boundary(found.surface, u) if keep_boundary else _mean_on_area(found.surface, u)
+    check_reach(u - mean, found.deck.angle)
     return _scaled(found, -mean)
 
 

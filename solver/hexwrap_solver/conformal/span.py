@@ -2,22 +2,46 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from hexwrap_solver.arrays import Floats
 from hexwrap_solver.errors import ConvergenceError
 
-#: The largest difference of u that a layout in double precision can show: e^36 is 4e15.
+#: The largest difference of u that a layout in double precision can show where places have no centre: e^36
+#: is 4e15.
 MAX_SPAN = 36.0
+#: Cones have a centre, their apex at the origin, and every place keeps all its digits relative to it, down to
+#: the smallest doubles. |u| up to this leaves room for products of two lengths: e^600 is 4e260.
+MAX_REACH = 300.0
+#: Cone angles nearer than this to a multiple of 2π have an apex, but one that is not known to all digits.
+CLEAR = 1e-3
+
+
+def largest_span(cone_angle: float) -> float:
+    """The largest difference of u that a domain of this cone angle can show."""
+    return 2 * MAX_REACH if abs(math.remainder(cone_angle, 2 * math.pi)) > CLEAR else MAX_SPAN
 
 
 def check_span(u: Floats, cone_angle: float) -> None:
     """Raises ConvergenceError where the domain would have finer parts than its coordinates have digits."""
     span = float(np.ptp(u))
-    if span > MAX_SPAN:
-        raise ConvergenceError(
-            f"Under this boundary condition (cone angle {np.degrees(cone_angle):.4g}°) the map would shrink "
-            f"some parts of the surface about 10^{span / np.log(10):.0f} times as much as others, more than "
-            "the 16 digits of a coordinate can tell apart; ask for a smaller cone angle, or cut the surface "
-            "where it is long and thin."
-        )
+    most = largest_span(cone_angle)
+    if span > most:
+        held = "the 16 digits of a coordinate" if most == MAX_SPAN else "the range of double precision"
+        _refuse(span, cone_angle, f"more than {held} can tell apart")
+
+
+def check_reach(u: Floats, cone_angle: float) -> None:
+    """Raises ConvergenceError where lengths or areas in the domain would leave the range of doubles."""
+    if float(np.abs(u).max()) > MAX_REACH:
+        _refuse(float(np.ptp(u)), cone_angle, "beyond the range of double precision")
+
+
+def _refuse(span: float, cone_angle: float, why: str) -> None:
+    raise ConvergenceError(
+        f"Under this boundary condition (cone angle {np.degrees(cone_angle):.4g}°) the map would shrink "
+        f"some parts of the surface about 10^{span / np.log(10):.0f} times as much as others, {why}; ask for "
+        "a smaller cone angle, or cut the surface where it is long and thin."
+    )

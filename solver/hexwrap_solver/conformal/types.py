@@ -109,7 +109,7 @@ class ConformalMap:
     circumference: length of one turn: |translation| on a cylinder; on a cone |K| × apex distance of its
     middle ring (the geometric mean of the loops' mean distances).
     residual: max |angle sum − target|. flips: number of edges flipped; inserted: number of vertices inserted.
-    closing_error: largest disagreement of the layout around the annulus / circumference.
+    closing_error: largest disagreement of the layout around the annulus / length of one turn.
     notes: sentences for the user.
     """
 

@@ -31,6 +31,9 @@ from hexwrap_solver.surface.projection import project, start_parameters
 #: Relative error of an edge length asked for that calls for a second attempt.
 CLOSE = 0.005
 
+#: Above so many cells nobody wants to read their number digit by digit.
+MANY = 1e12
+
 #: Rounding of the layout, relative to its extent; points this near to an edge count as on it.
 REACH = 1e-11
 
@@ -97,7 +100,7 @@ def _check_count(layout: Layout, settings: PatternSettings) -> None:
     cells = area / layout.lattice.cell_area
     if cells > settings.max_cells:
         raise PatternError(
-            f"About {cells:,.0f} cells would be needed, over the limit of {settings.max_cells:,}: ask for "
+            f"About {cells:{',.0f' if cells < MANY else '.0e'}} cells would be needed, over the limit of {settings.max_cells:,}: ask for "
             "a larger edge length or fewer cells around.",
             data={"cells": int(cells), "limit": settings.max_cells},
         )

@@ -17,7 +17,6 @@ from hexwrap_solver.conformal.factor import Factorisation
 from hexwrap_solver.conformal.robust.delaunay import make_delaunay
 from hexwrap_solver.conformal.robust.metric import Metric, angle_sums, edge_weights, measure
 from hexwrap_solver.conformal.robust.mirror import MirrorMesh
-from hexwrap_solver.conformal.span import MAX_SPAN
 from hexwrap_solver.errors import ConvergenceError
 
 MAX_STEPS = 200
@@ -32,7 +31,7 @@ ROUNDING = 1e-14
 #: Added to the diagonal, relative to it and to 1, one after the other until the Hessian is definite: in exact
 #: arithmetic it always is.
 LIFTS = (0.0, 1e-9, 1e-6)
-#: Newton may overshoot, but not by so much, where the answer lies within MAX_SPAN.
+#: Newton may overshoot, but not by so much, where the answer is of use.
 RUNAWAY = 2.0
 #: Above this the answer is not accepted. Needles of 1e-4 degrees have rounding of 1e-9 in their angles.
 ACCEPTED = 1e-8
@@ -111,8 +110,11 @@ class _System:
         )
 
 
-def descend(energy: FlipEnergy, start: Floats, progress: Progress) -> Descent:
-    """Minimises from ``start`` (n,) until rounding stops it; see ``residual`` for how far it got."""
+def descend(energy: FlipEnergy, start: Floats, span: float, progress: Progress) -> Descent:
+    """Minimises from ``start`` (n,) until rounding stops it; see ``residual`` for how far it got.
+
+    span: how far the values of u may lie apart in an answer of any use.
+    """
     x = energy.plain.unknowns_of(start)
     metric, gradient = energy.at(x)
     tolerance = ROUNDING * np.sqrt(len(x))
@@ -131,7 +133,7 @@ def descend(energy: FlipEnergy, start: Floats, progress: Progress) -> Descent:
             x, metric, gradient = step
         if not gained and residual <= ACCEPTED:
             break  # nothing but rounding is left
-        if np.ptp(x) > RUNAWAY * MAX_SPAN:
+        if np.ptp(x) > RUNAWAY * span:
             break  # no use to follow it further
     metric, gradient = energy.at(x)
     return Descent(energy.plain.scale_of(x), metric, _largest(gradient), iterations, energy.flips)

@@ -8,16 +8,19 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import breadth_first_order
 
-from hexwrap_solver.arrays import Complexes, Ints
+from hexwrap_solver.arrays import Complexes, Floats, Ints
+from hexwrap_solver.conformal.layout import FULL_TURN
 from hexwrap_solver.conformal.robust.metric import Metric
 from hexwrap_solver.conformal.robust.mirror import MirrorMesh
+from hexwrap_solver.conformal.types import Deck
 
 
 @dataclass(frozen=True)
 class Development:
     """uv: (n,) one copy of each vertex. lift: (n,) how many turns lie between that copy and the one that
     ``MirrorMesh.turn`` counts from: along a half-edge from v to w with turn c, from the copy uv[v],
-    lies g^{lift[v] + c − lift[w]}(uv[w]). translation: that of g. gap: greatest disagreement of any edge."""
+    lies g^{lift[v] + c − lift[w]}(uv[w]). translation: that of g. gap: greatest disagreement of any edge,
+    relative to the length of one turn where it lies."""
 
     uv: Complexes
     lift: Ints
@@ -55,8 +58,20 @@ def develop(mesh: MirrorMesh, metric: Metric, cone_angle: float) -> Development:
     forward = power[near] >= 0  # compare with g or with nothing; backward edges are the twins of forward ones
     near = near[forward]
     copy = np.where(power[near] == 1, rotation * uv[head[near]] + translation, uv[head[near]])
-    gap = float(np.abs(uv[tail[near]] + step[near] - copy).max())
+    around = _around(uv, Deck(cone_angle, translation))
+    around = np.maximum(around[tail[near]], around[head[near]])
+    gap = float((np.abs(uv[tail[near]] + step[near] - copy) / around).max())
     return Development(uv, lift, translation, gap)
+
+
+def _around(uv: Complexes, deck: Deck) -> Floats:
+    """(n,) length of one turn at each place."""
+    apex = deck.apex
+    if apex is not None:
+        return np.asarray(abs(deck.angle) * np.abs(uv - apex))
+    if abs(deck.angle) < FULL_TURN:
+        return np.full(len(uv), abs(deck.translation))
+    return np.full(len(uv), abs(deck.angle) * float(np.abs(uv - uv.mean()).mean()))
 
 
 def _translation(

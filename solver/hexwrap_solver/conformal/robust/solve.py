@@ -14,9 +14,9 @@ from hexwrap_solver.conformal.energy import Energy, opposite_lengths
 from hexwrap_solver.conformal.layout import normalise
 from hexwrap_solver.conformal.orientation import misdrawn
 from hexwrap_solver.conformal.robust.delaunay import make_delaunay
-from hexwrap_solver.conformal.robust.descent import ACCEPTED, FlipEnergy, descend
+from hexwrap_solver.conformal.robust.descent import ACCEPTED, Descent, FlipEnergy, descend
 from hexwrap_solver.conformal.robust.develop import develop
-from hexwrap_solver.conformal.robust.metric import angle_sums
+from hexwrap_solver.conformal.robust.metric import Metric, angle_sums
 from hexwrap_solver.conformal.robust.mirror import mirror_mesh
 from hexwrap_solver.conformal.robust.refine import (
     Problem,
@@ -27,7 +27,7 @@ from hexwrap_solver.conformal.robust.refine import (
     spread,
 )
 from hexwrap_solver.conformal.robust.straight import straighten
-from hexwrap_solver.conformal.span import check_span
+from hexwrap_solver.conformal.span import MAX_SPAN, check_reach, check_span, largest_span
 from hexwrap_solver.conformal.types import ConformalMap, Deck, Targets
 from hexwrap_solver.errors import ConvergenceError
 from hexwrap_solver.surface.types import Surface
@@ -107,14 +107,16 @@ def _uncollapse(problem: Problem) -> Problem:
 def _attempt(problem: Problem, progress: Progress) -> ConformalMap:
     """The map of the vertices, with the triangles as they are, whether they turn over or not."""
     surface, targets = problem.surface, problem.targets
+    free = bool((targets.tie == 0).any() and len(targets.tie_angle) == 1)  # the cone angle comes out
     turn = _turns(surface)
     log_length = np.log(opposite_lengths(surface.vertices, surface.faces))[[2, 0, 1]].T.ravel()
     unit = float(np.median(log_length))  # logarithms near 0 have the most digits behind the point
     mesh = mirror_mesh(surface, log_length - unit, turn.ravel())
     flips = make_delaunay(mesh, np.zeros(mesh.n), euclidean=True)
-    descent = descend(FlipEnergy(Energy(surface, targets), mesh), problem.u, progress)
+    span = MAX_SPAN if free else largest_span(cone_angle_of(targets, targets.angle, surface))
+    descent = descend(FlipEnergy(Energy(surface, targets), mesh), problem.u, span, progress)
     sums = angle_sums(mesh, descent.metric)
-    known = sums if (targets.tie == 0).any() else targets.angle
+    known = sums if free else targets.angle
     angle = cone_angle_of(targets, known, surface)
     check_span(descent.u, angle)
     if not descent.residual <= ACCEPTED:
@@ -123,8 +125,10 @@ def _attempt(problem: Problem, progress: Progress) -> ConformalMap:
             f"{descent.residual:.1e} rad off: double precision cannot hold the map of this surface; "
             "remesh it more evenly."
         )
+    u, metric = _centred(descent, targets)
+    check_reach(u, angle)
     foot = int(surface.loops[0][0])
-    laid = develop(mesh, descent.metric, angle)
+    laid = develop(mesh, metric, angle)
     uv, deck, circumference = normalise(
         laid.uv * np.exp(unit), Deck(angle, laid.translation * np.exp(unit)), foot, surface.loops
     )
@@ -134,7 +138,7 @@ def _attempt(problem: Problem, progress: Progress) -> ConformalMap:
     sheet[:, 2] -= turn[:, 2]
     return ConformalMap(
         surface=surface,
-        log_scale=descent.u,
+        log_scale=u,
         uv=straighten(surface, targets, uv, sheet, deck),
         sheet=sheet,
         deck=deck,
@@ -143,8 +147,16 @@ def _attempt(problem: Problem, progress: Progress) -> ConformalMap:
         iterations=descent.iterations,
         residual=descent.residual,
         flips=flips + descent.flips,
-        closing_error=laid.gap * float(np.exp(unit)) / circumference,
+        closing_error=laid.gap,
     )
+
+
+def _centred(descent: Descent, targets: Targets) -> tuple[Floats, Metric]:
+    """u and its metric, shifted to the middle of the doubles where u has a free constant."""
+    if (targets.tie == 0).any():
+        return descent.u, descent.metric
+    middle = float(descent.u.min() + descent.u.max()) / 2
+    return descent.u - middle, replace(descent.metric, length=descent.metric.length - middle)
 
 
 def _told(found: ConformalMap, surface: Surface, iterations: int) -> ConformalMap:
