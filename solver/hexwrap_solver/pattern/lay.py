@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -31,8 +32,10 @@ from hexwrap_solver.surface.projection import project, start_parameters
 #: Relative error of an edge length asked for that calls for a second attempt.
 CLOSE = 0.005
 
-#: Above so many cells nobody wants to read their number digit by digit.
+#: Above so many cells, where the map is STEEP, it is the map that does not suit, not the size of the cells.
 MANY = 1e12
+#: Differences of u that alone make so many: areas e^24 = 3e10 times as large as others.
+STEEP = 12.0
 
 #: Rounding of the layout, relative to its extent; points this near to an edge count as on it.
 REACH = 1e-11
@@ -65,7 +68,7 @@ def _lay(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings, progre
     placement = place_lattice(cmap, lattice, settings)
     progress(0.1, "placing the lattice")
     layout = layout_of(cmap, lattice, placement)
-    _check_count(layout, settings)
+    _check_count(cmap, layout, settings)
     nodes = find_nodes(layout)
     if not nodes.n:
         raise _too_coarse(placement)
@@ -94,13 +97,20 @@ def layout_of(cmap: ConformalMap, lattice: Lattice, placement: Placement) -> Lay
     return Layout(corners, cover_of(cmap), lattice, placement.motion, reach)
 
 
-def _check_count(layout: Layout, settings: PatternSettings) -> None:
-    p, q, r = layout.corners.T
+def _check_count(cmap: ConformalMap, layout: Layout, settings: PatternSettings) -> None:
+    extent = float(abs(layout.corners).max())
+    p, q, r = layout.corners.T / extent  # on cones that shrink beyond all measure areas would overflow
     area = float((abs(((q - p).conj() * (r - p)).imag) / 2).sum())
-    cells = area / layout.lattice.cell_area
+    cells = min(area / layout.lattice.cell_area * extent * extent, sys.float_info.max)
+    if cells > MANY and np.ptp(cmap.log_scale) > STEEP:
+        raise PatternError(
+            f"About {cells:.0e} cells would be needed: under this boundary condition the map shrinks some "
+            "parts of the surface far too much for cells of one size; ask for a smaller cone angle.",
+            data={"cells": cells, "limit": settings.max_cells},
+        )
     if cells > settings.max_cells:
         raise PatternError(
-            f"About {cells:{',.0f' if cells < MANY else '.0e'}} cells would be needed, over the limit of {settings.max_cells:,}: ask for "
+            f"About {cells:,.0f} cells would be needed, over the limit of {settings.max_cells:,}: ask for "
             "a larger edge length or fewer cells around.",
             data={"cells": int(cells), "limit": settings.max_cells},
         )

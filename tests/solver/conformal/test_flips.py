@@ -11,12 +11,14 @@ from hexwrap_solver.arrays import Floats
 from hexwrap_solver.conformal import boundary, conformal_map
 from hexwrap_solver.conformal.cut import cut_open
 from hexwrap_solver.conformal.energy import Energy, opposite_lengths
+from hexwrap_solver.conformal.robust import solve as robust
 from hexwrap_solver.conformal.robust import solve_with_flips
 from hexwrap_solver.conformal.robust.delaunay import cosine_sums, make_delaunay
 from hexwrap_solver.conformal.robust.descent import FlipEnergy
 from hexwrap_solver.conformal.robust.metric import angle_sums, measure
 from hexwrap_solver.conformal.robust.mirror import MirrorMesh, mirror_mesh
 from hexwrap_solver.conformal.types import BoundaryCondition
+from hexwrap_solver.errors import ConvergenceError
 from hexwrap_solver.surface.types import Surface
 from tests.solver.conformal.annuli import bump, catenoid
 from tests.solver.conformal.checks import faults
@@ -161,3 +163,12 @@ def test_refinement_stays_on_the_surface_and_tells() -> None:
 def _area(surface: Surface) -> float:
     a, b, c = (surface.vertices[surface.faces[:, k]] for k in range(3))
     return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
+
+
+def test_refinement_without_end_is_told_with_the_sent_vertices(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(robust, "MAX_ROUNDS", 1)
+    surface = TORTURE["retriangulated"](np.random.default_rng(0))
+    with pytest.raises(ConvergenceError, match="remesh it") as caught:
+        conformal_map(surface, BoundaryCondition())
+    assert caught.value.vertices
+    assert set(caught.value.vertices) <= set(surface.input_vertex.tolist())

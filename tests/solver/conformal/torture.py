@@ -329,6 +329,20 @@ def densified(surface: Surface, random: Random) -> BoundaryCondition:
     return _listed(surface, np.concatenate(pairs), np.array([1, 11, 11, 1]) * np.pi / 6)
 
 
+def extreme(surface: Surface, random: Random) -> BoundaryCondition:
+    """Up to five angles from 0.1 to 6.5 rad per loop that happen to obey Gauss–Bonnet."""
+    while True:
+        chosen = [
+            random.choice(loop, int(random.integers(1, min(6, len(loop)))), replace=False)
+            for loop in surface.loops
+        ]
+        vertices = np.concatenate(chosen)
+        angles = random.uniform(0.1, 6.5, len(vertices))
+        angles[-1] += (np.pi - angles).sum()
+        if 0.1 < angles[-1] < 6.5:
+            return _listed(surface, vertices, angles)
+
+
 def _listed(surface: Surface, vertices: Ints, angles: Floats) -> BoundaryCondition:
     return BoundaryCondition("angles", vertices=surface.input_vertex[vertices], angles=angles)
 

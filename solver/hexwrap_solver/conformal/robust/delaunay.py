@@ -25,6 +25,8 @@ from hexwrap_solver.errors import ConvergenceError
 #: An edge passes whose cosines add up to more than −TOLERANCE times the terms that they are made of: rounding
 #: must not flip it to and fro.
 TOLERANCE = 2e-14
+#: Logarithms above this size have rounding that exceeds it, in proportion to their size.
+LARGE = 10.0
 #: Height over base of a triangle whose lengths are those of a flat one to rounding.
 FLATTEST = 1e-14
 #: Rounds of independent flips before something must be wrong; meshes seen so far need some dozens.
@@ -83,9 +85,10 @@ def make_delaunay(mesh: MirrorMesh, u: Floats, *, euclidean: bool = False) -> in
     length = mesh.scaled(u)
     edges = np.arange(len(length))
     total = 0
+    tolerance = TOLERANCE * max(1.0, float(np.abs(length).max()) / LARGE)
     for _ in range(MAX_ROUNDS):
         cosines, terms = cosine_sums(mesh, edges, length)
-        bad = edges[cosines < -TOLERANCE * (1 + terms)]
+        bad = edges[cosines < -tolerance * (1 + terms)]
         if not len(bad):
             return total
         now, claims = _independent(mesh, bad)

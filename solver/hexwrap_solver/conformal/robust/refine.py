@@ -25,8 +25,8 @@ HASTE = 3
 #: Edges are split between these places of their length.
 WITHIN = (0.02, 0.98)
 MIDDLE = (0.3, 0.7)
-#: From this ratio of target and angle on, a boundary vertex counts as opened wide.
-OPENED = 1.5
+#: From this ratio of target and angle on, and with so much of the target, a corner counts as opened wide.
+OPENED, BROAD = 1.5, 0.25 * np.pi
 #: Opposite angles that add up to more than this call for a split, radians.
 FLAT = np.deg2rad(210.0)
 #: Rounds of it between two solutions.
@@ -244,7 +244,7 @@ def split_places(surface: Surface, targets: Targets, wrong: Ints, attempt: int) 
     corner = surface.vertices[surface.faces[wrong]]
     along = np.roll(corner, -1, axis=1) - corner
     length = np.linalg.norm(along, axis=2)
-    opened = _opened(surface, targets)[surface.faces[wrong]]
+    opened = _opened(surface, targets)[wrong]
     side = np.where(opened.sum(axis=1) == 1, (opened.argmax(axis=1) + 1) % 3, length.argmax(axis=1))
     rows = np.arange(len(wrong))
     edge = along[rows, side]
@@ -277,10 +277,9 @@ def shells(surface: Surface, wrong: Ints, sent: int) -> tuple[Ints, Floats]:
 
 
 def _opened(surface: Surface, targets: Targets) -> Bools:
-    """(n,) boundary vertices whose target is well above their angle on the surface."""
-    angles = corner_angles(opposite_lengths(surface.vertices, surface.faces)).angle
-    sums = np.bincount(surface.faces.T.ravel(), weights=angles.ravel(), minlength=len(surface.vertices))
-    opened = (targets.tie < 0) & (targets.angle > OPENED * sums)
-    inner = np.ones(len(sums), dtype=bool)
-    inner[np.concatenate(surface.loops)] = False
-    return np.asarray(opened & ~inner)
+    """(m, 3) corners that the map opens wide: at vertices whose target is well above their angle on the
+    surface, and where what the corner gets of it is wide. Narrow corners of a fan need no finer fan."""
+    angle = corner_angles(opposite_lengths(surface.vertices, surface.faces)).angle.T
+    sums = np.bincount(surface.faces.ravel(), weights=angle.ravel(), minlength=len(surface.vertices))
+    ratio = np.where(targets.tie < 0, targets.angle / sums, 0.0)[surface.faces]
+    return np.asarray((ratio > OPENED) & (ratio * angle > BROAD))

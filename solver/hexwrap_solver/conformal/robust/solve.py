@@ -38,7 +38,7 @@ MAX_ROUNDS = 40
 #: vertices every so many rounds; where there are more of them, it is no cascade around single vertices.
 PATIENCE, FEW, SHELLS = 8, 4, 4
 #: Refinement that makes more than so many times the vertices, and so many more, does not come to an end.
-MOST, MOST_MORE = 2, 1000
+MOST, MOST_MORE = 2, 4000
 REFINED = "The mesh was refined:"
 
 
@@ -82,9 +82,9 @@ def solve_with_flips(
     inserted = len(problem.surface.vertices) - len(surface.vertices)
     raise ConvergenceError(
         f"After {attempt + 1} rounds of refinement with {inserted} new vertices {len(wrong)} triangles still "
-        "turn over in the domain: the surface is finer in places than double precision can hold; remesh it "
-        "more evenly.",
-        vertices=_sent(problem.surface, wrong),
+        "turn over in the domain: around the named vertices the mesh does not suit the boundary angles; "
+        "remesh it more evenly and finer there, or ask for angles nearer to 180°.",
+        vertices=_sent(surface, problem.parent[wrong]),
     )
 
 

@@ -1,0 +1,76 @@
+"""Cones whose parts differ in scale by far more than the digits of a coordinate."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hexwrap_solver.arrays import Floats
+from hexwrap_solver.conformal import conformal_map
+from hexwrap_solver.conformal.types import BoundaryCondition
+from hexwrap_solver.errors import ConvergenceError, PatternError
+from hexwrap_solver.panels import measure
+from hexwrap_solver.pattern import lay_pattern
+from hexwrap_solver.pattern.types import PatternSettings
+from hexwrap_solver.surface.types import Surface
+from tests.solver.conformal.annuli import grid
+from tests.solver.conformal.checks import faults
+
+AROUND = 6
+#: Rows are so many times as high as quads are wide.
+HIGH = 20.0
+
+
+def tube(rows: int) -> Surface:
+    """A prism over a regular hexagon of side 1."""
+
+    def place(phi: Floats, s: Floats) -> Floats:
+        return np.stack([np.cos(phi), np.sin(phi), HIGH * rows * s], axis=1)
+
+    return grid(AROUND, rows, place)
+
+
+def cone(surface: Surface, angle: float) -> BoundaryCondition:
+    """The cone angle spread evenly over all vertices of both loops."""
+    each = np.repeat([np.pi - angle / AROUND, np.pi + angle / AROUND], AROUND)
+    vertices = surface.input_vertex[np.concatenate(surface.loops)]
+    return BoundaryCondition("angles", vertices=vertices, angles=each)
+
+
+def growth(angle: float) -> float:
+    """log(outer / inner radius) of one row: rectangles 1 × HIGH become isosceles trapezoids p, q = ρp with
+    legs HIGH √(pq), as u is constant on rings, so √ρ − 1/√ρ = 2 HIGH sin(K / 2n)."""
+    return float(2 * np.arcsinh(HIGH * np.sin(angle / (2 * AROUND))))
+
+
+@pytest.mark.parametrize(("angle", "rows"), [(np.pi / 3, 200), (-np.pi / 3, 200), (3.0, 80)])
+def test_radii_of_a_tubes_rings_are_in_geometric_progression(angle: float, rows: int) -> None:
+    surface = tube(rows)
+    found = conformal_map(surface, cone(surface, angle))
+    assert faults(found) == []
+    assert np.ptp(found.log_scale) > 300
+    rings = surface.vertices[:, 2] / HIGH
+    radii = np.log(np.abs(found.uv[: len(rings)]))
+    slope, _ = np.polyfit(rings, radii, 1)
+    assert abs(slope) == pytest.approx(abs(growth(angle)), rel=1e-9)
+    np.testing.assert_allclose(radii - radii[0], slope * (rings - rings[0]), atol=1e-6)
+    assert found.closing_error < 1e-6
+    assert 0 < found.circumference < np.inf
+    assert np.log(measure(found, None, None).scale_ratio) == pytest.approx(np.ptp(found.log_scale))
+
+
+def test_patterns_on_them_are_refused_for_what_the_map_does() -> None:
+    surface = tube(200)
+    found = conformal_map(surface, cone(surface, np.pi / 3))
+    for settings in (PatternSettings(), PatternSettings(around=6), PatternSettings(edge_length=5.0)):
+        with pytest.raises(PatternError, match="smaller cone angle"):
+            lay_pattern(found, settings)
+
+
+def test_beyond_the_doubles_and_without_an_apex_the_limits_are_named() -> None:
+    surface = tube(300)
+    with pytest.raises(ConvergenceError, match="range of double precision"):
+        conformal_map(surface, cone(surface, np.pi / 3))
+    surface = tube(40)
+    with pytest.raises(ConvergenceError, match="16 digits"):
+        conformal_map(surface, cone(surface, 2 * np.pi))
