@@ -13,7 +13,7 @@ from hexwrap_solver.panels import limits
 from hexwrap_solver.panels.best import jointly_largest
 from hexwrap_solver.panels.energy import minimise_watertight
 from hexwrap_solver.panels.halfedges import HalfEdges, half_edges
-from hexwrap_solver.panels.polygons import fan_areas, mean_edges, means
+from hexwrap_solver.panels.polygons import edge_lengths, fan_areas, mean_edges, means, row_minima
 from hexwrap_solver.panels.poses import fit_poses, target_lengths
 from hexwrap_solver.panels.regular import Poses
 from hexwrap_solver.panels.separation import Separation, separating_planes
@@ -28,6 +28,9 @@ CORNERS = {"hex": 6, "quad": 4, "triangle": 3}
 
 #: A trimmed cell that would have to shrink below this fraction of itself gets no panel.
 LEAST_TRIMMED = 0.05
+
+#: An edge shorter than this fraction of its panel's mean edge has collapsed.
+LEAST_EDGE = 0.01
 
 
 @dataclass(frozen=True)
@@ -128,7 +131,20 @@ def _fit_watertight(
         whole=pattern.whole,
         cell_area=fan_areas(_corner_points(pattern)),
         energy=energy,
-        notes=WATERTIGHT_NOTES,
+        notes=WATERTIGHT_NOTES + collapsed_note(shapes),
+    )
+
+
+def collapsed_note(shapes: Ragged) -> tuple[str, ...]:
+    """Says so where flatness was bought with edges that have all but vanished."""
+    length, mean = edge_lengths(shapes), mean_edges(shapes)
+    shortest = row_minima(length / mean[shapes.row], shapes.offsets)
+    count = int(np.sum(shortest < LEAST_EDGE))
+    if not count:
+        return ()
+    return (
+        f"Watertight panels with an edge shorter than {LEAST_EDGE:.0%} of their mean edge: {count}; flatness"
+        " took a corner away there: give planarity less weight, or angle and edge more, or ask for split panels.",
     )
 
 

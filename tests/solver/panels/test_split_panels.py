@@ -10,8 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from hexwrap_solver.arrays import Ragged
 from hexwrap_solver.errors import PanelsError
 from hexwrap_solver.panels import fit_panels, measure, quantize, rationalize
+from hexwrap_solver.panels.fit import collapsed_note
 from hexwrap_solver.panels.limits import inscribed
 from hexwrap_solver.panels.regular import nearest_regular
 from hexwrap_solver.panels.tangents import surface_normals
@@ -84,6 +86,14 @@ def test_targets_are_ordered():
     }
     assert (limit["shortest"] <= limit["inscribed"] * (1 + 1e-12)).all()
     assert limit["shortest"].mean() < limit["inscribed"].mean() < limit["mean"].mean()
+
+
+def test_watertight_panels_that_lost_an_edge_are_told():
+    square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    narrow = square * [1.0, 1e-4, 1.0]
+    assert collapsed_note(Ragged.from_table(np.stack([square, square]))) == ()
+    (note,) = collapsed_note(Ragged.from_table(np.stack([square, narrow])))
+    assert "of their mean edge: 1;" in note
 
 
 def test_joints_that_mean_panels_cannot_keep_are_told():
