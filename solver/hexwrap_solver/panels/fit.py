@@ -144,7 +144,7 @@ def collapsed_note(shapes: Ragged) -> tuple[str, ...]:
         return ()
     return (
         f"Watertight panels with an edge shorter than {LEAST_EDGE:.0%} of their mean edge: {count}; flatness"
-        " took a corner away there: give planarity less weight, or angle and edge more, or ask for split panels.",
+        " took a corner away there: give planarity less weight, or angle and edge more, or ask for split.",
     )
 
 
