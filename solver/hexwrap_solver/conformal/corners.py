@@ -137,7 +137,9 @@ def _close(
     """Spreads the small rest of equation (1)."""
     free = [loop[~listed[loop]] for loop in surface.loops]
     rest = _rest_per_loop(sums, quantum)
-    if rest is None or any(len(f) == 0 and r for f, r in zip(free, rest, strict=True)):
+    if rest is not None:  # where every vertex of a loop is listed, all of them give way
+        free = [f if len(f) else loop for f, loop in zip(free, surface.loops, strict=True)]
+    else:
         if not any(len(f) for f in free):
             free = list(surface.loops)  # every vertex is listed: all of them give way
         count = np.array([len(f) for f in free])

@@ -140,3 +140,17 @@ def test_an_entry_without_a_place() -> None:
     condition = BoundaryCondition("angles", vertices=np.array([-1]), angles=np.array([3.0]))
     with pytest.raises(BoundaryError, match="neither a vertex nor a point"):
         boundary_angles(SURFACE, condition)
+
+
+@pytest.mark.parametrize("all_of", [(0,), (1,), (0, 1)])
+def test_a_loop_whose_vertices_are_all_listed_gives_way_to_the_quantum(all_of: tuple[int, ...]) -> None:
+    """Angles typed with four digits: K must still be a multiple, or no pattern closes up."""
+    surface = bump(24, 8)
+    vertices = np.concatenate([loop if k in all_of else loop[:3] for k, loop in enumerate(surface.loops)])
+    loop_of = np.isin(vertices, surface.loops[1]).astype(int)
+    counts = np.bincount(loop_of)
+    angles = np.round(np.pi + np.array([-1, 1])[loop_of] * np.pi / 3 / counts[loop_of], 5)
+    condition = BoundaryCondition("angles", vertices=vertices, angles=angles, quantum=np.pi / 3)
+    first, second = boundary_angles(surface, condition)
+    assert (np.pi - first).sum() == pytest.approx(np.pi / 3, abs=1e-12)
+    assert (np.pi - second).sum() == pytest.approx(-np.pi / 3, abs=1e-12)
