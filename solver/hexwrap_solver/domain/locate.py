@@ -12,6 +12,9 @@ from hexwrap_solver.conformal.types import ConformalMap
 #: A place this far outside of a triangle, in barycentric coordinates, still counts as on its edge.
 ON_EDGE = 1e-9
 
+#: Buckets beyond these are empty: sizes of triangles differ by less, and places farther off are outside.
+FARTHEST = 2.0**31
+
 #: Sheets tried to either side when g is a translation much shorter than the domain.
 FEW_SHEETS = 64
 
@@ -73,9 +76,8 @@ class TriangleIndex:
         weights = np.zeros((len(places), 3))
         depth = np.full(len(places), -ON_EDGE)
         for level in self.levels:
-            bucket = np.floor(
-                (np.stack([places.real, places.imag], axis=1) - self.origin) / level.side
-            ).astype(np.int64)
+            bucket = np.floor((np.stack([places.real, places.imag], axis=1) - self.origin) / level.side)
+            bucket = np.clip(bucket, -FARTHEST, FARTHEST).astype(np.int64)
             key = _pack(bucket[:, 0], bucket[:, 1])
             start, end = (np.searchsorted(level.key, key, side=side) for side in ("left", "right"))
             place, step = runs(end - start)
