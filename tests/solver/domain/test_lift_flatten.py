@@ -58,3 +58,8 @@ def test_places_outside_are_told():
     assert up.inside.tolist() == [False] * len(beyond) + [True] * 3 + [False]
     assert np.isnan(up.points[~up.inside]).all()
     assert np.isfinite(up.points[up.inside]).all()
+
+
+@pytest.mark.parametrize("k", CONES)
+def test_places_at_any_distance_are_outside(k):
+    assert not lift(CONES[k], np.array([1e30, 1e30j, -1e300, complex(0, np.inf)])).inside.any()
