@@ -52,7 +52,7 @@ def place_on_cylinder(
     T = options[pick]
     along = complex(lattice.position(T))
     around = int(lattice.cells_around(T))
-    notes = _told(lattice, settings, angle, around, along)
+    notes = _told(lattice, angle, along)
     if loops and settings.phase[1]:
         notes.append("phase moves the pattern only around: its rows are bound to the boundary.")
     scale = abs(along) / strip.length
@@ -128,14 +128,8 @@ def _heights(strip: _Strip, rows: Rows, settings: PatternSettings, loops: list[i
     return line + (strip.place.imag - strip.height[loop]) * scale
 
 
-def _told(
-    lattice: Lattice, settings: PatternSettings, angle: float, around: int, along: complex
-) -> list[str]:
+def _told(lattice: Lattice, angle: float, along: complex) -> list[str]:
     notes = []
-    if settings.around is not None and around != settings.around:
-        notes.append(
-            f"{around} cells around instead of {settings.around}: the nearest number that closes up."
-        )
     taken = angle_taken(lattice, along, angle)
     if abs(taken - angle) > 1e-9:
         notes.append(

@@ -50,6 +50,10 @@ def lay_pattern(cmap: ConformalMap, settings: PatternSettings, progress: Progres
     lattice = LATTICES[settings.kind]
     settings, notes = with_rotation(cmap, lattice, settings)
     pattern = _lay(cmap, lattice, settings, progress)
+    if settings.around is not None and pattern.around != settings.around:
+        notes.append(
+            f"{pattern.around} cells around instead of {settings.around}: the nearest that closes up."
+        )
     wanted = settings.edge_length
     if wanted is not None and abs(pattern.edge_length / wanted - 1) > CLOSE:
         corrected = replace(settings, edge_length=wanted**2 / pattern.edge_length)

@@ -136,3 +136,17 @@ def test_loops_turned_against_each_other_are_not_both_aligned():
 def test_cells_larger_than_the_narrowest_place_are_refused():
     with pytest.raises(PatternError, match="close up"):
         lay_pattern(MAPS["cone"], PatternSettings(around=3))
+
+
+def test_another_number_around_than_asked_for_is_told() -> None:
+    others = 0
+    for name, around in (("cone", 41), ("quads", 37)):
+        cmap = MAPS[name]
+        for align in ("both", "none"):
+            kind = "quad" if name == "quads" else "hex"
+            request = PatternSettings(kind=kind, around=around, align=align, phase=(0.0, 0.9))
+            pattern = lay_pattern(cmap, request)
+            told = any(f"{pattern.around} cells around instead of {around}" in note for note in pattern.notes)
+            assert told == (pattern.around != around)
+            others += told
+    assert others
