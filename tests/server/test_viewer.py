@@ -338,6 +338,46 @@ def test_copied_curl_request_is_the_request(browser, server: Server) -> None:
         assert body["pattern"]["kind"] == "hex"
 
 
+def test_a_failed_job_is_never_shown_on_another_surface(browser, server: Server) -> None:
+    disk = {"vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "faces": [[0, 1, 2]]}
+    with httpx.Client(base_url=server.url, trust_env=False, timeout=60) as client:
+        failed = client.post("/v1/jobs", json={"surface": disk, "name": "disk"}).json()["id"]
+        assert client.get(f"/v1/jobs/{failed}?wait=30").json()["status"] == "failed"
+    with opened(browser, server) as page:
+        page.select_option("#sample", "tower")
+        shown(page)
+        page.locator(f"[data-job='{failed}']").click()
+        page.locator("#banner:visible").wait_for()
+        page.wait_for_function(f"() => {{ {INSIDE} return state.result === null }}")
+        assert page.locator("#files a").count() == page.locator("#quality dd").count() == 0
+        assert page.evaluate("document.documentElement.dataset.shown") is None
+
+
+def test_work_that_stops_early_is_shown_without_complaint(browser, server: Server) -> None:
+    with httpx.Client(base_url=server.url, trust_env=False, timeout=60) as client:
+        tower = client.get("/v1/samples/tower").json()
+        for early in ({"panels": None}, {"panels": None, "pattern": None}):
+            id = client.post("/v1/jobs", json=tower | early).json()["id"]
+            assert client.get(f"/v1/jobs/{id}?wait=60").json()["status"] == "done"
+            with opened(browser, server, f"/#job/{id}") as page:
+                assert shown(page) == id
+                assert page.locator("#quality dd").count() >= 2
+                assert page.complaints == []
+
+
+def test_a_slow_sample_does_not_replace_a_newer_choice(browser, server: Server) -> None:
+    with opened(browser, server) as page:
+        held: list = []
+        page.route("**/v1/samples/waist", lambda route: held.append(route))
+        page.select_option("#sample", "waist")
+        page.select_option("#sample", "tower")
+        first = shown(page)
+        held[0].continue_()
+        page.wait_for_timeout(1500)
+        assert page.evaluate(f"() => {{ {INSIDE} return state.name }}") == "tower"
+        assert page.evaluate("document.documentElement.dataset.shown") == first
+
+
 def test_theme_and_keyboard(browser, server: Server) -> None:
     with opened(browser, server) as page:
         first = page.evaluate("document.documentElement.dataset.theme")

@@ -168,5 +168,5 @@ function upload(file: File): RequestInit {
 
 export const FILES = [
   "panels.obj", "panels.3dm", "panels.dxf", "panels.csv", "flat.dxf",
-  "domain.svg", "panels.png", "result.json", "result.npz",
+  "domain.svg", "domain.dxf", "panels.png", "result.json", "result.npz",
 ];

@@ -123,14 +123,20 @@ async function solve(request = state.surface ? currentRequest() : null): Promise
     const job = await api.submit(request);
     if (turn !== state.turn) return void api.cancel(job.id).catch(() => undefined);
     state.request = request;
-    await follow(job, turn, sameSurface(before));
+    await follow(job, turn, sameSurface());
   } catch (error) {
     if (turn === state.turn) report(error);
   }
 }
 
-let shownSurface: unknown = null;
-const sameSurface = (before: Job | null) => before !== null && shownSurface === state.surface;
+/** The surface that the shown result is of. */
+let shownSurface: Request["surface"] | null = null;
+
+/** Whether the shown result is of the surface that is being worked on; surfaces named by id are compared by it. */
+function sameSurface(): boolean {
+  const { surface } = state;
+  return shownSurface !== null && surface !== null && (shownSurface === surface || (surface.id !== undefined && shownSurface.id === surface.id));
+}
 
 async function follow(job: Job, turn: number, keepView: boolean): Promise<void> {
   banner(null);
@@ -149,10 +155,34 @@ async function follow(job: Job, turn: number, keepView: boolean): Promise<void> 
   setJob(job);
   void drawJobs();
   if (job.status === "failed" && job.problem) throw new ProblemError(job.problem);
-  if (job.status !== "done") return note(`This job was ${job.status}.`);
+  if (job.status !== "done") {
+    if (!sameSurface()) forget();
+    return note(`This job was ${job.status}.`);
+  }
   const result = await api.result(job.id);
   if (turn !== state.turn) return;
   present(job, result, keepView);
+}
+
+/** Nothing to look at any more: what comes next is of another surface. */
+function forget(): void {
+  state.result = null;
+  state.selected = null;
+  shownSurface = null;
+  delete document.documentElement.dataset.shown;
+  space.clear();
+  domain.clear();
+  drawResult();
+}
+
+/** Everything beside the two views. */
+function drawResult(): void {
+  drawColours();
+  drawCharts();
+  drawQuality();
+  drawCard();
+  drawFiles();
+  drawAngles();
 }
 
 function setJob(job: Job): void {
@@ -181,12 +211,7 @@ function present(job: Job, result: Result, keepView: boolean): void {
   note([...(result.mesh.repairs ?? []), ...(result.quality?.notes ?? [])].join(" "));
   space.show(result, keepView);
   domain.show(result, keepView);
-  drawColours();
-  drawCharts();
-  drawQuality();
-  drawCard();
-  drawFiles();
-  drawAngles();
+  drawResult();
   document.documentElement.dataset.shown = job.id;
 }
 
@@ -208,55 +233,59 @@ async function takeFile(file: File): Promise<void> {
   } catch (error) {
     if (turn !== state.turn) return;
     report(error);
-    if (error instanceof ProblemError) await showFaults(file, error.problem);
+    if (error instanceof ProblemError) await showFaults(file, error.problem, turn);
   }
 }
 
 /** The dropped mesh as it was sent, with the faulty vertices, edges and faces in red. */
-async function showFaults(file: File, problem: Problem): Promise<void> {
+async function showFaults(file: File, problem: Problem, turn: number): Promise<void> {
   try {
     const mesh = await api.preview(file);
-    state.result = null;
-    domain.clear();
+    if (turn !== state.turn) return;
+    forget();
     space.showMesh(mesh.vertices, mesh.faces, problem);
     document.documentElement.dataset.shown = "faults";
   } catch {
-    space.clear(); // not even readable: the sentence stands alone
+    if (turn === state.turn) forget(); // not even readable: the sentence stands alone
   }
 }
 
 async function takeSample(name: string): Promise<void> {
   if (!name) return;
+  const turn = ++state.turn;
   try {
     const request = await api.sample(name);
+    if (turn !== state.turn) return;
     state.surface = request.surface;
     state.name = request.name ?? name;
     state.corners = [];
     adopt(request);
     await solve(request);
-    if (state.result && request.boundary?.mode === "angles") {
-      adoptCorners(request, state.result);
-      drawAngles();
-    }
+    showCorners(request);
   } catch (error) {
-    report(error);
+    if (turn === state.turn) report(error);
   }
+}
+
+/** Once its result is shown: the corners that a request lists. */
+function showCorners(request: Request): void {
+  if (!state.result || state.request !== request || !sameSurface() || request.boundary?.mode !== "angles") return;
+  adoptCorners(request, state.result);
+  drawAngles();
 }
 
 async function openJob(id: string): Promise<void> {
   const turn = ++state.turn;
   try {
     const [job, request] = await Promise.all([api.job(id), api.request(id)]);
+    if (turn !== state.turn) return;
     state.surface = request.surface;
     state.name = request.name ?? "";
     state.request = request;
     state.corners = [];
     adopt(request);
     await follow(job, turn, false);
-    if (state.result && request.boundary?.mode === "angles") {
-      adoptCorners(request, state.result);
-      drawAngles();
-    }
+    showCorners(request);
   } catch (error) {
     if (turn === state.turn) report(error);
   }
@@ -278,6 +307,7 @@ function banner(text: string | null): void {
 function report(error: unknown): void {
   $("progress").hidden = true;
   $("cancel").hidden = true;
+  if (state.result && !sameSurface()) forget();
   if (error instanceof ProblemError) {
     const where = error.problem.errors?.map((e) => e.detail).filter((d) => d !== error.problem.detail) ?? [];
     banner([error.problem.detail || error.problem.title, ...where.slice(0, 3)].join(" "));
@@ -444,8 +474,8 @@ function hover(i: number | null): void {
 }
 
 function drawFiles(): void {
-  const { job } = state;
-  $("files").replaceChildren(...(job ? FILES.map((name) => {
+  const { job, result } = state;
+  $("files").replaceChildren(...(job && result ? FILES.map((name) => {
     const link = element("a", { href: `/v1/jobs/${job.id}/files/${name}`, download: name }, name);
     link.addEventListener("click", (event) => {
       event.preventDefault();
@@ -592,6 +622,7 @@ $("copy-gh").addEventListener("click", () => void copy(asGrasshopper(), "The set
 
 document.addEventListener("keydown", (event) => {
   if ((event.target as HTMLElement).matches("input, select, textarea")) return;
+  if ((event.ctrlKey && !event.altKey) || event.metaKey) return; // the browser's own; AltGr types brackets
   const count = state.result?.panels?.face.length ?? 0;
   if (event.key === "f" || event.key === "F") {
     space.fit();
