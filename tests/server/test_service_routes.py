@@ -96,6 +96,7 @@ def test_null_stops_after_a_stage(client: Live, left_out: dict[str, None], parts
     result = client.post("/v1/solve", json=request(**left_out)).json()
     assert all(result[part] is None for part in parts)
     assert result["quality"]["scale_ratio"] >= 1
+    assert result["quality"]["overlaps"] is result["quality"]["coverage"] is None  # nothing was measured
 
 
 def test_surface_is_sent_once_and_named_afterwards(client: Live) -> None:
