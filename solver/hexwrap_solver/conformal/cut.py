@@ -14,12 +14,14 @@ from scipy import sparse
 from scipy.sparse.csgraph import breadth_first_order, connected_components
 
 from hexwrap_solver.arrays import Ints
+from hexwrap_solver.surface.topology import half_edges, next_half_edge, twins
 
 
 @dataclass(frozen=True)
 class Cut:
     """path: (p,) vertices from loop 0 to loop 1. sheet: (m, 3) power of g per corner.
-    twin: (m, 3) face across the edge opposite to each corner, −1 at the boundary and across the cut."""
+    twin: (3m,) half-edge on the other side of each (see ``surface.topology``), −1 at the boundary and across
+    the cut."""
 
     path: Ints
     sheet: Ints
@@ -28,18 +30,22 @@ class Cut:
 
 def cut_open(faces: Ints, loops: tuple[Ints, Ints], n: int) -> Cut:
     """The cut along a shortest path of edges. faces: (m, 3) of an annulus with n vertices."""
-    path = _shortest_path(faces, loops, n)
-    twin, crossing, left = _twins(faces, path, n)
-    return Cut(path, _sheets(faces, path, twin, crossing, left, n), twin)
+    twin = twins(faces, n)
+    start, end = half_edges(faces)
+    path = _shortest_path(start, end, twin, loops, n)
+    left = _left_of(path, start, end, n)
+    twin[twin[left]] = -1
+    twin[left] = -1
+    return Cut(path, _sheets(start, path, twin, left, n), twin)
 
 
-def _shortest_path(faces: Ints, loops: tuple[Ints, Ints], n: int) -> Ints:
+def _shortest_path(start: Ints, end: Ints, twin: Ints, loops: tuple[Ints, Ints], n: int) -> Ints:
     """Fewest edges from any vertex of loop 0 to any of loop 1, through an extra vertex n tied to loop 0."""
-    tail = np.concatenate([faces.ravel(), np.full(len(loops[0]), n)])
-    head = np.concatenate([np.roll(faces, -1, axis=1).ravel(), loops[0]])
-    # edges along or into the source loop are of no use, those leaving the goal loop neither
+    rim = np.flatnonzero(twin < 0)  # all other edges have a half-edge each way
+    tail = np.concatenate([start, end[rim], np.full(len(loops[0]), n)])
+    head = np.concatenate([end, start[rim], loops[0]])
     graph = sparse.csr_matrix((np.ones(len(tail), dtype=np.int8), (tail, head)), shape=(n + 1, n + 1))
-    order, previous = breadth_first_order(graph, n, directed=False)
+    order, previous = breadth_first_order(graph, n)
     rank = np.full(n + 1, n + 1)
     rank[order] = np.arange(len(order))
     path = [int(loops[1][np.argmin(rank[loops[1]])])]
@@ -48,51 +54,29 @@ def _shortest_path(faces: Ints, loops: tuple[Ints, Ints], n: int) -> Ints:
     return np.array(path[::-1], dtype=np.int64)
 
 
-def _twins(faces: Ints, path: Ints, n: int) -> tuple[Ints, Ints, Ints]:
-    """twin (see Cut); positions in faces.ravel()-like order of the half-edges on the cut, and of those of
-    them whose face is on its left."""
-    tail = faces[:, [1, 2, 0]].ravel()
-    head = faces[:, [2, 0, 1]].ravel()
-    key = np.minimum(tail, head) * n + np.maximum(tail, head)
-    order = np.argsort(key, kind="stable")
-    ordered = key[order]
-    paired = np.flatnonzero(ordered[1:] == ordered[:-1])
-    one, other = order[paired], order[paired + 1]
-    twin = np.full(len(key), -1, dtype=np.int64)
-    twin[one], twin[other] = other // 3, one // 3
-    along = np.minimum(path[1:], path[:-1]) * n + np.maximum(path[1:], path[:-1])
-    found = np.searchsorted(ordered, along)
-    crossing = np.concatenate([order[found], order[found + 1]])
-    twin[crossing] = -1
+def _left_of(path: Ints, start: Ints, end: Ints, n: int) -> Ints:
+    """The half-edges that run along the path, in its direction: their faces are on its left."""
     following = np.full(n, -1, dtype=np.int64)
     following[path[:-1]] = path[1:]
-    left = crossing[following[tail[crossing]] == head[crossing]]
-    return twin.reshape(-1, 3), crossing, left
+    return np.flatnonzero(following[start] == end)
 
 
-def _sheets(faces: Ints, path: Ints, twin: Ints, crossing: Ints, left: Ints, n: int) -> Ints:
+def _sheets(start: Ints, path: Ints, twin: Ints, left: Ints, n: int) -> Ints:
     """1 at the corners to the left of the cut, 0 elsewhere: corners at path vertices, joined around them
     across every edge but those of the cut, fall into a left and a right fan each."""
     on_path = np.zeros(n, dtype=bool)
     on_path[path] = True
-    flat = faces.ravel()
-    near = np.flatnonzero(on_path[flat])
-    place = np.full(len(flat), -1, dtype=np.int64)
+    near = np.flatnonzero(on_path[start])  # corners, named by the half-edges that leave them
+    place = np.full(len(start), -1, dtype=np.int64)
     place[near] = np.arange(len(near))
-    joints = []
-    for step in (1, 2):  # the two edges at a corner are opposite to the other two corners
-        face, k = near // 3, (near % 3 + step) % 3
-        across = twin[face, k]
-        inside = across >= 0
-        same = faces[across[inside]] == flat[near[inside], None]
-        joints.append((near[inside], 3 * across[inside] + same.argmax(axis=1)))
-    start, end = (np.concatenate(parts) for parts in zip(*joints, strict=True))
+    crossed = near[twin[near] >= 0]
+    other = next_half_edge(twin[crossed])
     graph = sparse.coo_matrix(
-        (np.ones(len(start), dtype=np.int8), (place[start], place[end])), shape=(len(near), len(near))
+        (np.ones(len(crossed), dtype=np.int8), (place[crossed], place[other])), shape=(len(near), len(near))
     )
     fan = connected_components(graph, directed=False)[1]
-    touching = np.concatenate([3 * (left // 3) + (left % 3 + s) % 3 for s in (1, 2)])
-    left_fans = np.unique(fan[place[touching]])
-    sheet = np.zeros(len(flat), dtype=np.int64)
-    sheet[near] = np.isin(fan, left_fans)
+    left_fans = np.zeros(len(near), dtype=bool)
+    left_fans[fan[place[np.concatenate([left, next_half_edge(left)])]]] = True
+    sheet = np.zeros(len(start), dtype=np.int64)
+    sheet[near] = left_fans[fan]
     return sheet.reshape(-1, 3)

@@ -1,8 +1,9 @@
 """Nested dissection of a mesh by planes (George 1973): the elimination order of its sparse matrices.
 
-The vertices of each part are halved by a plane across the part's longest direction; the vertices along the
-cut on one side become the part's separator and are eliminated after both halves. All parts of one level
-are cut at once.
+The unknowns are first halved again and again by planes across each part's longest direction; a bit per level
+says on which side of its part's plane an unknown lies. An edge is cut at the first level at which the bits of
+its ends differ. Part by part, the ends of its cut edges on one side become its separator, which is
+eliminated after both halves.
 """
 
 from __future__ import annotations
@@ -14,10 +15,10 @@ import numpy as np
 from hexwrap_solver.arrays import Bools, Floats, Ints
 
 #: Parts of about this many vertices are not cut any further: dense algebra is faster there.
-LEAF = 128
+LEAF = 160
 #: Steps that bring each cutting plane to its part's median.
 MEDIAN_STEPS = 2
-#: Planes are found from every fourth unknown.
+#: Planes are found from every fourth unknown: one that is a little off costs nothing.
 SAMPLE = 4
 
 
@@ -25,8 +26,9 @@ SAMPLE = 4
 class Dissection:
     """A binary tree of separators. Node 0 is the root, nodes 2k + 1 and 2k + 2 are the halves of node k.
 
-    order: (n,) unknowns in the order of elimination, deepest nodes first. start: (nodes + 1,) the unknowns of
-    a node are order[start[position]:start[position + 1]] with position = nodes − 1 − node.
+    order: (n,) unknowns in the order of elimination, deepest nodes first; those of one node by the part they
+    lie in, so that unknowns which touch the same part stand together. start: (nodes + 1,) the unknowns of a
+    node are order[start[position]:start[position + 1]] with position = nodes − 1 − node.
     depth: number of levels below the root.
     """
 
@@ -38,62 +40,83 @@ class Dissection:
 def dissect(points: Floats, rows: Ints, columns: Ints) -> Dissection:
     """points: (n, 3) places of the unknowns, NaN for unknowns that touch very many others (they go into the
     root). rows, columns: (e,) unknowns that share a matrix entry."""
-    n = len(points)
-    placed: Bools = np.asarray(np.isfinite(points).all(axis=1))
-    depth = max(0, int(np.ceil(np.log2(max(placed.sum(), 1) / LEAF))))
-    if depth:
-        points = points - points[placed].mean(axis=0)  # second moments far from the origin lose their digits
-    node = np.zeros(n, dtype=np.int64)
+    placed: Bools = np.asarray(np.isfinite(points[:, 0]))
+    depth = max(0, int(np.ceil(np.log2(max(int(placed.sum()), 1) / LEAF))))
+    part = _parts(points, placed, depth)
+    node = np.where(placed, 2**depth - 1 + part, 0)
     done: Bools = np.logical_not(placed)
-    first, second = rows, columns
+    differing = part[rows] ^ part[columns]
+    cut = np.flatnonzero(differing)
+    level = depth - np.frexp(differing[cut].astype(float))[1]
+    by_level = np.argsort(level.astype(np.uint8), kind="stable")
+    bounds = np.searchsorted(level[by_level], np.arange(depth + 1))
+    for k in range(depth):
+        edge = cut[by_level[bounds[k] : bounds[k + 1]]]
+        first, second = rows[edge], columns[edge]
+        across = ~(done[first] | done[second])
+        ends = np.unique(np.concatenate([first[across], second[across]]))
+        separator = ends[_on_thinner_side(part[ends] >> (depth - k - 1), k)]
+        done[separator] = True
+        node[separator] = 2**k - 1 + (part[separator] >> (depth - k))
+    nodes = 2 ** (depth + 1) - 1
+    start = np.concatenate([[0], np.cumsum(np.bincount(node, minlength=nodes)[::-1])])
+    by_part = _stable_order(part, 2**depth)
+    return Dissection(by_part[_stable_order(nodes - 1 - node[by_part], nodes)], start, depth)
+
+
+def _stable_order(key: Ints, n: int) -> Ints:
+    """Stable argsort of integers 0 … n − 1; NumPy sorts short integers by counting."""
+    return np.argsort(key.astype(np.uint16) if n <= 2**16 else key, kind="stable")
+
+
+def _parts(points: Floats, placed: Bools, depth: int) -> Ints:
+    """(n,) the part in which each unknown lies: one bit per level, the first level's highest."""
+    part = np.zeros(len(points), dtype=np.int64)
+    if not depth:
+        return part
+    # Second moments far from the origin lose their digits.
+    centred = np.where(placed, (points - points[placed].mean(axis=0)).T, 0.0)
+    sample = np.flatnonzero(placed)[::SAMPLE]
+    sampled, of = centred[:, sample], np.zeros(len(sample), dtype=np.int64)
     for level in range(depth):
-        keep = ~(done[first] | done[second])  # no edge but those with a separator leads out of its part
-        first, second = first[keep], second[keep]
-        side = _halve(points, node, done, level)
-        cut = side[first] != side[second]
-        done[_thinner_side(first[cut], second[cut], side, node, level)] = True
-        node = np.where(done, node, 2 * node + 1 + side)
-    count = np.bincount(node, minlength=2 ** (depth + 1) - 1)
-    start = np.concatenate([[0], np.cumsum(count[::-1])])
-    return Dissection(np.argsort(-node, kind="stable"), start, depth)
+        axis, threshold = _planes(sampled, of, 2**level)
+        part = 2 * part + _beyond(centred, axis, threshold, part)
+        of = part[sample]
+    return part
 
 
-def _halve(points: Floats, node: Ints, done: Bools, level: int) -> Bools:
-    """(n,) on which side of its part's plane each unknown lies."""
-    parts = 2**level
-    active = np.flatnonzero(~done)
-    part = node[active] - (parts - 1)
-    count = np.maximum(np.bincount(part, minlength=parts), 1)
-    # directions from every fourth unknown: a plane that is a little off costs nothing
-    sampled, of = points[active[::SAMPLE]].T, part[::SAMPLE]
-    weight = np.maximum(np.bincount(of, minlength=parts), 1)
-    mean = np.stack([np.bincount(of, weights=x, minlength=parts) / weight for x in sampled])
-    spread = np.empty((parts, 3, 3))
+def _beyond(points: Floats, axis: Floats, threshold: Floats, part: Ints) -> Bools:
+    """(n,) whether each point, points (3, n), lies beyond the plane of its part."""
+    along = points[0] * axis[0][part]
+    along += points[1] * axis[1][part]
+    along += points[2] * axis[2][part]
+    return np.asarray(along > threshold[part])
+
+
+def _planes(points: Floats, part: Ints, parts: int) -> tuple[Floats, Floats]:
+    """(3, parts) longest directions and (parts,) medians along them of points (3, n)."""
+    weight = np.maximum(np.bincount(part, minlength=parts), 1)
+    mean = np.stack([np.bincount(part, weights=x, minlength=parts) / weight for x in points])
+    spread = np.zeros((parts, 3, 3))
     for i in range(3):
         for j in range(i + 1):
-            product = np.bincount(of, weights=sampled[i] * sampled[j], minlength=parts) / weight
+            product = np.bincount(part, weights=points[i] * points[j], minlength=parts) / weight
             spread[:, i, j] = spread[:, j, i] = product - mean[i] * mean[j]
     variance, axes = np.linalg.eigh(spread)
-    axis = axes[:, :, 2]
-    along = np.einsum("nd,nd->n", points[active], axis[part]) - np.einsum("dp,pd->p", mean, axis)[part]
-    # from the mean to the median by Newton's method, as if the density at it were the normal one
+    axis = np.ascontiguousarray(axes[:, :, 2].T)
+    along = (points * axis[:, part]).sum(axis=0)
+    threshold = (axis * mean).sum(axis=0)
+    # From the mean to the median by Newton's method, as if the density at it were the normal one.
     step = np.sqrt(2 * np.pi * np.maximum(variance[:, 2], 0))
-    threshold = np.zeros(parts)
     for _ in range(MEDIAN_STEPS):
-        share = np.bincount(part, weights=along > threshold[part], minlength=parts) / count
+        share = np.bincount(part, weights=along > threshold[part], minlength=parts) / weight
         threshold += (share - 0.5) * step
-    side = np.zeros(len(points), dtype=bool)
-    side[active] = along > threshold[part]
-    return side
+    return axis, threshold
 
 
-def _thinner_side(first: Ints, second: Ints, side: Bools, node: Ints, level: int) -> Bools:
-    """(n,) ends of the cut edges on the side that has fewer of them, part by part."""
-    touched = np.zeros(len(side), dtype=bool)
-    touched[first] = touched[second] = True
-    ends = np.flatnonzero(touched)
-    part = node[ends] - (2**level - 1)
-    balance = np.bincount(part, weights=np.where(side[ends], 1.0, -1.0), minlength=2**level)
-    chosen = np.zeros(len(side), dtype=bool)
-    chosen[ends] = side[ends] == (balance[part] < 0)
-    return chosen
+def _on_thinner_side(half: Ints, level: int) -> Bools:
+    """(k,) which ends of cut edges lie on the side that has fewer of them, part by part. half: (k,) the part
+    one level further down."""
+    count = np.bincount(half, minlength=2 ** (level + 1)).reshape(-1, 2)
+    thinner = (count[:, 1] <= count[:, 0]).astype(np.int64)
+    return np.asarray(half % 2 == thinner[half // 2])

@@ -15,7 +15,7 @@ import numpy as np
 
 from hexwrap_solver.arrays import Bools, Floats, Ints
 from hexwrap_solver.conformal.types import Targets
-from hexwrap_solver.surface.topology import edge_groups, half_edges
+from hexwrap_solver.surface.topology import edge_groups, edge_lengths, half_edges
 from hexwrap_solver.surface.types import Surface
 
 
@@ -25,17 +25,8 @@ def total(index: Ints, values: Floats, n: int) -> Floats:
 
 
 def opposite_lengths(vertices: Floats, faces: Ints) -> Floats:
-    """(3, m) length of the edge opposite to each corner, from coordinate differences.
-
-    Differences come first, so a far-away origin costs no digits beyond those the data has lost already.
-    """
-    scale = np.ptp(vertices, axis=0).max() or 1.0  # squares must neither overflow nor vanish
-    square = np.zeros((3, len(faces)))
-    for coordinate in vertices.T:
-        corner = coordinate[faces.T]
-        edge = (corner[[2, 0, 1]] - corner[[1, 2, 0]]) / scale
-        square += edge * edge
-    return np.asarray(np.sqrt(square) * scale)
+    """(3, m) length of the edge opposite to each corner."""
+    return np.ascontiguousarray(edge_lengths(vertices, faces).T[[1, 2, 0]])
 
 
 @dataclass(frozen=True)
@@ -83,7 +74,8 @@ class Energy:
     """Gradient and Hessian in the unknowns that are left after pinning and tying (see ``Targets``).
 
     dof: (n,) unknown of each vertex, −1 where u = 0 is fixed. With nothing pinned, u is only defined up to
-    a constant: then the first vertex is pinned (its equation follows from Gauss–Bonnet).
+    a constant: then a vertex in the middle of the numbering is pinned (its equation follows from
+    Gauss–Bonnet): on most meshes it is none at an end, where u would become twice as large and lose a digit.
     rows, columns: (e,) the off-diagonal pattern of the Hessian, rows > columns, each pair once.
     """
 
@@ -167,7 +159,7 @@ def _unknowns(targets: Targets) -> tuple[Ints, int]:
     free = targets.tie < 0
     if not (targets.tie == 0).any():
         free = free.copy()
-        free[np.argmax(free)] = False
+        free[np.flatnonzero(free)[int(free.sum()) // 2]] = False
     n_free = int(free.sum())
     dof = np.full(len(free), -1, dtype=np.int64)
     dof[free] = np.arange(n_free)

@@ -3,12 +3,12 @@
 Every node of the dissection tree eliminates its unknowns in one dense matrix, the front, with LAPACK, and
 hands what is left (the update) to its parent. The symbolic analysis is done once per pattern. It needs
 nothing but NumPy and SciPy, and is as fast as the compiled supernodal codes on meshes: the arithmetic is
-in BLAS, and there is one short Python step per front of some fifty unknowns.
+in BLAS, and there are a few short Python steps per front of some fifty unknowns.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg.blas import dgemv, dsyrk, dtrsm, dtrsv
@@ -17,28 +17,37 @@ from scipy.linalg.lapack import dpotrf
 from hexwrap_solver.arrays import Floats, Ints
 from hexwrap_solver.conformal.dissection import Dissection, dissect
 
+#: Blocks of at least this many entries are added run by run, where their places come in few runs without
+#: holes: the index arrays of so many single entries would not stay in the processor's cache.
+LARGE = 8000
+#: Adding one slice costs as much as adding this many entries one by one.
+ENTRIES_PER_SLICE = 600
 
-@dataclass(frozen=True)
-class _Front:
+
+class _Front(NamedTuple):
     """first, last: own unknowns in elimination order. boundary: unknowns of ancestors that they touch.
-    offset: of the own block (k × k, then b × k) in the factor. parent: front number, −1 at the root.
-    into_own, into_rest: where the boundary goes in the parent's own unknowns and in its boundary."""
+    offset: of the own block (k × k, then b × k) in the factor. children: their numbers, none at a leaf.
+    into_own, into_rest: where the boundary goes in the parent's own unknowns and in its boundary.
+    stack, update: which of the two stacks holds the update, and where in it."""
 
     first: int
     last: int
     boundary: Ints
     offset: int
-    parent: int
+    children: tuple[int, ...]
     into_own: Ints
     into_rest: Ints
+    stack: int
+    update: int
 
 
-def _cleared(size: int) -> Floats:
-    """(size,) zeros. NumPy asks for huge pages in ``empty`` but not in ``zeros``: on 200 MB that is a
-    difference of 0.03 to 0.4 s."""
-    array = np.empty(size)
-    array.fill(0.0)
-    return array
+class _Blocks(NamedTuple):
+    """Views of a front's own (k, k) and rest (b, k) part of the factor, and of its update (b, b). They are
+    stored by columns: row i of each array here is column i."""
+
+    own: Floats
+    rest: Floats
+    update: Floats
 
 
 class Factorisation:
@@ -53,10 +62,17 @@ class Factorisation:
         place[tree.order] = np.arange(self.n)
         one, other = place[rows], place[columns]
         low, high = np.minimum(one, other), np.maximum(one, other)
-        self._fronts = _analyse(tree, low, high)
+        self._fronts, visits, stacks = _analyse(tree, low, high)
         self._size, self._diagonal_at, self._off_diagonal_at = self._addresses(low, high)
         self._factor = np.empty(self._size)  # cleared by factorise
+        self._stacks = [np.empty(size) for size in stacks]
+        self._visits = visits
         self._blocks = [self._block(front) for front in self._fronts]
+        self._steps = [
+            (front.first, front.last, front.boundary, own.T, rest.T)
+            for front, (own, rest, _) in zip(self._fronts, self._blocks, strict=True)
+            if own.size
+        ]
 
     def _addresses(self, low: Ints, high: Ints) -> tuple[int, Ints, Ints]:
         """Length of the factor, and where the matrix entries go in it."""
@@ -78,15 +94,17 @@ class Factorisation:
             offset[low] + own[low] * k[low] + own[high],
             offset[low] + k[low] ** 2 + own[low] * b[low] + rank,
         )
-        size = sum((f.last - f.first) * (f.last - f.first + len(f.boundary)) for f in fronts)
-        return size, diagonal_at, at
+        last = fronts[-1]  # the root has no boundary
+        return last.offset + (last.last - last.first) ** 2, diagonal_at, at
 
-    def _block(self, front: _Front) -> tuple[Floats, Floats]:
-        """Views of a front's part of the factor: (k, k) own unknowns, (b, k) beside them, by columns."""
+    def _block(self, front: _Front) -> _Blocks:
         k, b = front.last - front.first, len(front.boundary)
-        own = self._factor[front.offset : front.offset + k * k]
-        rest = self._factor[front.offset + k * k : front.offset + k * (k + b)]
-        return own.reshape(k, k).T, rest.reshape(k, b).T
+        middle, stack = front.offset + k * k, self._stacks[front.stack]
+        return _Blocks(
+            self._factor[front.offset : middle].reshape(k, k),
+            self._factor[middle : middle + k * b].reshape(k, b),
+            stack[front.update : front.update + b * b].reshape(b, b),
+        )
 
     def factorise(self, diagonal: Floats, off_diagonal: Floats) -> None:
         """Takes new values. Raises np.linalg.LinAlgError where A is not positive definite."""
@@ -94,64 +112,74 @@ class Factorisation:
         factor.fill(0.0)
         factor[self._diagonal_at] = diagonal[self._order]
         factor[self._off_diagonal_at] = off_diagonal
-        updates: list[Floats | None] = [None] * len(self._fronts)
-        for i, front in enumerate(self._fronts):
-            own, rest = self._blocks[i]
-            b, k = rest.shape
-            update, updates[i] = updates[i], None
-            if k:
-                _, info = dpotrf(own, lower=1, clean=0, overwrite_a=1)
+        for i in self._visits:
+            front, (own, rest, update) = self._fronts[i], self._blocks[i]
+            for child in front.children:
+                self._add_above(self._fronts[child], self._blocks[child].update, own, rest)
+            if own.size:
+                _, info = dpotrf(own.T, lower=1, clean=0, overwrite_a=1)
                 if info:
                     raise np.linalg.LinAlgError("matrix is not positive definite")
-            if k and b:
-                dtrsm(1.0, own, rest, side=1, lower=1, trans_a=1, overwrite_b=1)
-                if update is None:
-                    update = _cleared(b * b)
-                dsyrk(-1.0, rest, beta=1.0, c=update.reshape(b, b).T, lower=1, overwrite_c=1)
-            if update is not None:
-                self._extend_add(factor, updates, front, update.reshape(b, b).T)
+            if rest.size:
+                dtrsm(1.0, own.T, rest.T, side=1, lower=1, trans_a=1, overwrite_b=1)
+                # The upper half of an update is never looked at, whatever stands there.
+                dsyrk(-1.0, rest.T, beta=0.0, c=update.T, lower=1, overwrite_c=1)
+            else:
+                update.fill(0.0)
+            for child in front.children:
+                below = self._fronts[child]
+                s, at = len(below.into_own), below.into_rest
+                _add(update, at, at, self._blocks[child].update[s:, s:])
 
-    def _extend_add(
-        self, factor: Floats, updates: list[Floats | None], front: _Front, update: Floats
-    ) -> None:
-        """Adds a front's update to the front above; all blocks are columns one after the other, lower half.
-
-        ``a[at] = a.take(at) + b`` is three times as fast as ``a[rows, columns] += b``.
-        """
-        parent = self._fronts[front.parent]
-        k, b = parent.last - parent.first, len(parent.boundary)
-        own, rest = front.into_own, front.into_rest
-        s = len(own)
-        columns = update.T
-        if s:
-            at = (parent.offset + k * own)[:, None] + own
-            factor[at] = factor.take(at) + columns[:s, :s]
-            at = (parent.offset + k * k + b * own)[:, None] + rest
-            factor[at] = factor.take(at) + columns[:s, s:]
-        if len(rest):
-            target = updates[front.parent]
-            if target is None:
-                target = updates[front.parent] = _cleared(b * b)
-            at = (b * rest)[:, None] + rest
-            target[at] = target.take(at) + columns[s:, s:]
+    def _add_above(self, child: _Front, update: Floats, own: Floats, rest: Floats) -> None:
+        """What a child's update adds to the factor of the front above."""
+        at, s = child.into_own, len(child.into_own)
+        _add(own, at, at, update[:s, :s])
+        _add(rest, at, child.into_rest, update[:s, s:])
 
     def solve(self, right: Floats) -> Floats:
         x = right[self._order]
-        for front, (own, rest) in zip(self._fronts, self._blocks, strict=True):
-            if front.last > front.first:
-                part = dtrsv(own, x[front.first : front.last], lower=1)
-                x[front.first : front.last] = part
-                if len(front.boundary):
-                    x[front.boundary] -= dgemv(1.0, rest, part)
-        for front, (own, rest) in zip(reversed(self._fronts), reversed(self._blocks), strict=True):
-            if front.last > front.first:
-                part = x[front.first : front.last]
-                if len(front.boundary):
-                    part = part - dgemv(1.0, rest, x[front.boundary], trans=1)
-                x[front.first : front.last] = dtrsv(own, part, lower=1, trans=1)
+        for first, last, boundary, own, rest in self._steps:
+            x[first:last] = part = dtrsv(own, x[first:last], lower=1)
+            if rest.size:
+                x[boundary] -= dgemv(1.0, rest, part)
+        for first, last, boundary, own, rest in reversed(self._steps):
+            part = x[first:last]
+            if rest.size:
+                part = part - dgemv(1.0, rest, x[boundary], trans=1)
+            x[first:last] = dtrsv(own, part, lower=1, trans=1)
         result = np.zeros(self.n)
         result[self._order] = x
         return result
+
+
+def _add(target: Floats, columns: Ints, rows: Ints, source: Floats) -> None:
+    """target[columns, rows] += source, blocks whose places ascend; of square blocks the lower half at least.
+
+    ``a[at] = a.take(at) + b`` is three times as fast as ``a[columns, rows] += b``.
+    """
+    if source.size >= LARGE:
+        across, down = _runs(columns), _runs(rows)
+        if len(across) * len(down) * ENTRIES_PER_SLICE <= source.size:
+            for to, column in across:
+                for below, row in down:
+                    target[to, below] += source[column, row]
+            return
+    at = (target.shape[1] * columns)[:, None] + rows
+    flat = target.reshape(-1)
+    flat[at] = flat.take(at) + source
+
+
+def _runs(places: Ints) -> list[tuple[slice, slice]]:
+    """Ascending places cut into runs without holes: pairs of slices (of the target, of the source)."""
+    if not len(places):
+        return []
+    breaks = np.flatnonzero(places[1:] != places[:-1] + 1) + 1
+    bounds = [0, *breaks.tolist(), len(places)]
+    first = places[bounds[:-1]].tolist()
+    return [
+        (slice(to, to + b - a), slice(a, b)) for to, a, b in zip(first, bounds[:-1], bounds[1:], strict=True)
+    ]
 
 
 def _distinct(keys: Ints) -> Ints:
@@ -162,8 +190,9 @@ def _distinct(keys: Ints) -> Ints:
     return np.asarray(keys[first])
 
 
-def _analyse(tree: Dissection, low: Ints, high: Ints) -> list[_Front]:
-    """Fronts in elimination order (deepest level first), with the boundaries that elimination creates."""
+def _analyse(tree: Dissection, low: Ints, high: Ints) -> tuple[list[_Front], list[int], list[int]]:
+    """Fronts in elimination order (deepest level first), with the boundaries that elimination creates; the
+    order in which to visit them; and the sizes of the two stacks of updates."""
     n = len(tree.order)
     nodes = len(tree.start) - 1
     size = np.diff(tree.start)
@@ -189,15 +218,54 @@ def _analyse(tree: Dissection, low: Ints, high: Ints) -> list[_Front]:
     in_rest = np.searchsorted(every, parent[front] * n + unknown) - begin[parent[front]]
     split = begin[:-1] + np.bincount(front, weights=to_own, minlength=nodes).astype(np.int64)
     offset = np.concatenate([[0], np.cumsum(size * (size + np.diff(begin)))])
-    return [
+    visits, stack, update, sizes = _stacked(np.diff(begin), tree.depth)
+    fronts = [
         _Front(
             int(tree.start[i]),
             int(tree.start[i + 1]),
             unknown[begin[i] : begin[i + 1]],
             int(offset[i]),
-            int(parent[i]),
+            _children(i, nodes),
             within[begin[i] : split[i]],
             in_rest[split[i] : begin[i + 1]],
+            stack[i],
+            update[i],
         )
         for i in range(nodes)
     ]
+    return fronts, visits, sizes
+
+
+def _children(i: int, nodes: int) -> tuple[int, ...]:
+    """Numbers of the two fronts below front i (node nodes − 1 − i of the tree)."""
+    left = 2 * (nodes - 1 - i) + 1
+    return (nodes - 1 - left, nodes - 2 - left) if left < nodes else ()
+
+
+def _stacked(b: Ints, depth: int) -> tuple[list[int], list[int], list[int], list[int]]:
+    """Fronts visited children first, left before right, so that only the updates along one way up wait. A
+    front's update and those of its children are needed at once, so levels take turns on two stacks: what is
+    pushed on one lies above all that still waits there.
+
+    Returns the visits, and per front its stack and its update's place; and the size of both stacks.
+    """
+    nodes = len(b)
+    area = (b * b).tolist()
+    visits: list[int] = []
+    stack, update = [0] * nodes, [0] * nodes
+    top, most = [0, 0], [0, 0]
+
+    def visit(i: int, level: int) -> None:
+        children = _children(i, nodes)
+        for child in children:
+            visit(child, level + 1)
+        if children:
+            top[(level + 1) % 2] = update[children[0]]
+        mine = level % 2
+        stack[i], update[i] = mine, top[mine]
+        top[mine] += area[i]
+        most[mine] = max(most[mine], top[mine])
+        visits.append(i)
+
+    visit(nodes - 1, 0)
+    return visits, stack, update, most

@@ -8,9 +8,10 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import breadth_first_order
 
-from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints
+from hexwrap_solver.arrays import Complexes, Floats, Ints
 from hexwrap_solver.conformal.cut import Cut, cut_open
 from hexwrap_solver.conformal.types import Deck
+from hexwrap_solver.surface.topology import next_half_edge
 
 #: Cone angles nearer than this to a multiple of 2π count as one: g is a translation (see Deck).
 FULL_TURN = 1e-9
@@ -46,64 +47,68 @@ def lay_out(
     and g moves it along +x. K = 2πm, m ≠ 0: loop 0 is centred at 0.
     """
     cut = cut_open(faces, loops, n)
-    corners = _develop(cut.twin, lengths, angles, faces)
+    corners = _develop(cut.twin, lengths, angles)
     return _close(faces, corners, cut, cone_angle, loops, n)
 
 
-def _local_frames(lengths: Floats, angles: Floats) -> Complexes:
-    """(m, 3) every triangle by itself: corner 0 at 0, corner 1 on the positive real axis."""
-    local = np.zeros((lengths.shape[1], 3), dtype=complex)
-    local[:, 1] = lengths[2]
-    local[:, 2] = lengths[1] * np.exp(1j * angles[0])
+def _local_frames(lengths: Floats, angles: Floats, order: Ints) -> Complexes:
+    """(m, 3) every triangle by itself, in the given order: corner 0 at 0, corner 1 on the positive real
+    axis."""
+    local = np.zeros((len(order), 3), dtype=complex)
+    length, angle = lengths[1][order], angles[0][order]
+    local[:, 1] = lengths[2][order]
+    local.real[:, 2], local.imag[:, 2] = length * np.cos(angle), length * np.sin(angle)
     return local
 
 
-def _develop(twin: Ints, lengths: Floats, angles: Floats, faces: Ints) -> Complexes:
+def _develop(twin: Ints, lengths: Floats, angles: Floats) -> Complexes:
     """(m, 3) all triangles side by side in the plane, consistent across all edges of the tree.
 
     Motions z → r z + t from each face into its parent are composed by pointer jumping: after k rounds
     every face knows the way 2^k steps up the tree, so rounds and rounding errors grow with log(depth).
     """
-    m = len(faces)
+    m = len(twin) // 3
     order, up = _face_tree(twin)
     # faces in breadth-first order: parents then lie side by side in memory, too
-    local = _local_frames(lengths[:, order], angles[:, order])
+    local = _local_frames(lengths, angles, order)
     turn = np.ones(m, dtype=complex)
     shift = np.zeros(m, dtype=complex)
-    turn[1:], shift[1:] = _motions(faces[order], local, twin[order[1:]] == order[up[1:], None], up[1:])
-    while up.any():
-        above = turn[up]
-        shift = above * shift + shift[up]
-        turn = above * turn
-        up = up[up]
+    turn[1:], shift[1:] = _motions(twin, local, order, up)
+    first = 1  # the faces before it know their way to the root: parents stand before their children
+    while first < m:
+        rest = slice(first, m)
+        above = up[rest]
+        shift[rest] = turn[above] * shift[rest] + shift[above]
+        turn[rest] *= turn[above]
+        up[rest] = up[above]
+        first = int(np.searchsorted(up, 1))
     turn /= np.abs(turn)
     corners = np.empty((m, 3), dtype=complex)
     corners[order] = turn[:, None] * local + shift[:, None]
     return corners
 
 
-def _motions(faces: Ints, local: Complexes, through: Bools, parent: Ints) -> tuple[Complexes, Complexes]:
-    """Rotation and translation that lay faces 1, 2, … against their parents' frames. through: (m − 1, 3)
-    marks the edge between the two by the corner opposite to it."""
-    corner = faces.ravel()
+def _motions(twin: Ints, local: Complexes, order: Ints, up: Ints) -> tuple[Complexes, Complexes]:
+    """Rotation and translation that lay faces 1, 2, … (in the given order) against their parents' frames."""
+    face, parent = order[1:], order[up[1:]]
+    across = twin.reshape(-1, 3)[face] // 3
+    corner = np.where(across[:, 0] == parent, 0, np.where(across[:, 1] == parent, 1, 2))
+    back = twin[3 * face + corner]  # the shared edge, seen from the parent: it runs backwards there
     place = local.ravel()
-    edge = through.argmax(axis=1)
-    base = 3 * np.arange(1, len(faces))
-    tail, head = base + (edge + 1) % 3, base + (edge + 2) % 3
-    start = (faces[parent] == corner[tail, None]).argmax(axis=1)  # the edge runs backwards in the parent
-    in_parent = place[3 * parent + start], place[3 * parent + (start + 2) % 3]
-    mine = place[tail], place[head]
-    turn = (in_parent[1] - in_parent[0]) / (mine[1] - mine[0])
+    base, above = 3 * np.arange(1, len(order)), 3 * (up[1:] - parent)
+    tail, head = place[base + corner], place[base + (corner + 1) % 3]
+    tail_there, head_there = place[above + next_half_edge(back)], place[above + back]
+    turn = (head_there - tail_there) / (head - tail)
     turn /= np.abs(turn)
-    return turn, (in_parent[0] + in_parent[1] - turn * (mine[0] + mine[1])) / 2
+    return turn, (tail_there + head_there - turn * (tail + head)) / 2
 
 
 def _face_tree(twin: Ints) -> tuple[Ints, Ints]:
     """The faces in breadth-first order, and the place of each one's parent in that order (0 for the root)."""
-    m = len(twin)
-    neighbour = np.where(twin >= 0, twin, np.arange(m)[:, None])  # itself, where there is none
+    m = len(twin) // 3
+    neighbour = np.where(twin >= 0, twin, np.arange(3 * m)) // 3  # itself, where there is none
     starts = np.arange(0, 3 * m + 1, 3)
-    graph = sparse.csr_matrix((np.ones(3 * m, dtype=np.int8), neighbour.ravel(), starts), shape=(m, m))
+    graph = sparse.csr_matrix((np.ones(3 * m, dtype=np.int8), neighbour, starts), shape=(m, m))
     order, parent = breadth_first_order(graph, 0)
     place = np.zeros(m, dtype=np.int64)
     place[order] = np.arange(m)

@@ -25,14 +25,19 @@ ROUNDING = 2e-14
 #: A residual up to this is accepted (the boundary angles are promised to 1e-9); from there on, a step that
 #: leaves more than STAGNATION of it is the last one: slivers stop at a higher level of rounding.
 ACCEPTED, STAGNATION = 3e-10, 0.5
+#: Residuals below this are worth no factorisation of their own, radians.
+LAST_ROUNDINGS = 1e-12
 #: Multiples of its largest diagonal entry that make a singular Hessian definite.
 SHIFTS = (0.0, 1e-12, 1e-9, 1e-6)
 #: Acceptable overshoot φ'(t) / |φ'(0)| of a step.
 OVERSHOOT = 0.1
 MAX_TRIALS = 30
-#: After a full step that changes no unknown by more than CHORD, the factorised Hessian is used again, as long
-#: as each such step leaves at most CHORD_GAIN of the residual: a solve costs a fifth of a factorisation.
-CHORD, CHORD_GAIN = 0.5, 0.2
+#: After a full step, the factorised Hessian is used again where that many such chord steps (each leaving as
+#: much of the residual as the last step did) would reach rounding: a solve costs a fourth to a sixth of a
+#: factorisation, and Newton's method would need one or two.
+CHORDS = 4
+#: What a chord step may leave of the residual to be kept.
+CHORD_GAIN = 0.2
 
 
 @dataclass(frozen=True)
@@ -80,24 +85,26 @@ def minimise(energy: Energy, start: Floats | None = None, progress: Progress = n
     factorisation = Factorisation(energy.points, energy.rows, energy.columns)
     point = _Point.at(energy, np.zeros(energy.n_dof) if start is None else energy.unknowns_of(start))
     tolerance = max(ROUNDING, np.finfo(float).eps * _largest(energy.target))
-    iterations, factorisations, small = 0, 0, False
+    iterations, factorisations, chord = 0, 0, False
     while point.residual > tolerance and iterations < MAX_STEPS:
         progress(
             min(0.9, iterations / 10), f"Newton step {iterations + 1}, residual {point.residual:.1e} rad"
         )
-        following = _chord(energy, factorisation, point) if small else None
+        following, full = None, True
+        if chord:
+            following = _chord(energy, factorisation, point)
         if following is None:
             factorisations += 1
-            following, small = _newton_step(energy, factorisation, point)
+            following, full = _newton_step(energy, factorisation, point)
         if following is None:
             break
         iterations += 1
-        stagnant = following.residual > STAGNATION * point.residual
-        near = point.residual <= ACCEPTED
-        if following.residual < point.residual or not near:
+        gain, near = following.residual / point.residual, point.residual <= ACCEPTED
+        if gain < 1 or not near:
             point = following
-        if stagnant and near:
+        if gain > STAGNATION and near:
             break
+        chord = full and _chords_left(point.residual, gain, tolerance) <= CHORDS
     return Minimum(
         energy.scale_of(point.x),
         point.corners,
@@ -112,19 +119,28 @@ def _largest(gradient: Floats) -> float:
     return float(np.abs(gradient).max(initial=0.0))
 
 
+def _chords_left(residual: float, gain: float, tolerance: float) -> float:
+    """Steps that reach the tolerance when each leaves ``gain`` of the residual."""
+    if residual <= tolerance:
+        return 0.0
+    return float(np.log(tolerance / residual) / np.log(gain)) if gain < 1 else np.inf
+
+
 def _chord(energy: Energy, factorisation: Factorisation, point: _Point) -> _Point | None:
-    """A step with the Hessian of an earlier one; None where that is not good enough."""
+    """A step with the Hessian of an earlier one; None where that is not good enough. Among the last roundings
+    whatever is gained is: the Hessian is not what is missing there."""
     following = _Point.at(energy, point.x - factorisation.solve(point.gradient))
-    return following if following.residual <= CHORD_GAIN * point.residual else None
+    enough = CHORD_GAIN if point.residual > LAST_ROUNDINGS else np.inf
+    return following if following.residual <= enough * point.residual else None
 
 
 def _newton_step(energy: Energy, factorisation: Factorisation, point: _Point) -> tuple[_Point | None, bool]:
-    """The next point, None where there is none, and whether the step was a full one below CHORD."""
+    """The next point, None where there is none, and whether the step was a full one."""
     direction = _newton_direction(energy, factorisation, point)
     if direction is None:
         return None, False
     following, length = _line_search(energy, point, direction)
-    return following, length == 1.0 and _largest(direction) <= CHORD
+    return following, length == 1.0
 
 
 def _newton_direction(energy: Energy, factorisation: Factorisation, point: _Point) -> Floats | None:

@@ -104,17 +104,15 @@ def spanning_tree(twin: Ints, root: int = 0) -> tuple[Ints, Ints]:
 
 def face_normals(vertices: Floats, faces: Ints) -> Floats:
     """(m, 3) normals, their length twice the area."""
-    a = vertices[faces[:, 0]]
-    ax, ay, az = (vertices[faces[:, 1]] - a).T
-    bx, by, bz = (vertices[faces[:, 2]] - a).T
-    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
+    at = [coordinate[np.ascontiguousarray(faces.T)] for coordinate in np.ascontiguousarray(vertices.T)]
+    (ax, bx), (ay, by), (az, bz) = ((x[1] - x[0], x[2] - x[0]) for x in at)
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx]).T
 
 
 def vertex_normals(vertices: Floats, faces: Ints) -> Floats:
     """(n, 3) unit normals, area-weighted means of the faces around; zero where they cancel."""
-    n = len(vertices)
-    weighted = np.repeat(face_normals(vertices, faces), 3, axis=0)
-    return unit(sum_rows(weighted, faces.ravel(), n))
+    around = np.repeat(face_normals(vertices, faces).T, 3, axis=1)
+    return unit(sum_rows(around.T, faces.ravel(), len(vertices)))
 
 
 def sum_rows(rows: Floats, where: Ints, n: int) -> Floats:
@@ -129,7 +127,13 @@ def unit(vectors: Floats) -> Floats:
 
 
 def edge_lengths(vertices: Floats, faces: Ints) -> Floats:
-    """(m, 3) lengths of the half-edges."""
-    corners = vertices[faces]
-    sides = corners[:, [1, 2, 0]] - corners
-    return np.asarray(np.sqrt(np.einsum("ijk,ijk->ij", sides, sides)))
+    """(m, 3) lengths of the half-edges, from coordinate differences: a far-away origin costs no digits beyond
+    those the data has lost already."""
+    square = np.zeros((3, len(faces)))
+    corner = np.ascontiguousarray(faces.T)
+    for coordinate in np.ascontiguousarray(vertices.T):
+        at = coordinate[corner]
+        for k in range(3):
+            side = at[(k + 1) % 3] - at[k]
+            square[k] += side * side
+    return np.asarray(np.sqrt(square).T)

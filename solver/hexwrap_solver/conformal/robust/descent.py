@@ -35,6 +35,9 @@ LIFTS = (0.0, 1e-9, 1e-6)
 RUNAWAY = 2.0
 #: Above this the answer is not accepted. Needles of 1e-4 degrees have rounding of 1e-9 in their angles.
 ACCEPTED = 1e-8
+#: So many steps that do not halve an accepted residual are tried before it counts as rounding: what rounding
+#: leaves differs from step to step, and boundary angles show the sum of many residuals.
+STALLS = 3
 
 
 @dataclass(frozen=True)
@@ -118,7 +121,7 @@ def descend(energy: FlipEnergy, start: Floats, span: float, progress: Progress) 
     x = energy.plain.unknowns_of(start)
     metric, gradient = energy.at(x)
     tolerance = ROUNDING * np.sqrt(len(x))
-    iterations = 0
+    iterations, stalls = 0, 0
     while iterations < MAX_STEPS and _largest(gradient) > tolerance:
         residual = _largest(gradient)
         progress(
@@ -131,7 +134,8 @@ def descend(energy: FlipEnergy, start: Floats, span: float, progress: Progress) 
         gained = _largest(step[2]) < 0.5 * residual
         if _largest(step[2]) < residual or residual > ACCEPTED:
             x, metric, gradient = step
-        if not gained and residual <= ACCEPTED:
+        stalls += not gained and residual <= ACCEPTED
+        if stalls == STALLS:
             break  # nothing but rounding is left
         if np.ptp(x) > RUNAWAY * span:
             break  # no use to follow it further
