@@ -14,7 +14,8 @@ from scipy import sparse
 from scipy.sparse.csgraph import breadth_first_order, connected_components
 
 from hexwrap_solver.arrays import Ints
-from hexwrap_solver.surface.topology import half_edges, next_half_edge, twins
+from hexwrap_solver.surface.topology import half_edges, next_half_edge
+from hexwrap_solver.surface.types import Surface
 
 
 @dataclass(frozen=True)
@@ -28,11 +29,11 @@ class Cut:
     twin: Ints
 
 
-def cut_open(faces: Ints, loops: tuple[Ints, Ints], n: int) -> Cut:
-    """The cut along a shortest path of edges. faces: (m, 3) of an annulus with n vertices."""
-    twin = twins(faces, n)
-    start, end = half_edges(faces)
-    path = _shortest_path(start, end, twin, loops, n)
+def cut_open(surface: Surface) -> Cut:
+    """The cut along a shortest path of edges."""
+    n, twin = len(surface.vertices), surface.twin.copy()
+    start, end = half_edges(surface.faces)
+    path = _shortest_path(start, end, twin, surface.loops, n)
     left = _left_of(path, start, end, n)
     twin[twin[left]] = -1
     twin[left] = -1

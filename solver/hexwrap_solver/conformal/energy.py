@@ -15,7 +15,7 @@ import numpy as np
 
 from hexwrap_solver.arrays import Bools, Floats, Ints
 from hexwrap_solver.conformal.types import Targets
-from hexwrap_solver.surface.topology import edge_groups, edge_lengths, half_edges
+from hexwrap_solver.surface.topology import edge_lengths, half_edges
 from hexwrap_solver.surface.types import Surface
 
 
@@ -89,7 +89,8 @@ class Energy:
         self.target = self.reduce(np.where(targets.tie < 0, targets.angle, 0.0))
         for tie in range(1, len(targets.tie_angle)):
             self.target[self.dof[np.argmax(targets.tie == tie)]] = targets.tie_angle[tie]
-        self._find_pattern()
+        self._pair: Ints | None = None
+        self._find_pattern(surface)
 
     @property
     def points(self) -> Floats:
@@ -99,19 +100,23 @@ class Energy:
         points[self.dof[alone]] = self._vertices[alone]
         return points
 
-    def _find_pattern(self) -> None:
+    def _find_pattern(self, surface: Surface) -> None:
         """Edges between unknowns, each once, and the corners whose cotangents they take."""
-        ends = (self.dof + 1)[self.corner.T]  # 0: pinned
-        order, first = edge_groups(ends, self.n_dof + 1)
+        order, first = surface.edge_groups
         face, corner = order // 3, order % 3
-        self._opposite = (corner + 2) % 3 * len(ends) + face
+        self._opposite = (corner + 2) % 3 * len(surface.faces) + face
         self._first = first[:-1]
-        start, end = (side[order[self._first]] for side in half_edges(ends))
+        unknown = self.dof + 1  # 0: pinned
+        start, end = (unknown[side[order[self._first]]] for side in half_edges(surface.faces))
         low, high = np.minimum(start, end), np.maximum(start, end)
         self._apart = np.flatnonzero(low != high)  # an edge inside one tie does not change
         self._low, self._high = low[self._apart], high[self._apart]
         self._inner = np.flatnonzero(self._low > 0)
-        self.rows, self.columns = self._high[self._inner] - 1, self._low[self._inner] - 1
+        rows, columns = self._high[self._inner] - 1, self._low[self._inner] - 1
+        if len(self.targets.tie_angle) > 1:  # several edges join one vertex and one tie
+            pairs, self._pair = np.unique(rows * self.n_dof + columns, return_inverse=True)
+            rows, columns = pairs // self.n_dof, pairs % self.n_dof
+        self.rows, self.columns = rows, columns
 
     def reduce(self, per_vertex: Floats) -> Floats:
         """Sums over the vertices that share an unknown; pinned ones fall away."""
@@ -151,7 +156,10 @@ class Energy:
         weight = 0.5 * corners.cotangent().ravel()[self._opposite]
         edge = np.add.reduceat(weight, self._first)[self._apart]
         diagonal = total(self._low, edge, self.n_dof + 1) + total(self._high, edge, self.n_dof + 1)
-        return diagonal[1:], -edge[self._inner]
+        off_diagonal = -edge[self._inner]
+        if self._pair is not None:
+            off_diagonal = total(self._pair, off_diagonal, len(self.rows))
+        return diagonal[1:], off_diagonal
 
 
 def _unknowns(targets: Targets) -> tuple[Ints, int]:

@@ -12,6 +12,7 @@ from hexwrap_solver.arrays import Complexes, Floats, Ints
 from hexwrap_solver.conformal.cut import Cut, cut_open
 from hexwrap_solver.conformal.types import Deck
 from hexwrap_solver.surface.topology import next_half_edge
+from hexwrap_solver.surface.types import Surface
 
 #: Cone angles nearer than this to a multiple of 2π count as one: g is a translation (see Deck).
 FULL_TURN = 1e-9
@@ -34,9 +35,7 @@ class Layout:
     closing_error: float
 
 
-def lay_out(
-    faces: Ints, lengths: Floats, angles: Floats, cone_angle: float, loops: tuple[Ints, Ints], n: int
-) -> Layout:
+def lay_out(surface: Surface, lengths: Floats, angles: Floats, cone_angle: float) -> Layout:
     """Develops the triangles over a breadth-first tree of the faces and closes the result with g.
 
     lengths, angles: (3, m) of the flat metric (row k: corner k, and the edge opposite to it).
@@ -46,9 +45,8 @@ def lay_out(
     origin, and the sheet is symmetric to the positive y axis; where the apex is FAR away, the cut starts at 0
     and g moves it along +x. K = 2πm, m ≠ 0: loop 0 is centred at 0.
     """
-    cut = cut_open(faces, loops, n)
-    corners = _develop(cut.twin, lengths, angles)
-    return _close(faces, corners, cut, cone_angle, loops, n)
+    cut = cut_open(surface)
+    return _close(surface, _develop(cut.twin, lengths, angles), cut, cone_angle)
 
 
 def _local_frames(lengths: Floats, angles: Floats, order: Ints) -> Complexes:
@@ -117,10 +115,8 @@ def _face_tree(twin: Ints) -> tuple[Ints, Ints]:
     return order.astype(np.int64), up
 
 
-def _close(
-    faces: Ints, corners: Complexes, cut: Cut, cone_angle: float, loops: tuple[Ints, Ints], n: int
-) -> Layout:
-    flat = faces.ravel()
+def _close(surface: Surface, corners: Complexes, cut: Cut, cone_angle: float) -> Layout:
+    flat, n = surface.faces.ravel(), len(surface.vertices)
     rotation = np.exp(1j * cone_angle)
     on_left = cut.sheet.ravel() > 0
     right = _mean_position(flat[~on_left], corners.ravel()[~on_left], n)
@@ -131,7 +127,7 @@ def _close(
     disagreement = float(np.abs(offsets - translation).max())
     uv = right
     deck = Deck(cone_angle, translation)
-    uv, deck, circumference = normalise(uv, deck, int(cut.path[0]), loops)
+    uv, deck, circumference = normalise(uv, deck, int(cut.path[0]), surface.loops)
     return Layout(uv, cut.sheet, deck, circumference, disagreement / circumference)
 
 

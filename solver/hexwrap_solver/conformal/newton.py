@@ -38,6 +38,9 @@ MAX_TRIALS = 30
 CHORDS = 4
 #: What a chord step may leave of the residual to be kept.
 CHORD_GAIN = 0.2
+#: Where more than so many triangles are broken after so many steps, or any after a full step that leaves at
+#: most SETTLED of the residual, the minimum has broken triangles as well: the search ends there.
+BROKEN, PATIENCE, SETTLED = 8, 5, 0.05
 
 
 @dataclass(frozen=True)
@@ -80,7 +83,8 @@ def minimise(energy: Energy, start: Floats | None = None, progress: Progress = n
     """Minimises the energy from ``start`` (u = 0 by default).
 
     Stops at rounding: when the residual is below what angle sums of this many triangles can resolve, or
-    when a full Newton step near the minimum no longer lowers it.
+    when a full Newton step near the minimum no longer lowers it. Stops without convergence as soon as it is
+    plain that triangles will stay broken.
     """
     factorisation = Factorisation(energy.points, energy.rows, energy.columns)
     point = _Point.at(energy, np.zeros(energy.n_dof) if start is None else energy.unknowns_of(start))
@@ -104,7 +108,9 @@ def minimise(energy: Energy, start: Floats | None = None, progress: Progress = n
             point = following
         if gain > STAGNATION and near:
             break
-        chord = full and _chords_left(point.residual, gain, tolerance) <= CHORDS
+        if _stays_broken(point.corners, iterations, full and gain <= SETTLED):
+            break
+        chord = full and chords_left(point.residual, gain, tolerance) <= CHORDS
     return Minimum(
         energy.scale_of(point.x),
         point.corners,
@@ -115,11 +121,17 @@ def minimise(energy: Energy, start: Floats | None = None, progress: Progress = n
     )
 
 
+def _stays_broken(corners: Corners, iterations: int, settled: bool) -> bool:
+    """Whether the original triangulation can be given up, see BROKEN."""
+    count = int(corners.broken.sum())
+    return count > 0 and (settled or (iterations >= PATIENCE and count > BROKEN))
+
+
 def _largest(gradient: Floats) -> float:
     return float(np.abs(gradient).max(initial=0.0))
 
 
-def _chords_left(residual: float, gain: float, tolerance: float) -> float:
+def chords_left(residual: float, gain: float, tolerance: float) -> float:
     """Steps that reach the tolerance when each leaves ``gain`` of the residual."""
     if residual <= tolerance:
         return 0.0

@@ -14,9 +14,12 @@ from hexwrap_solver.conformal.layout import lay_out
 from hexwrap_solver.conformal.newton import Minimum, minimise
 from hexwrap_solver.conformal.orientation import faithful, positive
 from hexwrap_solver.conformal.robust import solve_with_flips, with_inserted
-from hexwrap_solver.conformal.span import check_reach, check_span
+from hexwrap_solver.conformal.span import MAX_SPAN, check_reach, check_span
 from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap, Deck, Targets
 from hexwrap_solver.surface.types import Surface
+
+#: Angle sums this near to their targets make u a start for the search with flips, radians.
+CLOSE = 0.5
 
 
 def conformal_map(
@@ -72,6 +75,11 @@ def _rounding_note(found: float, rounded: float) -> str:
     )
 
 
+def _useful(minimum: Minimum) -> bool:
+    """Whether the search with flips may start where the one without them ended."""
+    return minimum.residual < CLOSE and bool(np.ptp(minimum.u) < MAX_SPAN)
+
+
 @dataclass(frozen=True)
 class _Plain:
     """A flat metric on the triangles as they are."""
@@ -88,7 +96,7 @@ def _metric(
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # where u runs away, flips take over
         minimum = minimise(energy, start, progress)
     if not minimum.converged or minimum.broken:
-        return solve_with_flips(surface, targets, progress, start)
+        return solve_with_flips(surface, targets, progress, minimum.u if _useful(minimum) else start)
     check_span(minimum.u, boundary.cone_angle_of(targets, energy.angle_sums(minimum.corners), surface))
     return _Plain(energy, minimum)
 
@@ -129,12 +137,10 @@ def _finish(surface: Surface, energy: Energy, minimum: Minimum) -> ConformalMap:
     u = minimum.u
     known = sums if pinned else energy.targets.angle
     layout = lay_out(
-        surface.faces,
+        surface,
         energy.scaled_lengths(u),
         minimum.corners.angle,
         boundary.cone_angle_of(energy.targets, known, surface),
-        surface.loops,
-        len(surface.vertices),
     )
     return ConformalMap(
         surface=surface,

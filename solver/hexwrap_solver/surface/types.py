@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 from hexwrap_solver.arrays import Floats, Ints, Ragged
+from hexwrap_solver.surface.topology import edge_groups, twins_of
 
 
 @dataclass(frozen=True)
@@ -72,3 +74,15 @@ class Surface:
     repairs: tuple[str, ...] = ()
     nurbs: NurbsSurface | None = None
     parameters: Floats | None = None
+
+    @cached_property
+    def edge_groups(self) -> tuple[Ints, Ints]:
+        """The half-edges in the order of their edges, see ``topology.edge_groups``."""
+        return edge_groups(self.faces, len(self.vertices))
+
+    @cached_property
+    def twin(self) -> Ints:
+        """(3m,) the half-edge on the other side of each, −1 at the boundary. Not to be written to."""
+        twin = twins_of(*self.edge_groups)
+        twin.flags.writeable = False
+        return twin

@@ -27,7 +27,7 @@ from tests.solver.conformal.torture import TORTURE, taken_in
 
 
 def _mirrored(surface: Surface) -> MirrorMesh:
-    sheet = cut_open(surface.faces, surface.loops, len(surface.vertices)).sheet
+    sheet = cut_open(surface).sheet
     turn = (np.roll(sheet, -1, axis=1) - sheet).ravel()
     lengths = opposite_lengths(surface.vertices, surface.faces)
     return mirror_mesh(surface, np.log(lengths)[[2, 0, 1]].T.ravel(), turn)

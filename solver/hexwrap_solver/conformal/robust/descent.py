@@ -8,12 +8,21 @@ fixed triangulation there are no broken triangles: each trial point is made Dela
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from hexwrap_solver.arrays import Floats, Ints, Progress
 from hexwrap_solver.conformal.energy import Energy
 from hexwrap_solver.conformal.factor import Factorisation
+from hexwrap_solver.conformal.newton import (
+    CHORD_GAIN,
+    CHORDS,
+    LAST_ROUNDINGS,
+    ROUNDING,
+    STAGNATION,
+    chords_left,
+)
 from hexwrap_solver.conformal.robust.delaunay import make_delaunay
 from hexwrap_solver.conformal.robust.metric import Metric, angle_sums, edge_weights, measure
 from hexwrap_solver.conformal.robust.mirror import MirrorMesh
@@ -26,8 +35,6 @@ MAX_CHANGE = 5.0
 #: Acceptable overshoot φ'(t) / |φ'(0)| of a step along its direction.
 OVERSHOOT = 0.1
 MAX_TRIALS = 40
-#: The largest entry of the gradient bottoms out at rounding, about this times √(number of unknowns).
-ROUNDING = 1e-14
 #: Added to the diagonal, relative to it and to 1, one after the other until the Hessian is definite: in exact
 #: arithmetic it always is.
 LIFTS = (0.0, 1e-9, 1e-6)
@@ -72,6 +79,12 @@ class FlipEnergy:
         if self._system is None or self._system.flips != self.flips:
             self._system = _System(self)
         return self._system.solve(metric, -gradient)
+
+    def chord_direction(self, gradient: Floats) -> Floats:
+        """The same with the Hessian of an earlier step, which flips since then do not spoil: it is
+        continuous."""
+        assert self._system is not None
+        return self._system.factorisation.solve(-gradient)
 
     def change(self, direction: Floats) -> float:
         """The greatest change of u along an edge of the current triangulation."""
@@ -120,25 +133,28 @@ def descend(energy: FlipEnergy, start: Floats, span: float, progress: Progress) 
     """
     x = energy.plain.unknowns_of(start)
     metric, gradient = energy.at(x)
-    tolerance = ROUNDING * np.sqrt(len(x))
-    iterations, stalls = 0, 0
+    tolerance = max(ROUNDING, float(np.finfo(float).eps) * _largest(energy.plain.target))
+    iterations, stalls, chord = 0, 0, False
     while iterations < MAX_STEPS and _largest(gradient) > tolerance:
         residual = _largest(gradient)
         progress(
             min(0.9, iterations / 20), f"Newton step {iterations + 1} with flips, residual {residual:.1e}"
         )
-        step = _line_search(energy, x, energy.newton_direction(metric, gradient), gradient)
+        step = _chord(energy, x, gradient) if chord else None
+        if step is None:
+            step = _line_search(energy, x, energy.newton_direction(metric, gradient), gradient)
         if step is None:
             break
         iterations += 1
-        gained = _largest(step[2]) < 0.5 * residual
-        if _largest(step[2]) < residual or residual > ACCEPTED:
-            x, metric, gradient = step
-        stalls += not gained and residual <= ACCEPTED
-        if stalls == STALLS:
+        gain = _largest(step.gradient) / residual
+        if gain < 1 or residual > ACCEPTED:
+            x, metric, gradient = step.x, step.metric, step.gradient
+        stalls += gain > STAGNATION and residual <= ACCEPTED
+        if stalls and (stalls == STALLS or residual <= LAST_ROUNDINGS):
             break  # nothing but rounding is left
         if np.ptp(x) > RUNAWAY * span:
             break  # no use to follow it further
+        chord = step.full and chords_left(_largest(gradient), gain, tolerance) <= CHORDS
     metric, gradient = energy.at(x)
     return Descent(energy.plain.scale_of(x), metric, _largest(gradient), iterations, energy.flips)
 
@@ -151,9 +167,25 @@ def _largest(gradient: Floats) -> float:
     return float(np.abs(gradient).max(initial=0.0))
 
 
-def _line_search(
-    energy: FlipEnergy, x: Floats, direction: Floats, gradient: Floats
-) -> tuple[Floats, Metric, Floats] | None:
+class _Step(NamedTuple):
+    """Where a step led: the unknowns, the metric and gradient there, and whether it was a full one."""
+
+    x: Floats
+    metric: Metric
+    gradient: Floats
+    full: bool
+
+
+def _chord(energy: FlipEnergy, x: Floats, gradient: Floats) -> _Step | None:
+    """A step with the Hessian of an earlier one; None where that is not good enough."""
+    x = x + energy.chord_direction(gradient)
+    metric, new = energy.at(x)
+    residual = _largest(gradient)
+    enough = residual <= LAST_ROUNDINGS or _largest(new) <= CHORD_GAIN * residual
+    return _Step(x, metric, new, True) if enough else None
+
+
+def _line_search(energy: FlipEnergy, x: Floats, direction: Floats, gradient: Floats) -> _Step | None:
     """The first point along the direction where φ' is at most a little above zero; φ is convex, so secants
     on φ' bracket its minimum."""
     slope = float(gradient @ direction)
@@ -166,7 +198,7 @@ def _line_search(
         metric, new = energy.at(trial)
         new_slope = float(new @ direction)
         if new_slope <= OVERSHOOT * abs(slope) or _largest(new) <= 0.5 * _largest(gradient):
-            return trial, metric, new
+            return _Step(trial, metric, new, t == 1.0)
         secant = low + (t - low) * low_slope / (low_slope - new_slope)
         t = min(max(secant, low + 0.1 * (t - low)), low + 0.7 * (t - low))
     return None

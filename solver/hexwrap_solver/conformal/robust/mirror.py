@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexwrap_solver.arrays import Bools, Floats, Ints
-from hexwrap_solver.surface.topology import next_half_edge, twins
+from hexwrap_solver.surface.topology import next_half_edge
 from hexwrap_solver.surface.types import Surface
 
 
@@ -76,8 +76,7 @@ class MirrorMesh:
 
 def mirror_mesh(surface: Surface, log_length: Floats, turn: Ints) -> MirrorMesh:
     """The double of a surface. log_length, turn: (3m,) per half-edge of the faces (see ``topology``)."""
-    faces, n = surface.faces, len(surface.vertices)
-    twin = twins(faces, n)
+    faces, twin, n = surface.faces, surface.twin, len(surface.vertices)
     inner = np.arange(faces.size)
     lead = (twin < 0) | (inner < twin)
     edge = np.zeros(faces.size, dtype=np.int64)

@@ -13,7 +13,7 @@ from hexwrap_solver.arrays import Bools, Floats, Ints
 from hexwrap_solver.conformal.energy import corner_angles, opposite_lengths
 from hexwrap_solver.conformal.robust.retriangulate import angle_sums_opposite, flatten_out
 from hexwrap_solver.conformal.types import Targets
-from hexwrap_solver.surface.topology import half_edges, twins
+from hexwrap_solver.surface.topology import half_edges
 from hexwrap_solver.surface.types import Surface
 
 #: A boundary vertex with target angle Θ gets at least Θ / FULLEST triangles.
@@ -52,8 +52,7 @@ def split_edges(problem: Problem, marked: Ints, place: Floats) -> Problem:
     belong to the tie that both ends belong to.
     """
     surface, targets = problem.surface, problem.targets
-    faces, n = surface.faces, len(surface.vertices)
-    twin = twins(faces, n)
+    faces, twin, n = surface.faces, surface.twin, len(surface.vertices)
     tail, head = half_edges(faces)
     name = np.where(twin[marked] >= 0, np.minimum(marked, twin[marked]), marked)
     _, first = np.unique(name, return_index=True)
@@ -156,9 +155,8 @@ def spread(problem: Problem, first_new: int) -> Problem:
     Delaunay: an inserted vertex pulls on the triangles behind it, round after round through a fan."""
     for _ in range(SPREAD):
         surface = problem.surface
-        faces, n = surface.faces, len(surface.vertices)
+        faces, twin, n = surface.faces, surface.twin, len(surface.vertices)
         near = np.flatnonzero((faces >= first_new).any(axis=1))
-        twin = twins(faces, n)
         h = (3 * near[:, None] + np.arange(3)).ravel()
         h = h[(twin[h] >= 0)]
         h = h[problem.parent[h // 3] != problem.parent[twin[h] // 3]]
@@ -197,8 +195,7 @@ def collapsing(surface: Surface, targets: Targets, turn: Ints) -> Ints:
 
 
 def _chords(surface: Surface, targets: Targets, turn: Ints) -> Ints:
-    faces, n = surface.faces, len(surface.vertices)
-    twin = twins(faces, n)
+    faces, twin, n = surface.faces, surface.twin, len(surface.vertices)
     tail, head = half_edges(faces)
     found = []
     for loop in surface.loops:

@@ -91,7 +91,7 @@ def solve_with_flips(
 def _turns(surface: Surface) -> Ints:
     """(m, 3) how often the side from each corner to the next goes around the annulus (see
     ``MirrorMesh.turn``)."""
-    sheet = cut_open(surface.faces, surface.loops, len(surface.vertices)).sheet
+    sheet = cut_open(surface).sheet
     return np.asarray(np.roll(sheet, -1, axis=1) - sheet)
 
 
