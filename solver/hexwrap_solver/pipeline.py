@@ -21,6 +21,7 @@ from hexwrap_solver.panels.types import Components, Panels, PanelSettings, Quali
 from hexwrap_solver.pattern import lay_pattern
 from hexwrap_solver.pattern.types import Pattern, PatternSettings
 from hexwrap_solver.surface.types import Surface
+from hexwrap_solver.threads import one_blas_thread
 
 T = TypeVar("T")
 
@@ -73,7 +74,19 @@ def solve(
     source: what the surface depends on, for runners that remember. with_support: also without components,
     then as axes and beams without depth. Raises HexwrapError.
     """
-    run = run or PlainRunner()
+    with one_blas_thread():
+        return _solve(take_in, boundary, pattern, panels, run or PlainRunner(), source, with_support)
+
+
+def _solve(
+    take_in: Callable[[], Surface],
+    boundary: BoundaryCondition,
+    pattern: PatternSettings | None,
+    panels: PanelSettings | None,
+    run: StageRunner,
+    source: Any,
+    with_support: bool,
+) -> Solution:
     surface = run("surface", source, lambda progress: take_in())
     cmap = run("map", boundary, lambda progress: conformal_map(surface, boundary, progress))
     if pattern is None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from hexwrap_solver.arrays import Ragged
 from hexwrap_solver.conformal.types import BoundaryCondition
@@ -63,3 +64,21 @@ def test_components_and_support_come_where_asked_for():
     assert len(alone.support.axes) == len(alone.pattern.vertices)
     assert "fit" not in runner.timings
     assert run(panels=PanelSettings())[0].support is None
+
+
+def test_stages_run_with_one_blas_thread_and_leave_the_callers_setting_alone():
+    def threads():
+        return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
+
+    seen = []
+
+    class Runner(PlainRunner):
+        def __call__(self, stage, settings, compute):
+            seen.append(threads())
+            return super().__call__(stage, settings, compute)
+
+    with threadpool_limits(2, user_api="blas"):
+        before = threads()
+        solve(take_in, BoundaryCondition(), None, None, Runner())
+        assert threads() == before == {2}
+    assert seen == [{1}] * 3
