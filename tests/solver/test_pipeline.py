@@ -80,5 +80,5 @@ def test_stages_run_with_one_blas_thread_and_leave_the_callers_setting_alone():
     with threadpool_limits(2, user_api="blas"):
         before = threads()
         solve(take_in, BoundaryCondition(), None, None, Runner())
-        assert threads() == before == {2}
-    assert seen == [{1}] * 3
+        assert threads() == before
+    assert seen == [{1} if before else set()] * 3  # Accelerate on macOS has no threads to set
