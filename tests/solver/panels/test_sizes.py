@@ -113,3 +113,13 @@ def test_large_problems_agree_with_the_quadratic_programme():
     for k in range(2, 9):
         value = np.where(i <= j, value[:-1, None] + (j - i) * square[:, None], -np.inf).max(axis=0)
         assert partition_by_area(length, 8).loss[k - 1] == pytest.approx(square.sum() - value[-1], rel=1e-11)
+
+
+@given(st.lists(st.floats(0.5, 2.0), min_size=1, max_size=9, unique=True), st.integers(1, 9))
+def test_limits_that_only_rounding_tells_apart_share_a_size(values, classes):
+    apart = np.repeat(np.round(values, 3), 4)
+    noise = 1 + 1e-15 * np.arange(len(apart))
+    length = choose_lengths(apart * noise, classes)
+    np.testing.assert_allclose(length, choose_lengths(apart, classes), rtol=1e-12)
+    assert len(np.unique(length)) <= min(classes, len(np.unique(apart)))
+    assert (length <= apart * noise).all()
