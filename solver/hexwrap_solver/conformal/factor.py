@@ -2,8 +2,10 @@
 
 Every node of the dissection tree eliminates its unknowns in one dense matrix, the front, with LAPACK, and
 hands what is left (the update) to its parent. The symbolic analysis is done once per pattern. It needs
-nothing but NumPy and SciPy, and is as fast as the compiled supernodal codes on meshes: the arithmetic is
-in BLAS, and there are a few short Python steps per front of some fifty unknowns.
+nothing but NumPy and SciPy: the arithmetic is in BLAS, with a few short Python steps per front of some fifty
+unknowns. Analysis and first factorisation, which is what a new mesh costs, take 1.7 and 1.1 times as long
+as in CHOLMOD and 0.6 times as long as in MKL PARDISO, at 20,000 and 200,000 vertices (``benchmarks/map.py``);
+SciPy's own SuperLU takes ten times as long and more.
 """
 
 from __future__ import annotations
