@@ -13,7 +13,7 @@ from hexwrap_solver.conformal.energy import Energy
 from hexwrap_solver.conformal.layout import lay_out
 from hexwrap_solver.conformal.newton import Minimum, minimise
 from hexwrap_solver.conformal.orientation import faithful, positive
-from hexwrap_solver.conformal.robust import solve_with_flips, with_inserted
+from hexwrap_solver.conformal.robust import FlatMetric, metric_with_flips, solve_with_flips, with_inserted
 from hexwrap_solver.conformal.span import MAX_SPAN, check_reach, check_span
 from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap, Deck, Targets
 from hexwrap_solver.surface.types import Surface
@@ -33,10 +33,11 @@ def conformal_map(
     """
     if condition.mode == "isometric":
         return _isometric(surface, condition, progress)
+    targets = boundary.straight(surface)
     if condition.mode == "angles":
         targets = boundary.prescribed(surface, boundary_angles(surface, condition))
-        return _map(surface, targets, None, progress)
-    return _map(surface, boundary.straight(surface), None, progress)
+    found = _map(surface, targets, None, progress)
+    return _scaled(found, -_mean_on_area(found.surface, found.log_scale))
 
 
 def _isometric(surface: Surface, condition: BoundaryCondition, progress: Progress) -> ConformalMap:
@@ -44,12 +45,11 @@ def _isometric(surface: Surface, condition: BoundaryCondition, progress: Progres
     targets = boundary.isometric(surface)
     if condition.quantum is None:
         return _map(surface, targets, None, progress)
-    first = _metric(surface, targets, None, _part(progress, 0.0))
-    if isinstance(first, ConformalMap):
-        surface, u, angles = first.surface, first.log_scale, first.boundary_angles
-    else:
-        sums = first.energy.angle_sums(first.minimum.corners)
-        u, angles = first.minimum.u, (sums[surface.loops[0]], sums[surface.loops[1]])
+    plain = _plain(surface, targets, None, _part(progress, 0.0))
+    first = plain.metric if plain.holds else metric_with_flips(surface, targets, progress, plain.start)
+    inserted = len(first.surface.vertices) - len(surface.vertices)
+    surface, loops = first.surface, first.surface.loops
+    angles = first.sums[loops[0]], first.sums[loops[1]]
     found = (boundary.cone_angle(angles[0]) - boundary.cone_angle(angles[1])) / 2
     rounded = boundary.nearest_multiple(found, condition.quantum)
     if condition.spread == "optimal":
@@ -57,9 +57,10 @@ def _isometric(surface: Surface, condition: BoundaryCondition, progress: Progres
     else:
         spread = boundary.spread_evenly
         targets = boundary.prescribed(surface, (spread(angles[0], rounded), spread(angles[1], -rounded)))
-    second = _map(surface, targets, u, _part(progress, 0.5), keep_boundary=True)
-    if isinstance(first, ConformalMap):
-        second = with_inserted(second, first.inserted)
+    second = _map(surface, targets, first.u, _part(progress, 0.5), flips=not plain.holds)
+    if condition.spread == "even":
+        second = _scaled(second, -_mean_on_boundary(second.surface, second.log_scale))
+    second = with_inserted(second, inserted)
     return replace(second, notes=(_rounding_note(found, rounded), *second.notes))
 
 
@@ -75,72 +76,78 @@ def _rounding_note(found: float, rounded: float) -> str:
     )
 
 
-def _useful(minimum: Minimum) -> bool:
-    """Whether the search with flips may start where the one without them ended."""
-    return minimum.residual < CLOSE and bool(np.ptp(minimum.u) < MAX_SPAN)
-
-
 @dataclass(frozen=True)
 class _Plain:
-    """A flat metric on the triangles as they are."""
+    """What Newton's method finds on the triangles as they are."""
 
+    surface: Surface
     energy: Energy
     minimum: Minimum
 
+    @property
+    def holds(self) -> bool:
+        """Whether it is a flat metric."""
+        return self.minimum.converged and not self.minimum.broken
 
-def _metric(
-    surface: Surface, targets: Targets, start: Floats | None, progress: Progress
-) -> _Plain | ConformalMap:
-    """On the triangles as they are where that works, otherwise with flips (which lay the map out at once)."""
+    @property
+    def metric(self) -> FlatMetric:
+        return FlatMetric(self.surface, self.minimum.u, self.energy.angle_sums(self.minimum.corners))
+
+    @property
+    def start(self) -> Floats | None:
+        """Where a search with flips may start; None where this one ran away."""
+        near = self.minimum.residual < CLOSE and np.ptp(self.minimum.u) < MAX_SPAN
+        return self.minimum.u if near else None
+
+
+def _plain(surface: Surface, targets: Targets, start: Floats | None, progress: Progress) -> _Plain:
     energy = Energy(surface, targets)
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # where u runs away, flips take over
-        minimum = minimise(energy, start, progress)
-    if not minimum.converged or minimum.broken:
-        return solve_with_flips(surface, targets, progress, minimum.u if _useful(minimum) else start)
-    check_span(minimum.u, boundary.cone_angle_of(targets, energy.angle_sums(minimum.corners), surface))
-    return _Plain(energy, minimum)
+        return _Plain(surface, energy, minimise(energy, start, progress))
 
 
 def _map(
-    surface: Surface, targets: Targets, start: Floats | None, progress: Progress, keep_boundary: bool = False
+    surface: Surface, targets: Targets, start: Floats | None, progress: Progress, flips: bool = False
 ) -> ConformalMap:
-    """Metric, layout, and with flips where triangles turn over in the layout, be it by rounding."""
-    found = _metric(surface, targets, start, progress)
-    if isinstance(found, _Plain):
-        found = _finish(surface, found.energy, found.minimum)
-        if not (positive(found.corners()).all() and faithful(found)):
-            found = solve_with_flips(surface, targets, progress, start)
-    if (targets.tie == 0).any():
-        return found
-    u = found.log_scale
-    mean = _mean_on_boundary(found.surface, u) if keep_boundary else _mean_on_area(found.surface, u)
-    check_reach(u - mean, found.deck.angle)
-    return _scaled(found, -mean)
+    """On the triangles as they are where that works; with flips where it does not, where triangles turn over
+    in the layout (be it by rounding), or from the beginning. With free u its scale is arbitrary."""
+    if not flips:
+        plain = _plain(surface, targets, start, progress)
+        if plain.holds:
+            found = _finish(plain)
+            if positive(found.corners()).all() and faithful(found):
+                return found
+        start = start if plain.start is None else plain.start
+    return solve_with_flips(surface, targets, progress, start)
 
 
 def _scaled(found: ConformalMap, shift: float) -> ConformalMap:
-    """The same map with a domain e^shift times as large."""
+    """The same map with a domain e^shift times as large. Raises ConvergenceError beyond all doubles."""
+    u = found.log_scale + shift
+    check_reach(u, found.deck.angle)
     factor = float(np.exp(shift))
     return replace(
         found,
-        log_scale=found.log_scale + shift,
+        log_scale=u,
         uv=found.uv * factor,
         deck=Deck(found.deck.angle, found.deck.translation * factor),
         circumference=found.circumference * factor,
     )
 
 
-def _finish(surface: Surface, energy: Energy, minimum: Minimum) -> ConformalMap:
+def _finish(plain: _Plain) -> ConformalMap:
     """Layout and everything measured on the result."""
+    surface, energy, minimum, u = plain.surface, plain.energy, plain.minimum, plain.minimum.u
     sums = energy.angle_sums(minimum.corners)
     pinned = bool((energy.targets.tie == 0).any())
-    u = minimum.u
     known = sums if pinned else energy.targets.angle
+    angle = boundary.cone_angle_of(energy.targets, known, surface)
+    check_span(u, angle)
     layout = lay_out(
         surface,
         energy.scaled_lengths(u),
         minimum.corners.angle,
-        boundary.cone_angle_of(energy.targets, known, surface),
+        angle,
     )
     return ConformalMap(
         surface=surface,

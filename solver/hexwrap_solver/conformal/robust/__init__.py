@@ -1,5 +1,10 @@
 """The route that serves every annulus: intrinsic flips on the mirrored surface, refinement where needed."""
 
-from hexwrap_solver.conformal.robust.solve import solve_with_flips, with_inserted
+from hexwrap_solver.conformal.robust.solve import (
+    FlatMetric,
+    metric_with_flips,
+    solve_with_flips,
+    with_inserted,
+)
 
-__all__ = ["solve_with_flips", "with_inserted"]
+__all__ = ["FlatMetric", "metric_with_flips", "solve_with_flips", "with_inserted"]

@@ -3,7 +3,7 @@ triangle cannot follow the map."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from hexwrap_solver.conformal.robust.delaunay import make_delaunay
 from hexwrap_solver.conformal.robust.descent import ACCEPTED, Descent, FlipEnergy, descend
 from hexwrap_solver.conformal.robust.develop import develop
 from hexwrap_solver.conformal.robust.metric import Metric, angle_sums
-from hexwrap_solver.conformal.robust.mirror import mirror_mesh
+from hexwrap_solver.conformal.robust.mirror import MirrorMesh, mirror_mesh
 from hexwrap_solver.conformal.robust.refine import (
     Problem,
     collapsing,
@@ -54,16 +54,11 @@ def solve_with_flips(
     Sources: Gu, Luo, Sun, Wu 2018 (existence); Springborn 2020; Gillespie, Springborn, Crane 2021 (flips).
     Raises ConvergenceError where double precision does not suffice.
     """
-    problem = Problem(
-        surface,
-        targets,
-        np.zeros(len(surface.vertices)) if start is None else start,
-        np.arange(len(surface.faces)),
-    )
+    problem = _problem(surface, targets, start)
     iterations, fewest = 0, len(surface.faces)
     for attempt in range(MAX_ROUNDS):
         problem = _uncollapse(problem)
-        found = _attempt(problem, progress)
+        found = _draw(problem, _flatten(problem, progress))
         iterations += found.iterations
         wrong = np.flatnonzero(misdrawn(found))
         if not len(wrong):
@@ -88,6 +83,30 @@ def solve_with_flips(
     )
 
 
+@dataclass(frozen=True)
+class FlatMetric:
+    """A flat metric that has not been drawn. surface: the one it belongs to, with vertices inserted where
+    triangles could have had no room. u: (n,) logarithmic factors. sums: (n,) angle sums."""
+
+    surface: Surface
+    u: Floats
+    sums: Floats
+
+
+def metric_with_flips(
+    surface: Surface, targets: Targets, progress: Progress = no_progress, start: Floats | None = None
+) -> FlatMetric:
+    """The metric of ``solve_with_flips``, whether or not straight triangles can be drawn in it."""
+    problem = _uncollapse(_problem(surface, targets, start))
+    flat = _flatten(problem, progress)
+    return FlatMetric(problem.surface, flat.descent.u, flat.sums)
+
+
+def _problem(surface: Surface, targets: Targets, start: Floats | None) -> Problem:
+    u = np.zeros(len(surface.vertices)) if start is None else start
+    return Problem(surface, targets, u, np.arange(len(surface.faces)))
+
+
 def _turns(surface: Surface) -> Ints:
     """(m, 3) how often the side from each corner to the next goes around the annulus (see
     ``MirrorMesh.turn``)."""
@@ -104,8 +123,24 @@ def _uncollapse(problem: Problem) -> Problem:
         problem = split_edges(problem, marked, np.full(len(marked), 0.5))
 
 
-def _attempt(problem: Problem, progress: Progress) -> ConformalMap:
-    """The map of the vertices, with the triangles as they are, whether they turn over or not."""
+@dataclass(frozen=True)
+class _Flat:
+    """A flat Delaunay metric on the mirrored annulus.
+
+    turn: (m, 3) see ``_turns``. unit: logarithm of the length in which the metric is measured.
+    cone_angle: K. sums: (n,) angle sums. flips: all of them."""
+
+    mesh: MirrorMesh
+    turn: Ints
+    unit: float
+    cone_angle: float
+    descent: Descent
+    sums: Floats
+    flips: int
+
+
+def _flatten(problem: Problem, progress: Progress) -> _Flat:
+    """The metric with the problem's angle sums. Raises ConvergenceError."""
     surface, targets = problem.surface, problem.targets
     free = bool((targets.tie == 0).any() and len(targets.tie_angle) == 1)  # the cone angle comes out
     turn = _turns(surface)
@@ -125,17 +160,24 @@ def _attempt(problem: Problem, progress: Progress) -> ConformalMap:
             f"{descent.residual:.1e} rad off: double precision cannot hold the map of this surface; "
             "remesh it more evenly."
         )
+    return _Flat(mesh, turn, unit, angle, descent, sums, flips + descent.flips)
+
+
+def _draw(problem: Problem, flat: _Flat) -> ConformalMap:
+    """The map of the vertices, with the triangles as they are, whether they turn over or not."""
+    surface, targets, descent, sums = problem.surface, problem.targets, flat.descent, flat.sums
     u, metric = _centred(descent, targets)
-    check_reach(u, angle)
+    check_reach(u, flat.cone_angle)
     foot = int(surface.loops[0][0])
-    laid = develop(mesh, metric, angle)
+    laid = develop(flat.mesh, metric, flat.cone_angle)
+    unit = np.exp(flat.unit)
     uv, deck, circumference = normalise(
-        laid.uv * np.exp(unit), Deck(angle, laid.translation * np.exp(unit)), foot, surface.loops
+        laid.uv * unit, Deck(flat.cone_angle, laid.translation * unit), foot, surface.loops
     )
     lift = laid.lift[surface.faces]
     sheet = lift[:, :1] - lift
-    sheet[:, 1] += turn[:, 0]
-    sheet[:, 2] -= turn[:, 2]
+    sheet[:, 1] += flat.turn[:, 0]
+    sheet[:, 2] -= flat.turn[:, 2]
     return ConformalMap(
         surface=surface,
         log_scale=u,
@@ -146,7 +188,7 @@ def _attempt(problem: Problem, progress: Progress) -> ConformalMap:
         circumference=circumference,
         iterations=descent.iterations,
         residual=descent.residual,
-        flips=flips + descent.flips,
+        flips=flat.flips,
         closing_error=laid.gap,
     )
 
