@@ -9,7 +9,6 @@ import numpy as np
 from hexwrap_solver.arrays import Complexes, Floats, Ints
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.domain.interpolate import domain_weights
-from hexwrap_solver.surface.closest import TriangleTree
 
 
 @dataclass(frozen=True)
@@ -27,7 +26,7 @@ def flatten(cmap: ConformalMap, points: Floats) -> Flattened:
     """Carry the surface points nearest to (k, 3) points into the domain."""
     points = np.asarray(points, dtype=float).reshape(-1, 3)
     surface = cmap.surface
-    near = TriangleTree.build(surface.vertices, surface.faces).nearest(points)
+    near = surface.tree.nearest(points)
     weights = domain_weights(cmap, near.face, near.barycentric)
     corners = cmap.deck.apply(cmap.uv[surface.faces[near.face]], cmap.sheet[near.face])
     return Flattened((weights * corners).sum(axis=1), near.distance, near.face, near.barycentric)

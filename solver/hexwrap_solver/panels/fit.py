@@ -20,7 +20,6 @@ from hexwrap_solver.panels.separation import Separation, separating_planes
 from hexwrap_solver.panels.trimmed import flatten_and_clear, plane_normals
 from hexwrap_solver.panels.types import FittedPanels, PanelSettings, Weights
 from hexwrap_solver.pattern.types import Pattern
-from hexwrap_solver.surface.closest import TriangleTree
 from hexwrap_solver.surface.types import Surface
 
 #: Corners of a whole cell of each kind.
@@ -116,7 +115,7 @@ def _fit_watertight(
 ) -> FittedPanels:
     """All cells, trimmed ones too, as polygons over shared corners."""
     target = target_lengths(_corner_points(pattern), settings)
-    tree = TriangleTree.build(surface.vertices, surface.faces) if settings.weights.surface > 0 else None
+    tree = surface.tree if settings.weights.surface > 0 else None
     moved, energy = minimise_watertight(pattern, target, settings.weights, tree, progress)
     shapes = Ragged(moved[pattern.faces.values.astype(np.int64)], pattern.faces.offsets)
     return FittedPanels(

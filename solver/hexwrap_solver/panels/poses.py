@@ -10,7 +10,6 @@ from hexwrap_solver.panels.polygons import edge_lengths, mean_edges, row_minima
 from hexwrap_solver.panels.regular import Poses, nearest_regular, nearest_regular_in_plane
 from hexwrap_solver.panels.tangents import surface_normals
 from hexwrap_solver.panels.types import PanelSettings
-from hexwrap_solver.surface.closest import TriangleTree
 from hexwrap_solver.surface.types import Surface
 
 #: Minimisers this near to regular panels (relative to the edge) are regular to rounding.
@@ -25,8 +24,7 @@ def fit_poses(
     if settings.method == "exact":
         return _nearest(surface, cells, settings), None, ()
     target = target_lengths(Ragged.from_table(cells), settings)
-    pull = settings.weights.surface > 0
-    tree = TriangleTree.build(surface.vertices, surface.faces) if pull else None
+    tree = surface.tree if settings.weights.surface > 0 else None
     shape, energy = minimise_singly(cells, target, settings.weights, tree, progress)
     poses = _nearest(surface, shape, settings)
     ideal = poses.center[:, None] + poses.free_length[:, None, None] * poses.spokes(cells.shape[1])
@@ -50,5 +48,4 @@ def target_lengths(cells: Ragged, settings: PanelSettings) -> Floats:
 def _nearest(surface: Surface, shape: Floats, settings: PanelSettings) -> Poses:
     if settings.orientation == "fit":
         return nearest_regular(shape)
-    tree = TriangleTree.build(surface.vertices, surface.faces)
-    return nearest_regular_in_plane(shape, surface_normals(surface, shape.mean(axis=1), tree))
+    return nearest_regular_in_plane(shape, surface_normals(surface, shape.mean(axis=1)))

@@ -22,7 +22,6 @@ from hexwrap_solver.panels.polygons import (
 )
 from hexwrap_solver.panels.types import Panels, Quality
 from hexwrap_solver.pattern.types import Pattern
-from hexwrap_solver.surface.closest import TriangleTree
 
 
 def measure(
@@ -46,8 +45,7 @@ def measure(
     row, count, mean = polygons.row, polygons.lengths, mean_edges(polygons)
     ideal = (np.pi * (count - 2) / count)[row]
     progress(0.5, "distances to the surface")
-    tree = TriangleTree.build(cmap.surface.vertices, cmap.surface.faces)
-    away = tree.nearest(np.asarray(polygons.values, dtype=np.float64)).distance
+    away = cmap.surface.tree.nearest(np.asarray(polygons.values, dtype=np.float64)).distance
     progress(0.9, "looking for overlaps")
     return replace(
         quality,

@@ -5,17 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from hexwrap_solver.arrays import Floats
-from hexwrap_solver.surface.closest import TriangleTree
 from hexwrap_solver.surface.projection import project, start_parameters
 from hexwrap_solver.surface.types import Surface
 
 
-def surface_normals(surface: Surface, points: Floats, tree: TriangleTree) -> Floats:
+def surface_normals(surface: Surface, points: Floats) -> Floats:
     """(k, 3) unit normals, on the outside, where the surface is nearest to the points (k, 3).
 
     From the tangents of the NURBS surface where there is one, else interpolated between the mesh's normals.
     """
-    nearest = tree.nearest(points)
+    nearest = surface.tree.nearest(points)
     corners = surface.normals[surface.faces[nearest.face]]
     interpolated = np.einsum("kc,kcd->kd", nearest.barycentric, corners)
     if surface.nurbs is None:

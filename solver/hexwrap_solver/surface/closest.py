@@ -12,11 +12,20 @@ from hexwrap_solver.arrays import Floats, Ints
 #: Points searched together; bounds the memory of the search, not its result.
 CHUNK = 65536
 
-#: Points that descend the tree together.
-GROUP = 8
+#: At most so many points descend the tree together: as many as there are for each triangle, since the box of
+#: points that lie further apart than triangles meets too many of these.
+LARGEST_GROUP = 8
 
 #: Bits per coordinate of the Morton code that sorts the triangles.
 MORTON_BITS = 20
+#: Moves the bits of a coordinate three places apart: shift, then keep what these masks leave.
+SPREAD = (
+    (32, 0x1F00000000FFFF),
+    (16, 0x1F0000FF0000FF),
+    (8, 0x100F00F00F00F00F),
+    (4, 0x10C30C30C30C30C3),
+    (2, 0x1249249249249249),
+)
 
 
 @dataclass(frozen=True)
@@ -33,7 +42,7 @@ class TriangleTree:
     """Boxes around triangles sorted along a Morton curve, pairwise merged up to a single root.
 
     corners: (m, 3, 3). centroids: search tree over the triangles' centroids. order: (m,) triangles along
-    the curve. low, high: per level from the root downwards, (2^level, 3); boxes beyond the last triangle
+    the curve. low, high: per level from the root downwards, (3, 2^level); boxes beyond the last triangle
     are empty (low = ∞).
     """
 
@@ -50,13 +59,14 @@ class TriangleTree:
         centroid = corners.mean(axis=1)
         order = np.argsort(_morton(centroid), kind="stable")
         leaves = 1 << max(len(faces) - 1, 0).bit_length()
-        low, high = np.full((leaves, 3), np.inf), np.full((leaves, 3), -np.inf)
-        low[: len(faces)] = corners[order].min(axis=1)
-        high[: len(faces)] = corners[order].max(axis=1)
+        low, high = np.full((3, leaves), np.inf), np.full((3, leaves), -np.inf)
+        a, b, c = (vertices[corner].T for corner in faces[order].T)
+        low[:, : len(faces)] = np.minimum(np.minimum(a, b), c)
+        high[:, : len(faces)] = np.maximum(np.maximum(a, b), c)
         lows, highs = [low], [high]
-        while len(lows[-1]) > 1:
-            lows.append(np.minimum(lows[-1][::2], lows[-1][1::2]))
-            highs.append(np.maximum(highs[-1][::2], highs[-1][1::2]))
+        while lows[-1].shape[1] > 1:
+            lows.append(np.minimum(lows[-1][:, ::2], lows[-1][:, 1::2]))
+            highs.append(np.maximum(highs[-1][:, ::2], highs[-1][:, 1::2]))
         return cls(corners, KDTree(centroid), order, lows[::-1], highs[::-1])
 
     def nearest(self, points: Floats) -> Nearest:
@@ -88,22 +98,29 @@ class TriangleTree:
 
         Points that are neighbours along the curve descend the tree together, in one box.
         """
-        start = np.arange(0, len(points), GROUP)
-        low = np.minimum.reduceat(points - reach[:, None], start)
-        high = np.maximum.reduceat(points + reach[:, None], start)
+        together = min(LARGEST_GROUP, 1 + len(points) // len(self.order))
+        start = np.arange(0, len(points), together)
+        place = np.ascontiguousarray(points.T)
+        low = np.minimum.reduceat(place - reach, start, axis=1)
+        high = np.maximum.reduceat(place + reach, start, axis=1)
         group, node = np.arange(len(start)), np.zeros(len(start), dtype=np.int64)
         for level in range(1, len(self.low)):
             group = np.repeat(group, 2)
             node = np.repeat(2 * node, 2)
             node[1::2] += 1
-            meets = (self.low[level][node] <= high[group]) & (self.high[level][node] >= low[group])
-            keep = meets[:, 0] & meets[:, 1] & meets[:, 2]
-            group, node = group[keep], node[keep]
-        size = np.minimum(GROUP, len(points) - start)[group]
+            for axis in range(3):
+                meets = self.low[level][axis][node] <= high[axis][group]
+                meets &= self.high[level][axis][node] >= low[axis][group]
+                group, node = group[meets], node[meets]
+        size = np.minimum(together, len(points) - start)[group]
         point = np.repeat(start[group] - np.cumsum(size) + size, size) + np.arange(size.sum())
         leaf = np.repeat(node, size)
-        outside = np.maximum(self.low[-1][leaf] - points[point], points[point] - self.high[-1][leaf])
-        keep = np.linalg.norm(np.maximum(outside, 0.0), axis=1) <= reach[point]
+        square = np.zeros(len(leaf))
+        for axis in range(3):
+            at = place[axis][point]
+            outside = np.maximum(self.low[-1][axis][leaf] - at, at - self.high[-1][axis][leaf])
+            square += np.maximum(outside, 0.0) ** 2
+        keep = np.sqrt(square) <= reach[point]
         return point[keep], leaf[keep]
 
 
@@ -147,9 +164,11 @@ def _morton(points: Floats) -> Ints:
     span = max(float((points.max(axis=0) - low).max()), np.finfo(float).tiny)
     cell = ((points - low) / span * ((1 << MORTON_BITS) - 1)).astype(np.int64)
     code = np.zeros(len(points), dtype=np.int64)
-    for bit in range(MORTON_BITS):
-        for axis in range(3):
-            code |= ((cell[:, axis] >> bit) & 1) << (3 * bit + axis)
+    for axis in range(3):
+        spread = np.ascontiguousarray(cell[:, axis])
+        for shift, mask in SPREAD:
+            spread = (spread | spread << shift) & mask
+        code |= spread << axis
     return code
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from hexwrap_solver.arrays import Floats, Ints, Ragged
+from hexwrap_solver.surface.closest import TriangleTree
 from hexwrap_solver.surface.topology import edge_groups, twins_of
 
 
@@ -86,3 +87,8 @@ class Surface:
         twin = twins_of(*self.edge_groups)
         twin.flags.writeable = False
         return twin
+
+    @cached_property
+    def tree(self) -> TriangleTree:
+        """For the nearest points of the mesh."""
+        return TriangleTree.build(self.vertices, self.faces)

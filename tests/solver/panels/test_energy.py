@@ -13,7 +13,6 @@ from hexwrap_solver.panels.energy.residuals import jacobian, residuals, surface_
 from hexwrap_solver.panels.energy.single import minimise_singly
 from hexwrap_solver.panels.regular import corners, nearest_regular
 from hexwrap_solver.panels.types import PanelSettings, Weights
-from hexwrap_solver.surface.closest import TriangleTree
 from tests.solver.panels.cells import (
     catenoid,
     grid_map,
@@ -58,7 +57,7 @@ def test_derivatives_agree_with_finite_differences(p):
 
 def test_the_distance_to_the_surface_has_the_right_slope():
     surface = grid_map(torus, 40, 20, -0.5, 1.5).surface
-    tree = TriangleTree.build(surface.vertices, surface.faces)
+    tree = surface.tree
     points = np.random.default_rng(0).normal(size=(50, 3)) * 2
     length = np.full(50, 0.3)
     _, slope = surface_residuals(points, length, tree)
@@ -103,7 +102,7 @@ def test_closed_form_is_the_optimum_of_the_energy(make, target):
 
 def test_with_the_surface_the_energy_falls_below_that_of_the_closed_form():
     pattern, cmap = hex_pattern(torus, 24, 6), grid_map(torus, 96, 60, -0.1, 1.2)
-    tree = TriangleTree.build(cmap.surface.vertices, cmap.surface.faces)
+    tree = cmap.surface.tree
     cells = pattern.vertices[pattern.faces.values].reshape(-1, 6, 3)
     length = np.linalg.norm(np.roll(cells, -1, axis=1) - cells, axis=2).mean(axis=1)
     pull = Weights(surface=10.0)
