@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from math import inf
 from pathlib import Path
 
+import hexwrap_server.one_thread  # noqa: F401  (before NumPy is imported)  # isort: skip
 import httpx
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn

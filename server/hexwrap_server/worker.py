@@ -24,19 +24,9 @@ from typing import IO, Any
 
 import psutil
 
+from hexwrap_server.one_thread import ONE_THREAD
 from hexwrap_solver.errors import HexwrapError
 
-#: Two workers with two BLAS threads each are many times slower than with one each.
-ONE_THREAD = dict.fromkeys(
-    (
-        "OMP_NUM_THREADS",
-        "OPENBLAS_NUM_THREADS",
-        "MKL_NUM_THREADS",
-        "VECLIB_MAXIMUM_THREADS",
-        "NUMEXPR_NUM_THREADS",
-    ),
-    "1",
-)
 #: Seconds between two looks at a worker's memory and clock.
 WATCH_INTERVAL = 0.1
 #: Seconds between two progress messages of one job.
