@@ -18,6 +18,10 @@ from hexwrap_solver.arrays import Bools, Floats, Ints
 INCREMENT_SLACK = 1e-9
 
 
+#: Neighbouring limits that differ by less than this (relatively) are equal but for rounding.
+ROUNDING = 1e-11
+
+
 @dataclass(frozen=True)
 class Partition:
     """Best classes for every number 1…K over limits sorted ascending.
@@ -35,6 +39,13 @@ def floor_to(length: Floats, increment: float) -> Floats:
     if increment <= 0:
         return length
     return np.asarray(np.floor(length / increment + INCREMENT_SLACK) * increment)
+
+
+def level(length: Floats) -> Floats:
+    """Ascending lengths, those that rounding alone tells apart (on symmetric surfaces) made the least of
+    them: they need no size of their own."""
+    new = np.append(True, np.diff(length) > ROUNDING * length[:-1])
+    return np.asarray(length[np.flatnonzero(new)[np.cumsum(new) - 1]])
 
 
 def partition_by_area(length: Floats, classes: int) -> Partition:
@@ -143,7 +154,7 @@ def partition(
     limit: Floats, classes: int, cost: Literal["area", "worst"], increment: float
 ) -> tuple[Partition, Floats]:
     """Partition of limits sorted ascending, and the floored limits that the lengths are taken from."""
-    floored = floor_to(limit, increment)
+    floored = level(floor_to(limit, increment))
     made = (
         partition_by_area(floored, classes) if cost == "area" else partition_by_worst(limit, floored, classes)
     )

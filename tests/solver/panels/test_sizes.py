@@ -104,6 +104,16 @@ def test_equal_limits_make_one_class():
     assert (choose_lengths(np.full(100, 1.7), 11) == 1.7).all()
 
 
+@pytest.mark.parametrize("cost", ["area", "worst"])
+def test_limits_that_rounding_tells_apart_share_a_class(cost):
+    few = np.array([1.0, 1.3, 1.7])
+    limit = np.repeat(few, 50) * (1 + 1e-15 * np.random.default_rng(0).normal(size=150))
+    length = choose_lengths(limit, 11, cost)
+    assert len(np.unique(length)) == 3
+    assert (length <= limit).all()
+    np.testing.assert_allclose(length, limit, rtol=1e-13)
+
+
 def test_large_problems_agree_with_the_quadratic_programme():
     """Monge or not, the recurrence evaluated over all pairs gives the same value."""
     length = np.sort(np.random.default_rng(5).lognormal(size=400))
