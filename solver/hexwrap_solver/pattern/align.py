@@ -8,7 +8,7 @@ import numpy as np
 
 from hexwrap_solver.arrays import Complexes, Floats, Ints
 from hexwrap_solver.conformal.types import ConformalMap
-from hexwrap_solver.pattern.deform import deform, distortion_of
+from hexwrap_solver.pattern.deform import System, deform, distortion_of
 from hexwrap_solver.pattern.lattice import Lattice, Motion
 from hexwrap_solver.pattern.placement import Placement, edge_angle
 from hexwrap_solver.pattern.rows import Rows, rows_along
@@ -37,7 +37,8 @@ COMPARED, DEFORMED, ENOUGH = 12, 3, 0.03
 class _Trial:
     """W = scale·(z − apex) + origin before the deformation, what g becomes, and the line of each side.
 
-    moved: by how much the sides (and g) are moved, as ``Strain`` wants it; extra: costs beside its own.
+    moved: by how much the sides (and g) are moved, and the scale, as ``Strain`` wants it. extra: costs beside
+    its own.
     """
 
     scale: complex
@@ -66,6 +67,13 @@ class _Frame:
     depth: Floats
     unit: complex
 
+    @property
+    def turned(self) -> Floats:
+        """(k,) mean depth of their side less the depth of the sides' vertices, at scale 1."""
+        place = (self.sides.place - (self.cmap.deck.apex or 0)) * self.unit
+        side = self.sides.side
+        return np.asarray(self.depth[side] - (self.normal[side].conj() * place).real)
+
 
 def place_by_sides(
     cmap: ConformalMap, lattice: Lattice, settings: PatternSettings, turns: int, loops: list[int]
@@ -75,7 +83,8 @@ def place_by_sides(
     frame = _frame(cmap, lattice, settings, turns, loops)
     rotation = Motion(lattice, turns, (0, 0))
     lines = lines_of(len(cmap.uv), frame.sides, frame.normal, rotation)
-    strain = Strain.of(cmap, frame.sides, lines, rotation)
+    system = System(cmap, rotation, lines.normal)
+    strain = Strain.of(system, frame.sides, lines, frame.turned)
     size = lattice.edge / wanted_edge(cmap, lattice, settings, angle)
     spread = size_spread(settings)
     trials = [
@@ -86,8 +95,7 @@ def place_by_sides(
     tried = []
     for trial in _best_of(trials, strain)[:DEFORMED]:
         rest = trial.scale * (cmap.uv - (cmap.deck.apex or 0)) + trial.origin
-        depth = lines.depths(trial.depth, trial.motion)
-        place = deform(cmap, trial.motion, trial.scale, rest, lines.normal, depth)
+        place = deform(system, trial.motion, trial.scale, rest, lines.depths(trial.depth, trial.motion))
         tried.append((distortion_of(cmap, trial.motion, place), trial, place))
         if tried[-1][0] < ENOUGH:
             break
@@ -135,6 +143,7 @@ def _trials_at(frame: _Frame, strain: Strain, scale: complex, cost_of_size: floa
         if frame.cmap.deck.apex is None:
             apart = complex(lattice.position(np.array(motion.shift))) - scale * frame.cmap.deck.translation
             moved = np.append(moved, [apart.real, apart.imag])
+        moved = np.append(moved, abs(scale))
         moved = strain.nearest(moved, rows.period, sides.n)
         line = depth + moved[: sides.n]
         extra = cost_of_size + COST_OF_CORNERS * _misplaced_corners(lattice, sides, normal, line)

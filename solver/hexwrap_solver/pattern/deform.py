@@ -29,26 +29,20 @@ ROUNDS, FLOOR = 4, 1e-2
 REST = 1e-9
 
 
-def deform(
-    cmap: ConformalMap, motion: Motion, scale: complex, rest: Complexes, normal: Complexes, depth: Floats
-) -> Complexes:
-    """(n,) vertices in lattice units.
+def deform(system: System, motion: Motion, scale: complex, rest: Complexes, depth: Floats) -> Complexes:
+    """(n,) vertices in lattice units, on the lines of the system.
 
-    rest: (n,) where they would stand undeformed. normal, depth: (n, 2) up to two lines Re(conj(normal)·W) =
-    depth that each vertex must lie on; normal 0 where there is none.
+    rest: (n,) where they would stand undeformed, with scale = ∂W/∂z. depth: (n, 2) of the lines.
     """
-    freedom = Freedom.of(normal)
-    change = derivatives(cmap, motion)
-    shift = change.of_shift(_shifts(cmap, motion))
-    system = System(cmap, change, freedom)
+    change, freedom = system.change, system.freedom
+    shift = change.of_shift(_shifts(system.cmap, motion))
     fixed = freedom.place_on_lines(depth)
     start = freedom.basis.T @ _parts(rest - fixed)  # the basis is orthonormal
     angles, sizes = change.of(fixed, shift)
     even = np.sqrt(change.area / change.area.sum())
     weight, best, least = even, rest, np.inf
     for _ in range(ROUNDS):
-        system.factorise(weight)
-        place = fixed + system.solve(-angles, scale - sizes, start)
+        place = fixed + system.solve(weight, -angles, scale - sizes, start)
         bent, kept = change.strains(place, shift)
         worst = _worst(bent, kept)
         if worst < least or best is rest:
@@ -149,30 +143,34 @@ class Freedom:
 
 
 class System:
-    """The least-squares problem, with its factorised normal matrix."""
+    """The least-squares problem for all choices of depths, and its factorised normal matrix."""
 
-    def __init__(self, cmap: ConformalMap, change: Derivatives, freedom: Freedom) -> None:
-        self._basis = freedom.basis
-        # Both errors of a triangle as one matrix: twice angles, then twice sizes (real, imaginary).
-        conformal, similar = (_real(part) @ freedom.basis for part in (change.angles, change.sizes))
-        self._matrix = sparse.csr_array(sparse.vstack([conformal, similar]))
-        self._normal = NormalMatrix(cmap.surface.vertices[freedom.vertex])
-        self._weight = np.zeros(self._matrix.shape[0])
+    def __init__(self, cmap: ConformalMap, motion: Motion, normal: Complexes) -> None:
+        """motion: any with the rotation of the deck transformation. normal: (n, 2) up to two lines
+        Re(conj(normal)·W) = depth that each vertex must lie on; normal 0 where there is none."""
+        self.cmap = cmap
+        self.change = derivatives(cmap, motion)
+        self.freedom = Freedom.of(normal)
+        # Both errors of a triangle as one matrix: angles, then sizes, each in real and imaginary parts.
+        parts = (_real(part) @ self.freedom.basis for part in (self.change.angles, self.change.sizes))
+        self._matrix = sparse.csr_array(sparse.vstack(list(parts)))
+        self._normal = NormalMatrix(cmap.surface.vertices[self.freedom.vertex])
+        self._last: Floats | None = None
         self._pull = 0.0
 
-    def factorise(self, weight: Floats) -> None:
-        """weight: (m,) of the triangles."""
-        self._weight = np.concatenate([weight, weight, SIZE * weight, SIZE * weight])
-        squares = self._matrix.copy()
-        squares.data = squares.data**2
-        self._pull = REST * float((self._weight @ squares).mean())
-        self._normal.factorise(self._matrix, self._weight, self._pull)
-
-    def solve(self, angles: Complexes, sizes: Complexes, start: Floats) -> Complexes:
-        """(n,) movements within the freedom whose ∂/∂z̄ and ∂/∂z come nearest to the given ones, (m,)."""
+    def solve(self, weight: Floats, angles: Complexes, sizes: Complexes, start: Floats) -> Complexes:
+        """(n,) movements within the freedom whose ∂/∂z̄ and ∂/∂z come nearest to the given ones, (m,), the
+        triangles weighted with (m,). Equal weights one after the other are factorised once."""
+        weights = np.concatenate([weight, weight, SIZE * weight, SIZE * weight])
+        if self._last is None or not np.array_equal(weight, self._last):
+            squares = self._matrix.copy()
+            squares.data = squares.data**2
+            self._pull = REST * float((weights @ squares).mean())
+            self._normal.factorise(self._matrix, weights, self._pull)
+            self._last = weight
         aim = np.concatenate([_parts(angles), _parts(sizes)])
-        unknown = self._normal.solve(self._matrix.T @ (self._weight * aim) + self._pull * start)
-        moved = self._basis @ unknown
+        unknown = self._normal.solve(self._matrix.T @ (weights * aim) + self._pull * start)
+        moved = self.freedom.basis @ unknown
         n = len(moved) // 2
         return np.asarray(moved[:n] + 1j * moved[n:])
 

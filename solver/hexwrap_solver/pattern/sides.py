@@ -118,11 +118,12 @@ def _sides_of_loop(cmap: ConformalMap, lattice: Lattice, loop: int, gained: Ints
 class Lines:
     """The lines on which vertices must lie, up to two each: normal: (n, 2), unit and inward in the vertex's
     own sheet, 0 where there is none. side: (n, 2) to which they belong, −1 where there is none. sheet: (n,
-    2) on which the side's frame shows the vertex."""
+    2) on which the side's frame shows the vertex. entry: (n, 2) where the sides list it."""
 
     normal: Complexes
     side: Ints
     sheet: Ints
+    entry: Ints
 
     def depths(self, depth: Floats, motion: Motion) -> Floats:
         """(n, 2) depth of each line from 0 in the vertex's own sheet; depth: (s,) of the sides in the frame
@@ -150,4 +151,6 @@ def lines_of(n: int, sides: Sides, normal: Complexes, motion: Motion) -> Lines:
     normals[vertex, again] = own[order]
     side[vertex, again] = sides.side[order]
     sheet[vertex, again] = sides.sheet[order]
-    return Lines(normals, side, sheet)
+    entry = np.zeros_like(side)
+    entry[vertex, again] = order
+    return Lines(normals, side, sheet, entry)

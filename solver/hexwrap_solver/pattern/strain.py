@@ -12,42 +12,42 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexwrap_solver.arrays import Complexes, Floats
-from hexwrap_solver.conformal.types import ConformalMap
-from hexwrap_solver.pattern.deform import Freedom, System, derivatives
-from hexwrap_solver.pattern.lattice import Motion
+from hexwrap_solver.pattern.deform import System
 from hexwrap_solver.pattern.sides import Lines, Sides
 
 
 @dataclass(frozen=True)
 class Strain:
     """Columns: one per side, moved by 1 into the domain; on translations two more, for the deck
-    transformation moved by 1 and by i. response: (m, columns) ∂/∂z̄ of the least deformation. area: (m,)
-    parts of the whole. squares: (columns, columns) ∫ of products of the columns."""
+    transformation moved by 1 and by i; and one for a scale of 1 itself, at which sides that are turned out of
+    the lattice's directions are turned back. response: (m, columns) ∂/∂z̄ of the least deformation. area:
+    (m,) parts of the whole. squares: (columns, columns) ∫ of products of the columns."""
 
     response: Complexes
     area: Floats
     squares: Floats
 
     @classmethod
-    def of(cls, cmap: ConformalMap, sides: Sides, lines: Lines, motion: Motion) -> Strain:
-        """motion: any with the rotation of the deck transformation."""
-        change = derivatives(cmap, motion)
-        freedom = Freedom.of(lines.normal)
-        system = System(cmap, change, freedom)
+    def of(cls, system: System, sides: Sides, lines: Lines, turned: Floats) -> Strain:
+        """system: for the sides' lines. turned: (k,) how much deeper, at scale 1, the sides' mean depth is
+        than their vertices are."""
+        change, freedom = system.change, system.freedom
         area = change.area / change.area.sum()
-        system.factorise(np.sqrt(area))
+        weight = np.sqrt(area)
         still = np.zeros(freedom.basis.shape[1])
         moves = [(np.where(lines.side == k, 1.0, 0.0), 0j) for k in range(sides.n)]
-        if cmap.deck.apex is None:
+        if system.cmap.deck.apex is None:
             moves += [(-(lines.normal.conj() * lines.sheet * step).real, step) for step in (1 + 0j, 1j)]
+        moves.append((np.where(lines.side >= 0, turned[lines.entry], 0.0), 0j))
         columns = []
         for depth, step in moves:
             fixed = freedom.place_on_lines(depth)
-            shift = change.of_shift(np.asarray(cmap.sheet * step))
+            shift = change.of_shift(np.asarray(system.cmap.sheet * step))
             angles, sizes = change.of(fixed, shift)
-            columns.append(change.of(fixed + system.solve(-angles, -sizes, still), shift)[0])
+            columns.append(change.of(fixed + system.solve(weight, -angles, -sizes, still), shift)[0])
         response = np.stack(columns, axis=1)
-        return cls(response, np.asarray(area), ((response.conj() * area[:, None]).T @ response).real)
+        squares = ((response.conj() * area[:, None]).T @ response).real
+        return cls(response, np.asarray(area), np.asarray(squares))
 
     def mean(self, moved: Floats) -> float:
         """Root mean square of |∂/∂z̄| where the columns are moved by so much."""
