@@ -17,6 +17,8 @@ from hexwrap_solver.surface.nurbs import domain, evaluate_points
 DEGREE = 3
 #: Coordinates are kept to a tenth of a millimetre, lengths being in metres.
 DIGITS = 4
+#: Half the width of an entrance, as a fraction of a turn.
+ENTRANCE = 0.0325
 
 
 def loft(rings: Floats) -> NurbsSurface:
@@ -92,11 +94,12 @@ def tent() -> NurbsSurface:
 
 
 def pavilion() -> NurbsSurface:
-    """A round hall of 28 m that swells between ground and roof, 13 m high."""
+    """A round hall of 28 m that swells between ground and roof, 13.35 m high: so that 22 rows of the cells
+    of ``entrance`` fill it nearly without a stretch."""
     t = np.linspace(0, 1, 6)[:, None]
     a = _angles(16)
     radius = 13.0 + 2.6 * np.sin(np.pi * (0.15 + 0.7 * t)) + 0.5 * np.cos(2 * a) * t
-    z = 13.0 * t + 0.7 * t**2 * np.cos(2 * a)
+    z = 13.35 * t + 0.7 * t**2 * np.cos(2 * a)
     return loft(np.stack([radius * np.cos(a), 0.92 * radius * np.sin(a), z], axis=2))
 
 
@@ -133,15 +136,16 @@ def corners(points: list[list[float]], angle: float) -> list[dict[str, Any]]:
     return [{"point": point, "angle": angle} for point in points]
 
 
-def body(name: str, surface: NurbsSurface, **request: Any) -> dict[str, Any]:
-    """A request body with the surface inline."""
+def body(name: str, surface: NurbsSurface, max_edge: float | None = None, **request: Any) -> dict[str, Any]:
+    """A request body with the surface inline. max_edge: of its mesh, where the default is not fine enough."""
     nurbs = {
         "degree": list(surface.degree),
         "knots": [k.tolist() for k in surface.knots],
         "control_points": surface.control_points.tolist(),
         "closed": list(surface.closed),
     }
-    return {"name": name, "surface": {"nurbs": nurbs}, **request}
+    mesh = {} if max_edge is None else {"mesh": {"max_edge": max_edge}}
+    return {"name": name, "surface": {"nurbs": nurbs, **mesh}, **request}
 
 
 def requests() -> list[tuple[NurbsSurface, dict[str, Any]]]:
@@ -193,17 +197,22 @@ def _isometric() -> tuple[NurbsSurface, dict[str, Any]]:
 
 
 def _entrance() -> tuple[NurbsSurface, dict[str, Any]]:
-    """Figure 7, left: two entrances, each of 4π/3, π/3, 4π/3 on the ground, on a straight cylinder."""
+    """Figure 7, left: two entrances, each of 4π/3, π/3, 4π/3 on the ground, on a straight cylinder.
+
+    As wide as 12 cells' edges are long in the domain. Cells beside a corner of 4π/3 are not larger than a few
+    triangles of the default mesh, on which they would come out uneven.
+    """
     surface = pavilion()
     angles = []
     for middle in (0.25, 0.75):
-        left, tip, right = at(surface, 0, [middle - 0.06, middle, middle + 0.06])
+        left, tip, right = at(surface, 0, [middle - ENTRANCE, middle, middle + ENTRANCE])
         angles += [*corners([left], 4 / 3), *corners([tip], 1 / 3), *corners([right], 4 / 3)]
     return surface, body(
         "entrance",
         surface,
+        max_edge=0.3,
         boundary={"mode": "angles", "angles": angles, "angle_unit": "pi"},
-        pattern={"kind": "hex", "around": 84},
+        pattern={"kind": "hex", "edge_length": 0.7},
     )
 
 

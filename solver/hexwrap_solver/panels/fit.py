@@ -94,6 +94,7 @@ def _fit_split(
     notes += _room_note(np.flatnonzero(regular & ~kept), int(kept.sum()), settings.joint)
     shapes, shape_center, cut = _trimmed(cells, normal, planes, edges, ~regular)
     face = np.flatnonzero(kept | cut)
+    spare = _spare(poses, planes, regular, pattern, settings)
     return FittedPanels(
         mode="split",
         face=face,
@@ -107,6 +108,8 @@ def _fit_split(
         cell_area=fan_areas(cells)[face],
         energy=energy,
         notes=notes + _joint_note(settings) + _dropped_note(int((~regular & ~cut).sum())),
+        spare_limit=spare and _merge(kept, spare[0][roomy], cut, mean_edges(shapes))[face],
+        spare_center=spare and _merge(kept, spare[1][roomy], cut, shape_center)[face],
     )
 
 
@@ -179,6 +182,16 @@ def _limits(
         partner = _partners(at.ravel(), edges)
         return jointly_largest(poses, direction, offset, partner, settings.joint, progress)
     return limits.inscribed(poses, direction, offset)
+
+
+def _spare(
+    poses: Poses, planes: Separation, regular: Bools, pattern: Pattern, settings: PanelSettings
+) -> tuple[Floats, Floats] | None:
+    """Beside the jointly largest panels, which differ more in size from each other, the inscribed ones."""
+    if settings.target != "best":
+        return None
+    at = pattern.faces.offsets[:-1][regular][:, None] + np.arange(CORNERS[pattern.kind])
+    return limits.inscribed(poses, planes.direction[at], planes.offset[at])
 
 
 def _partners(at: Ints, edges: HalfEdges) -> Ints:

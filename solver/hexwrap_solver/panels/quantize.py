@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -36,11 +36,19 @@ def quantize(fitted: FittedPanels, settings: PanelSettings) -> Panels:
     may be.
     """
     regular = fitted.regular
-    limit = fitted.limit[regular]
     smallest, largest = settings.edge_range or (0.0, np.inf)
-    allowed = np.minimum(limit, largest)
-    _require_increment(allowed, np.flatnonzero(regular), settings.increment)
-    length = choose_lengths(allowed, settings.sizes, settings.size_cost, settings.increment, smallest)
+    choices = [fitted]
+    if fitted.spare_limit is not None and fitted.spare_center is not None:
+        choices.append(replace(fitted, limit=fitted.spare_limit, center=fitted.spare_center))
+    limits = [np.minimum(choice.limit[regular], largest) for choice in choices]
+    _require_increment(limits[0], np.flatnonzero(regular), settings.increment)
+    limits = [limit for limit in limits if (floor_to(limit, settings.increment) > 0).all()]
+    lengths = [
+        choose_lengths(limit, settings.sizes, settings.size_cost, settings.increment, smallest)
+        for limit in limits
+    ]
+    pick = min(range(len(lengths)), key=lambda k: _loss(fitted, lengths[k], smallest, settings))
+    fitted, length = choices[pick], lengths[pick]
     class_length, member, class_count = np.unique(length, return_inverse=True, return_counts=True)
     edge_length = fitted.limit.copy()
     edge_length[regular] = length
@@ -59,11 +67,31 @@ def quantize(fitted: FittedPanels, settings: PanelSettings) -> Panels:
         whole=fitted.whole,
         class_length=class_length,
         class_count=class_count.astype(np.int64),
-        trade_off=_trade_off(fitted, allowed, settings) if len(limit) else None,
+        trade_off=_trade_off(fitted, limits, settings) if len(length) else None,
         energy=fitted.energy,
-        notes=fitted.notes + _range_notes(settings, limit, outside),
+        notes=fitted.notes + _range_notes(settings, fitted.limit[regular], outside),
         outside=outside,
     )
+
+
+def _loss(
+    fitted: FittedPanels, length: Floats, smallest: float, settings: PanelSettings
+) -> tuple[int, float]:
+    """What is to be least: panels below the allowed range, then what ``size_cost`` asks for."""
+    below = int((length < smallest).sum())
+    if settings.size_cost == "area" or not len(length):
+        return below, -float(length @ length)
+    return below, float((_free_length(fitted) - length).max())
+
+
+def _free_length(fitted: FittedPanels) -> Floats:
+    """(r,) edges of the regular polygons that are as large as the regular panels' cells."""
+    return np.asarray(np.sqrt(fitted.cell_area[fitted.regular] / _unit_area(fitted.spokes.shape[1])))
+
+
+def _unit_area(p: int) -> float:
+    """Area of the regular p-gon of edge 1."""
+    return float(p / (4 * np.tan(np.pi / p)))
 
 
 def _require_increment(allowed: Floats, panel: Ints, increment: float) -> None:
@@ -92,23 +120,32 @@ def _polygons(fitted: FittedPanels, length: Floats) -> Ragged:
     return Ragged(points, offsets)
 
 
-def _trade_off(fitted: FittedPanels, allowed: Floats, settings: PanelSettings) -> TradeOff:
-    """What each number of classes leaves open; the regular panels only."""
+def _trade_off(fitted: FittedPanels, limits: list[Floats], settings: PanelSettings) -> TradeOff:
+    """What each number of classes leaves open, for the better of the limits; the regular panels only."""
+    curves = [_curve(fitted, limit, settings) for limit in limits]
+    most = max(len(curve) for curve in curves)
+    filled = np.stack([curve[np.minimum(np.arange(most), len(curve) - 1)] for curve in curves])
+    best = filled[..., 0 if settings.size_cost == "area" else 1].argmin(axis=0)
+    uncovered, worst = filled[best, np.arange(most)].T
+    return TradeOff(np.arange(1, most + 1), uncovered, worst)
+
+
+def _curve(fitted: FittedPanels, allowed: Floats, settings: PanelSettings) -> Floats:
+    """(k, 2) uncovered part and worst gap for 1…k classes."""
     order = np.argsort(allowed, kind="stable")
     limit = allowed[order]
     made, floored = partition(limit, TRADE_OFF_CLASSES, settings.size_cost, settings.increment)
     p = fitted.spokes.shape[1]
-    area_of_unit = p / (4 * np.tan(np.pi / p))
     # A cell's inradius exceeds its panel's by half the gap between cells of the same size.
     width_of_unit = 1 / np.tan(np.pi / p)
-    cell_area = fitted.cell_area[fitted.regular][order]
-    free_length = np.sqrt(cell_area / area_of_unit)
-    uncovered, worst = [], []
+    cell_area = float(fitted.cell_area[fitted.regular].sum())
+    free_length = _free_length(fitted)[order]
+    curve = []
     for start in made.start:
         length = np.repeat(floored[start], np.diff(np.append(start, len(limit))))
-        uncovered.append(1 - area_of_unit * float(length @ length) / float(cell_area.sum()))
-        worst.append(float(np.max(free_length - length)) * width_of_unit)
-    return TradeOff(np.arange(1, len(uncovered) + 1), np.array(uncovered), np.array(worst))
+        uncovered = 1 - _unit_area(p) * float(length @ length) / cell_area
+        curve.append((uncovered, float(np.max(free_length - length)) * width_of_unit))
+    return np.array(curve)
 
 
 def _range_notes(settings: PanelSettings, limit: Floats, outside: Ints) -> tuple[str, ...]:

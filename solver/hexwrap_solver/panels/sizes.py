@@ -16,9 +16,8 @@ from hexwrap_solver.arrays import Bools, Floats, Ints
 
 #: A limit this close below a multiple of the increment (relative to the increment) counts as the multiple.
 INCREMENT_SLACK = 1e-9
-#: Neighbouring limits that differ by less than this, relatively, are one: on symmetric surfaces rounding
-#: alone tells them apart, and no workshop can.
-EQUAL = 1e-12
+#: Neighbouring limits that differ by less than this (relatively) are equal but for rounding.
+ROUNDING = 1e-11
 
 
 @dataclass(frozen=True)
@@ -40,11 +39,11 @@ def floor_to(length: Floats, increment: float) -> Floats:
     return np.asarray(np.floor(length / increment + INCREMENT_SLACK) * increment)
 
 
-def _levelled(limit: Floats) -> Floats:
-    """Ascending limits, those that are as good as equal made so: each takes the least of them."""
-    first = np.ones(len(limit), dtype=bool)
-    first[1:] = np.diff(limit) > EQUAL * limit[1:]
-    return np.asarray(limit[first][np.cumsum(first) - 1])
+def level(length: Floats) -> Floats:
+    """Ascending lengths, those that rounding alone tells apart (on symmetric surfaces) made the least of
+    them: they need no size of their own."""
+    new = np.append(True, np.diff(length) > ROUNDING * length[:-1])
+    return np.asarray(length[np.flatnonzero(new)[np.cumsum(new) - 1]])
 
 
 def partition_by_area(length: Floats, classes: int) -> Partition:
@@ -153,7 +152,7 @@ def partition(
     limit: Floats, classes: int, cost: Literal["area", "worst"], increment: float
 ) -> tuple[Partition, Floats]:
     """Partition of limits sorted ascending, and the floored limits that the lengths are taken from."""
-    floored = floor_to(_levelled(limit), increment)
+    floored = level(floor_to(limit, increment))
     made = (
         partition_by_area(floored, classes) if cost == "area" else partition_by_worst(limit, floored, classes)
     )

@@ -72,7 +72,8 @@ class FittedPanels:
     the others (trimmed cells, watertight panels) are finished in ``shapes``. spokes: (r, p, 3) corners
     around the centre at edge length 1, of the r regular panels in order. shapes: polygons of the others in
     order. center, normal: (q, 3). limit: (q,) greatest edge length (mean edge of the others). whole: (q,).
-    cell_area: (q,) of the panels' cells. energy, notes: as in ``Panels``.
+    cell_area: (q,) of the panels' cells. energy, notes: as in ``Panels``. spare_limit, spare_center: another
+    choice of limit and center without overlap, which few classes may suit better.
     """
 
     mode: Literal["split", "watertight"]
@@ -87,6 +88,8 @@ class FittedPanels:
     cell_area: Floats
     energy: Floats | None = None
     notes: tuple[str, ...] = ()
+    spare_limit: Floats | None = None
+    spare_center: Floats | None = None
 
 
 @dataclass(frozen=True)

@@ -6,59 +6,100 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexwrap_solver.arrays import Complexes, Floats
+from hexwrap_solver.arrays import Complexes, Floats, Ints
 from hexwrap_solver.conformal.types import ConformalMap
-from hexwrap_solver.pattern.deform import deform, distortion_of
+from hexwrap_solver.pattern.deform import System, deform, distortion_of
 from hexwrap_solver.pattern.lattice import Lattice, Motion
 from hexwrap_solver.pattern.placement import Placement, edge_angle
 from hexwrap_solver.pattern.rows import Rows, rows_along
-from hexwrap_solver.pattern.sides import Sides, sides_of
+from hexwrap_solver.pattern.sides import Sides, lines_of, sides_of
 from hexwrap_solver.pattern.size import size_spread, wanted_edge, width_per_cell
+from hexwrap_solver.pattern.strain import Strain
 from hexwrap_solver.pattern.types import PatternSettings
 
 #: Scales tried, from the smallest to the largest admissible.
 SCALES = 241
 
-#: Costs, beside the squares of the sides' offsets in rows: of a size off the wanted one by its whole
-#: spread; of all corners standing on cells instead of nodes.
-COST_OF_SIZE, COST_OF_CORNERS = 0.002, 0.02
+#: Costs, beside the distortion: of a size off the wanted one by its whole spread; of all corners standing on
+#: cells instead of nodes.
+COST_OF_SIZE, COST_OF_CORNERS = 0.002, 0.004
+
+#: Corners standing on cells that one which the lattice does not mirror there outweighs: at an entrance the
+#: tip goes before the two corners beside it.
+COST_OF_LOPSIDED = 3.0
+
+#: So many placements with the least mean strain are compared by their sharp one, and so many of these, in
+#: order, are deformed, until one of them distorts by less than ENOUGH.
+COMPARED, DEFORMED, ENOUGH = 12, 3, 0.03
 
 
 @dataclass(frozen=True)
 class _Trial:
-    """W = scale·(z − apex) + origin before the deformation, what g becomes, and the line of each side."""
+    """W = scale·(z − apex) + origin before the deformation, what g becomes, and the line of each side.
 
-    cost: float
+    moved: by how much the sides (and g) are moved, and the scale, as ``Strain`` wants it. extra: costs beside
+    its own.
+    """
+
     scale: complex
     origin: complex
     motion: Motion
     depth: Floats
+    moved: Floats
+    extra: float
+
+    def cost(self, strain: float) -> float:
+        return 2 * strain / abs(self.scale) + self.extra
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """The sides turned to the lattice's directions. normal: (s,) inward; depth: (s,) of the sides at scale 1,
+    from the apex or the layout's origin; unit: the turn common to all; around: cells that are asked for."""
+
+    cmap: ConformalMap
+    lattice: Lattice
+    turns: int
+    around: int | None
+    sides: Sides
+    rows: Rows
+    normal: Complexes
+    depth: Floats
+    unit: complex
+
+    @property
+    def turned(self) -> Floats:
+        """(k,) mean depth of their side less the depth of the sides' vertices, at scale 1."""
+        place = (self.sides.place - (self.cmap.deck.apex or 0)) * self.unit
+        side = self.sides.side
+        return np.asarray(self.depth[side] - (self.normal[side].conj() * place).real)
 
 
 def place_by_sides(
     cmap: ConformalMap, lattice: Lattice, settings: PatternSettings, turns: int, loops: list[int]
 ) -> Placement:
-    """Scale, centre and lines with the smallest offsets, then the deformation that removes them."""
+    """Scale, centre and lines whose deformation distorts least, then that deformation."""
     angle = edge_angle(lattice, settings)
-    sides = sides_of(cmap, lattice, loops)
-    rows = rows_along(lattice, angle, settings.boundary)
-    zero = complex(lattice.position(lattice.steps[0])) / lattice.edge * np.exp(-1j * angle)
-    turn = _turns(cmap, lattice, sides, zero)
-    # Directions are exact up to rounding of the boundary angles; from here on they are exact.
-    steps = np.rint(np.angle(sides.direction * turn / zero) / lattice.quantum)
-    normal = 1j * zero * np.exp(1j * lattice.quantum * steps)
-    depth = _mean_depth(cmap, sides, normal, turn)
-    unit = complex(turn.mean() / abs(turn.mean()))
+    frame = _frame(cmap, lattice, settings, turns, loops)
+    rotation = Motion(lattice, turns, (0, 0))
+    lines = lines_of(len(cmap.uv), frame.sides, frame.normal, rotation)
+    system = System(cmap, rotation, lines.normal)
+    strain = Strain.of(system, frame.sides, lines, frame.turned)
     size = lattice.edge / wanted_edge(cmap, lattice, settings, angle)
     spread = size_spread(settings)
     trials = [
-        _best_at(cmap, lattice, sides, rows, normal, depth, turns, size * (1 + spread * x) * unit, abs(x))
+        trial
         for x in np.linspace(-1, 1, SCALES)
+        for trial in _trials_at(frame, strain, size * (1 + spread * x) * frame.unit, COST_OF_SIZE * x**2)
     ]
-    best = min(trials, key=lambda trial: trial.cost)
-    rest = best.scale * (cmap.uv - (cmap.deck.apex or 0)) + best.origin
-    lines = _lines(cmap, lattice, sides, normal, best)
-    place = deform(cmap, best.motion, best.scale, rest, *lines)
+    tried = []
+    for trial in _best_of(trials, strain)[:DEFORMED]:
+        rest = trial.scale * (cmap.uv - (cmap.deck.apex or 0)) + trial.origin
+        place = deform(system, trial.motion, trial.scale, rest, lines.depths(trial.depth, trial.motion))
+        tried.append((distortion_of(cmap, trial.motion, place), trial, place))
+        if tried[-1][0] < ENOUGH:
+            break
+    distortion, best, place = min(tried, key=lambda found: found[0] + found[1].extra)
     width = width_per_cell(lattice, angle) * lattice.edge
     around = round(cmap.circumference * abs(best.scale) / width)
     if turns == 0:
@@ -66,35 +107,58 @@ def place_by_sides(
     notes = (
         ("phase has no effect: lattice lines on all sides leave no freedom.",) if any(settings.phase) else ()
     )
-    return Placement(place, best.motion, angle, around, distortion_of(cmap, best.motion, place), notes)
+    return Placement(place, best.motion, angle, around, distortion, notes)
 
 
-def _best_at(
-    cmap: ConformalMap,
-    lattice: Lattice,
-    sides: Sides,
-    rows: Rows,
-    normal: Complexes,
-    unit_depth: Floats,
-    turns: int,
-    scale: complex,
-    off: float,
-) -> _Trial:
-    """The best centre and lines at one scale."""
-    mean_depth = unit_depth * abs(scale)
-    length = sides.length * abs(scale)
+def _frame(
+    cmap: ConformalMap, lattice: Lattice, settings: PatternSettings, turns: int, loops: list[int]
+) -> _Frame:
+    angle = edge_angle(lattice, settings)
+    sides = sides_of(cmap, lattice, loops)
+    zero = complex(lattice.position(lattice.steps[0])) / lattice.edge * np.exp(-1j * angle)
+    turn = _turns(cmap, lattice, sides, zero)
+    # Directions are exact up to rounding of the boundary angles; from here on they are exact.
+    steps = np.rint(np.angle(sides.direction * turn / zero) / lattice.quantum)
+    normal = 1j * zero * np.exp(1j * lattice.quantum * steps)
+    return _Frame(
+        cmap,
+        lattice,
+        turns,
+        settings.around,
+        sides,
+        rows_along(lattice, angle, settings.boundary),
+        normal,
+        _mean_depth(cmap, sides, normal, turn),
+        complex(turn.mean() / abs(turn.mean())),
+    )
+
+
+def _trials_at(frame: _Frame, strain: Strain, scale: complex, cost_of_size: float) -> list[_Trial]:
+    """For every centre the best lines at one scale."""
+    lattice, sides, rows, normal = frame.lattice, frame.sides, frame.rows, frame.normal
     trials = []
-    for motion, origin in _origins(cmap, lattice, sides, rows, normal, turns, scale, mean_depth):
-        depth = mean_depth + (normal.conj() * origin).real
-        line = rows.first + rows.period * np.rint((depth - rows.first) / rows.period)
-        miss = abs(depth - line)
-        cost = float(((miss / rows.period) ** 2).mean() + ((miss / length) ** 2).max())
-        cost += COST_OF_SIZE * off**2 + COST_OF_CORNERS * _corners_off_nodes(lattice, sides, normal, line)
-        if motion.turns % lattice.order == 0:
-            apart = abs(scale * cmap.deck.translation - complex(lattice.position(np.array(motion.shift))))
-            cost += float(apart / rows.period) ** 2
-        trials.append(_Trial(cost, scale, origin, motion, line))
-    return min(trials, key=lambda trial: trial.cost)
+    for motion, origin in _origins(frame, scale):
+        depth = frame.depth * abs(scale) + (normal.conj() * origin).real
+        moved = rows.first + rows.period * np.rint((depth - rows.first) / rows.period) - depth
+        if frame.cmap.deck.apex is None:
+            apart = complex(lattice.position(np.array(motion.shift))) - scale * frame.cmap.deck.translation
+            moved = np.append(moved, [apart.real, apart.imag])
+        moved = np.append(moved, abs(scale))
+        moved = strain.nearest(moved, rows.period, sides.n)
+        line = depth + moved[: sides.n]
+        extra = cost_of_size + COST_OF_CORNERS * _misplaced_corners(lattice, sides, normal, line)
+        trials.append(_Trial(scale, origin, motion, line, moved, extra))
+    return trials
+
+
+def _best_of(trials: list[_Trial], strain: Strain) -> list[_Trial]:
+    """Those with the least costs, the least first, each choice of lines once."""
+    different: dict[tuple[object, ...], _Trial] = {}
+    for trial in sorted(trials, key=lambda trial: trial.cost(strain.mean(trial.moved))):
+        lines = (*trial.motion.shift, *np.rint(1e6 * trial.depth).tolist())
+        if different.setdefault(lines, trial) is trial and len(different) == COMPARED:
+            break
+    return sorted(different.values(), key=lambda trial: trial.cost(strain.sharp(trial.moved)))
 
 
 def _turns(cmap: ConformalMap, lattice: Lattice, sides: Sides, zero: complex) -> Complexes:
@@ -132,23 +196,15 @@ def _mean_depth(cmap: ConformalMap, sides: Sides, normal: Complexes, turn: Compl
     return np.asarray(np.bincount(sides.side, weights=value) / np.bincount(sides.side))
 
 
-def _origins(
-    cmap: ConformalMap,
-    lattice: Lattice,
-    sides: Sides,
-    rows: Rows,
-    normal: Complexes,
-    turns: int,
-    scale: complex,
-    depth: Floats,
-) -> list[tuple[Motion, complex]]:
+def _origins(frame: _Frame, scale: complex) -> list[tuple[Motion, complex]]:
     """Every way in which g can be a motion of the lattice, and where the apex, or the layout's origin, stands
     then: on a cone at the kinds of symmetry centres; for a translation as two sides may lie on lines."""
-    apex = cmap.deck.apex
-    if apex is not None:
-        return symmetry_centres(lattice, turns)
-    shift = lattice.translation_near(scale * cmap.deck.translation)
-    motion = Motion(lattice, turns, (int(shift[0]), int(shift[1])))
+    lattice, rows, normal = frame.lattice, frame.rows, frame.normal
+    if frame.cmap.deck.apex is not None:
+        return symmetry_centres(lattice, frame.turns)
+    shift = _translation(frame, scale * frame.cmap.deck.translation)
+    motion = Motion(lattice, frame.turns, (int(shift[0]), int(shift[1])))
+    depth = frame.depth * abs(scale)
     across = np.flatnonzero(abs((normal.conj() * normal[0]).imag) > 1e-6)
     if not len(across):
         return [(motion, complex(normal[0] * (rows.first - depth[0])))]
@@ -156,6 +212,20 @@ def _origins(
     d = rows.first - depth[0]
     lines = rows.first + rows.period * np.arange(lattice.colours) - depth[across[0]]
     return [(motion, complex(1j * (e * p - d * q) / (np.conj(p) * q).imag)) for e in lines]
+
+
+def _translation(frame: _Frame, wanted: complex) -> Ints:
+    """The translation of the lattice that g becomes, near the wanted one.
+
+    A loop that is one closed line runs along it exactly. On a cylinder it has the number of cells asked for.
+    """
+    lattice = frame.lattice
+    if (np.bincount(frame.sides.loop) == 1).any():
+        row = lattice.shortest_towards(wanted)
+        return np.asarray(max(1, round(abs(wanted) / abs(complex(lattice.position(row))))) * row)
+    if frame.turns == 0 and frame.around is not None:
+        return lattice.ring_near(frame.around, wanted)
+    return lattice.translation_near(wanted)
 
 
 def symmetry_centres(lattice: Lattice, turns: int) -> list[tuple[Motion, complex]]:
@@ -175,8 +245,12 @@ def symmetry_centres(lattice: Lattice, turns: int) -> list[tuple[Motion, complex
     return found
 
 
-def _corners_off_nodes(lattice: Lattice, sides: Sides, normal: Complexes, line: Floats) -> float:
-    """Part of the corners between successive sides that stand on no node."""
+def _misplaced_corners(lattice: Lattice, sides: Sides, normal: Complexes, line: Floats) -> float:
+    """Part of the corners between successive sides that stand badly.
+
+    Corners stand well on nodes. Where three edges meet there, though, the lattice is mirrored at the
+    bisector of 2π/3 and 4π/3, but not of π/3 and 5π/3: those stand well on the centres of cells.
+    """
     following = np.arange(1, sides.n + 1)
     for loop in np.unique(sides.loop):
         members = np.flatnonzero(sides.loop == loop)
@@ -190,26 +264,9 @@ def _corners_off_nodes(lattice: Lattice, sides: Sides, normal: Complexes, line: 
         return 0.0
     corner = 1j * (line[following[inner]] * p - line[inner] * q) / area
     point = np.rint(lattice.coordinates(corner)).astype(np.int64)
-    on_node = lattice.is_node(point) & (abs(lattice.position(point) - corner) < 1e-6)
-    return float(1 - on_node.mean())
-
-
-def _lines(
-    cmap: ConformalMap, lattice: Lattice, sides: Sides, normal: Complexes, trial: _Trial
-) -> tuple[Complexes, Floats]:
-    """(n, 2) normals and depths of the lines on which each vertex must lie, in its own sheet."""
-    n = len(cmap.uv)
-    motion = trial.motion
-    shift = lattice.position(motion.apply(np.zeros((len(sides.sheet), 2), dtype=np.int64), sides.sheet))
-    turn = np.exp(1j * lattice.quantum * motion.rotation(sides.sheet))
-    own = normal[sides.side] / turn
-    depth = trial.depth[sides.side] - (normal[sides.side].conj() * shift).real
-    normals, depths = np.zeros((n, 2), dtype=complex), np.zeros((n, 2))
-    order = np.argsort(sides.vertex, kind="stable")
-    vertex = sides.vertex[order]
-    again = np.concatenate([[0], (vertex[1:] == vertex[:-1]).astype(np.int64)])
-    parallel = np.concatenate([[False], abs(own[order][1:] - own[order][:-1]) < 1e-9]) & (again == 1)
-    order, vertex, again = order[~parallel], vertex[~parallel], again[~parallel]
-    normals[vertex, again] = own[order]
-    depths[vertex, again] = depth[order]
-    return normals, depths
+    on_lattice = abs(lattice.position(point) - corner) < 1e-6
+    on_node = on_lattice & lattice.is_node(point)
+    odd = np.rint(np.angle(q / p) / lattice.quantum) % 2 == 1
+    lopsided = odd & on_node if lattice.kind == "hex" else np.zeros(len(odd), dtype=bool)
+    mirrored = odd & on_lattice & ~on_node if lattice.kind == "hex" else lopsided
+    return float((COST_OF_LOPSIDED * lopsided + ~(on_node | mirrored)).mean())

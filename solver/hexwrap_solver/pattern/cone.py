@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexwrap_solver.conformal.types import ConformalMap
-from hexwrap_solver.pattern.deform import deform, distortion_of
+from hexwrap_solver.pattern.deform import System, deform, distortion_of
 from hexwrap_solver.pattern.lattice import Lattice, Motion
 from hexwrap_solver.pattern.placement import Placement, anchor_vertex, edge_angle
 from hexwrap_solver.pattern.size import ASKED, wanted_edge, width_per_cell
@@ -102,5 +102,5 @@ def place_on_flat_ring(
     if fits:
         return Placement(place, motion, angle, around, 0.0, ())
     nowhere = np.zeros((len(place), 2))
-    place = deform(cmap, motion, factor, place, nowhere.astype(complex), nowhere)
+    place = deform(System(cmap, motion, nowhere.astype(complex)), motion, factor, place, nowhere)
     return Placement(place, motion, angle, around, distortion_of(cmap, motion, place), ())

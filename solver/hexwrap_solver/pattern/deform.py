@@ -8,11 +8,13 @@ along their line; corners stand where two lines meet. Lines are met exactly, wha
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy import sparse
-from scipy.sparse.linalg import LinearOperator, cg, splu
 
-from hexwrap_solver.arrays import Complexes, Floats
+from hexwrap_solver.arrays import Complexes, Floats, Ints
+from hexwrap_solver.conformal.normal_matrix import NormalMatrix
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.pattern.lattice import Motion
 
@@ -26,66 +28,151 @@ ROUNDS, FLOOR = 4, 1e-2
 #: Pull towards the undeformed place, relative: it only settles what nothing else does.
 REST = 1e-9
 
-#: Unknowns up to which the system is factorised; beyond, a number of conjugate-gradient steps must do.
-DIRECT, STEPS = 60_000, 150
 
+def deform(system: System, motion: Motion, scale: complex, rest: Complexes, depth: Floats) -> Complexes:
+    """(n,) vertices in lattice units, on the lines of the system.
 
-def deform(
-    cmap: ConformalMap, motion: Motion, scale: complex, rest: Complexes, normal: Complexes, depth: Floats
-) -> Complexes:
-    """(n,) vertices in lattice units.
-
-    rest: (n,) where they would stand undeformed. normal, depth: (n, 2) up to two lines Re(conj(normal)·W) =
-    depth that each vertex must lie on; normal 0 where there is none.
+    rest: (n,) where they would stand undeformed, with scale = ∂W/∂z. depth: (n, 2) of the lines.
     """
-    basis, fixed = _freedom(normal, depth, rest)
-    angles, sizes, area, shift_a, shift_s = _derivatives(cmap, motion)
-    conformal, similar = _real(angles) @ basis, _real(sizes) @ basis
-    aim_a = _parts(-shift_a) - _real(angles) @ _parts(fixed)
-    aim_s = _parts(scale - shift_s) - _real(sizes) @ _parts(fixed)
-    start = basis.T @ _parts(rest - fixed)  # the basis is orthonormal
-    weight = np.sqrt(area / area.sum())
-    n, best, least = len(rest), rest, np.inf
-    free = start
+    change, freedom = system.change, system.freedom
+    shift = change.of_shift(_shifts(system.cmap, motion))
+    fixed = freedom.place_on_lines(depth)
+    start = freedom.basis.T @ _parts(rest - fixed)  # the basis is orthonormal
+    angles, sizes = change.of(fixed, shift)
+    even = np.sqrt(change.area / change.area.sum())
+    weight, best, least = even, rest, np.inf
     for _ in range(ROUNDS):
-        both = np.tile(weight, 2)
-        matrix = conformal.T @ (both[:, None] * conformal) + SIZE * (similar.T @ (both[:, None] * similar))
-        right = conformal.T @ (both * aim_a) + SIZE * (similar.T @ (both * aim_s))
-        pull = REST * float(matrix.diagonal().mean())
-        matrix = (matrix + pull * sparse.eye_array(matrix.shape[0])).tocsc()
-        free = _solve(matrix, right + pull * start, free)
-        moved = basis @ free
-        place = np.asarray(fixed + moved[:n] + 1j * moved[n:])
-        worst = distortion_of(cmap, motion, place)
+        place = fixed + system.solve(weight, -angles, scale - sizes, start)
+        bent, kept = change.strains(place, shift)
+        worst = _worst(bent, kept)
         if worst < least or best is rest:
             best, least = place, worst
-        bent = abs(angles @ place + shift_a) ** 2
         # Half-way in the logarithm: full steps of reweighting oscillate for powers above three.
-        aim = np.sqrt(area / area.sum()) * (bent / max(bent.mean(), 1e-300) + FLOOR)
-        weight = np.sqrt(weight * aim)
+        weight = np.sqrt(weight * even * (bent**2 / max((bent**2).mean(), 1e-300) + FLOOR))
         weight /= weight.mean()
     return best
 
 
 def distortion_of(cmap: ConformalMap, motion: Motion, place: Complexes) -> float:
     """Worst ratio of singular values − 1 over the triangles; infinite where one is turned over."""
-    angles, sizes, _, shift_a, shift_s = _derivatives(cmap, motion)
-    bent = np.abs(np.asarray(angles @ place) + shift_a)
-    kept = np.abs(np.asarray(sizes @ place) + shift_s)
+    change = derivatives(cmap, motion)
+    return _worst(*change.strains(place, change.of_shift(_shifts(cmap, motion))))
+
+
+def _worst(bent: Floats, kept: Floats) -> float:
     if (bent >= kept).any():
         return float("inf")
     return float(((kept + bent) / (kept - bent)).max() - 1)
 
 
-def _solve(matrix: sparse.csc_array, right: Floats, start: Floats) -> Floats:
-    if matrix.shape[0] <= DIRECT:
-        factors = splu(
-            matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-        )
-        return np.asarray(factors.solve(right))
-    inverse = 1 / matrix.diagonal()
-    jacobi = LinearOperator(matrix.shape, matvec=lambda x: inverse * x, dtype=float)
-    return np.asarray(cg(matrix, right, x0=start, rtol=1e-8, maxiter=STEPS, M=jacobi)[0])
+@dataclass(frozen=True)
+class Derivatives:
+    """angles, sizes: (m, n) complex matrices, ∂W/∂z̄ and ∂W/∂z of the triangles from W at the vertices, the
+    translations of the deck transformation left out. gradient: (m, 3). area: (m,) in the domain."""
+
+    angles: sparse.csr_array
+    sizes: sparse.csr_array
+    gradient: Complexes
+    area: Floats
+
+    def of(self, place: Complexes, shift: tuple[Complexes, Complexes]) -> tuple[Complexes, Complexes]:
+        """(m,) ∂W/∂z̄ and ∂W/∂z for W (n,)."""
+        return np.asarray(self.angles @ place) + shift[0], np.asarray(self.sizes @ place) + shift[1]
+
+    def strains(self, place: Complexes, shift: tuple[Complexes, Complexes]) -> tuple[Floats, Floats]:
+        """(m,) absolute values of both."""
+        angles, sizes = self.of(place, shift)
+        return np.asarray(np.abs(angles)), np.asarray(np.abs(sizes))
+
+    def of_shift(self, shift: Complexes) -> tuple[Complexes, Complexes]:
+        """(m,) what translations (m, 3) of the triangles' corners add to ∂W/∂z̄ and ∂W/∂z."""
+        return (self.gradient * shift).sum(axis=1), (self.gradient.conj() * shift).sum(axis=1)
+
+
+def derivatives(cmap: ConformalMap, motion: Motion) -> Derivatives:
+    """They depend on the rotation of the motion alone."""
+    z = cmap.corners()
+    faces = cmap.surface.faces
+    m, n = len(faces), len(cmap.uv)
+    opposite = np.roll(z, -2, axis=1) - np.roll(z, -1, axis=1)
+    area = ((z[:, 1] - z[:, 0]).conj() * (z[:, 2] - z[:, 0])).imag / 2
+    gradient = 1j * opposite / (4 * area)[:, None]
+    turn = np.exp(1j * motion.lattice.quantum * motion.rotation(cmap.sheet))
+    where = (np.repeat(np.arange(m), 3), faces.ravel())
+    angles, sizes = (
+        sparse.csr_array(((g * turn).ravel(), where), shape=(m, n)) for g in (gradient, gradient.conj())
+    )
+    return Derivatives(angles, sizes, gradient, np.asarray(area))
+
+
+def _shifts(cmap: ConformalMap, motion: Motion) -> Complexes:
+    """(m, 3) by how much the triangles' corners are shifted on their sheets."""
+    zero = np.zeros((*cmap.sheet.shape, 2), dtype=np.int64)
+    return motion.lattice.position(motion.apply(zero, cmap.sheet))
+
+
+@dataclass(frozen=True)
+class Freedom:
+    """basis: (2n, unknowns), orthonormal, of the movements that lines leave to the vertices (real parts, then
+    imaginary parts); vertex: (unknowns,) that each belongs to. normal: (n, 2) of the lines."""
+
+    basis: sparse.csr_array
+    vertex: Ints
+    normal: Complexes
+
+    @classmethod
+    def of(cls, normal: Complexes) -> Freedom:
+        n = len(normal)
+        lines = (normal != 0).sum(axis=1)
+        free, one = np.flatnonzero(lines == 0), np.flatnonzero(lines == 1)
+        along = 1j * normal[one].sum(axis=1)  # the other one is 0
+        f, k = len(free), len(one)
+        rows = np.concatenate([free, free + n, one, one + n])
+        columns = np.concatenate([np.arange(2 * f), 2 * f + np.arange(k), 2 * f + np.arange(k)])
+        values = np.concatenate([np.ones(2 * f), along.real, along.imag])
+        basis = sparse.csr_array((values, (rows, columns)), shape=(2 * n, 2 * f + k))
+        return cls(basis, np.concatenate([free, free, one]), normal)
+
+    def place_on_lines(self, depth: Floats) -> Complexes:
+        """(n,) a place on each vertex's lines, linear in their depths (n, 2); 0 where there is none."""
+        p, q = self.normal.T
+        d, e = np.where(self.normal != 0, depth, 0.0).T
+        both = (p != 0) & (q != 0)
+        area = np.where(both, (p.conj() * q).imag, 1.0)
+        return np.asarray(np.where(both, 1j * (e * p - d * q) / area, p * d + q * e))
+
+
+class System:
+    """The least-squares problem for all choices of depths, and its factorised normal matrix."""
+
+    def __init__(self, cmap: ConformalMap, motion: Motion, normal: Complexes) -> None:
+        """motion: any with the rotation of the deck transformation. normal: (n, 2) up to two lines
+        Re(conj(normal)·W) = depth that each vertex must lie on; normal 0 where there is none."""
+        self.cmap = cmap
+        self.change = derivatives(cmap, motion)
+        self.freedom = Freedom.of(normal)
+        # Both errors of a triangle as one matrix: angles, then sizes, each in real and imaginary parts.
+        parts = (_real(part) @ self.freedom.basis for part in (self.change.angles, self.change.sizes))
+        self._matrix = sparse.csr_array(sparse.vstack(list(parts)))
+        self._normal = NormalMatrix(cmap.surface.vertices[self.freedom.vertex])
+        self._last: Floats | None = None
+        self._pull = 0.0
+
+    def solve(self, weight: Floats, angles: Complexes, sizes: Complexes, start: Floats) -> Complexes:
+        """(n,) movements within the freedom whose ∂/∂z̄ and ∂/∂z come nearest to the given ones, (m,), the
+        triangles weighted with (m,). Equal weights one after the other are factorised once."""
+        weights = np.concatenate([weight, weight, SIZE * weight, SIZE * weight])
+        if self._last is None or not np.array_equal(weight, self._last):
+            squares = self._matrix.copy()
+            squares.data = squares.data**2
+            self._pull = REST * float((weights @ squares).mean())
+            self._normal.factorise(self._matrix, weights, self._pull)
+            self._last = weight
+        aim = np.concatenate([_parts(angles), _parts(sizes)])
+        unknown = self._normal.solve(self._matrix.T @ (weights * aim) + self._pull * start)
+        moved = self.freedom.basis @ unknown
+        n = len(moved) // 2
+        return np.asarray(moved[:n] + 1j * moved[n:])
 
 
 def _parts(z: Complexes) -> Floats:
@@ -95,47 +182,3 @@ def _parts(z: Complexes) -> Floats:
 def _real(matrix: sparse.csr_array) -> sparse.csr_array:
     """A complex linear map on (real parts, imaginary parts)."""
     return sparse.csr_array(sparse.block_array([[matrix.real, -matrix.imag], [matrix.imag, matrix.real]]))
-
-
-def _derivatives(
-    cmap: ConformalMap, motion: Motion
-) -> tuple[sparse.csr_array, sparse.csr_array, Floats, Complexes, Complexes]:
-    """∂/∂z̄ and ∂/∂z per triangle as matrices on W with what the motion's translations add, and areas."""
-    z = cmap.corners()
-    faces, sheet = cmap.surface.faces, cmap.sheet
-    m, n = len(faces), len(cmap.uv)
-    opposite = np.roll(z, -2, axis=1) - np.roll(z, -1, axis=1)
-    area = ((z[:, 1] - z[:, 0]).conj() * (z[:, 2] - z[:, 0])).imag / 2
-    gradient = 1j * opposite / (4 * area)[:, None]
-    shift = motion.lattice.position(motion.apply(np.zeros((m, 3, 2), dtype=np.int64), sheet))
-    turn = np.exp(1j * motion.lattice.quantum * motion.rotation(sheet))
-    where = (np.repeat(np.arange(m), 3), faces.ravel())
-    conformal, size = ((g * turn).ravel() for g in (gradient, gradient.conj()))
-    return (
-        sparse.csr_array((conformal, where), shape=(m, n)),
-        sparse.csr_array((size, where), shape=(m, n)),
-        np.asarray(area),
-        np.asarray((gradient * shift).sum(axis=1)),
-        np.asarray((gradient.conj() * shift).sum(axis=1)),
-    )
-
-
-def _freedom(normal: Complexes, depth: Floats, rest: Complexes) -> tuple[sparse.csr_array, Complexes]:
-    """Orthonormal basis (2n, unknowns) of the movements left to the vertices, and a place on the lines."""
-    n = len(rest)
-    lines = (normal != 0).sum(axis=1)
-    fixed = np.zeros(n, dtype=complex)
-    one, two = np.flatnonzero(lines == 1), np.flatnonzero(lines == 2)
-    first = normal[one][np.arange(len(one)), np.argmax(normal[one] != 0, axis=1)]
-    at = depth[one][np.arange(len(one)), np.argmax(normal[one] != 0, axis=1)]
-    fixed[one] = first * at
-    p, q = normal[two].T
-    d, e = depth[two].T
-    fixed[two] = 1j * (e * p - d * q) / (p.conj() * q).imag
-    free = np.flatnonzero(lines == 0)
-    f, k = len(free), len(one)
-    along = 1j * first
-    rows = np.concatenate([free, free + n, one, one + n])
-    columns = np.concatenate([np.arange(2 * f), 2 * f + np.arange(k), 2 * f + np.arange(k)])
-    values = np.concatenate([np.ones(2 * f), along.real, along.imag])
-    return sparse.csr_array((values, (rows, columns)), shape=(2 * n, 2 * f + k)), fixed

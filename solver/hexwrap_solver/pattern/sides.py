@@ -9,7 +9,7 @@ import numpy as np
 
 from hexwrap_solver.arrays import Complexes, Floats, Ints
 from hexwrap_solver.conformal.types import ConformalMap
-from hexwrap_solver.pattern.lattice import Lattice
+from hexwrap_solver.pattern.lattice import Lattice, Motion
 
 #: A boundary is straight where it turns by less than this altogether, a corner quantized within it; rad.
 QUANTIZED = 0.02
@@ -112,3 +112,45 @@ def _sides_of_loop(cmap: ConformalMap, lattice: Lattice, loop: int, gained: Ints
         sheet[index],
         place[index],
     )
+
+
+@dataclass(frozen=True)
+class Lines:
+    """The lines on which vertices must lie, up to two each: normal: (n, 2), unit and inward in the vertex's
+    own sheet, 0 where there is none. side: (n, 2) to which they belong, −1 where there is none. sheet: (n,
+    2) on which the side's frame shows the vertex. entry: (n, 2) where the sides list it."""
+
+    normal: Complexes
+    side: Ints
+    sheet: Ints
+    entry: Ints
+
+    def depths(self, depth: Floats, motion: Motion) -> Floats:
+        """(n, 2) depth of each line from 0 in the vertex's own sheet; depth: (s,) of the sides in the frame
+        of their loop."""
+        zero = np.zeros((*self.sheet.shape, 2), dtype=np.int64)
+        shift = motion.lattice.position(motion.apply(zero, self.sheet))
+        turn = np.exp(1j * motion.lattice.quantum * motion.rotation(self.sheet))
+        own = depth[self.side] - ((self.normal * turn).conj() * shift).real
+        return np.asarray(np.where(self.side >= 0, own, 0.0))
+
+
+def lines_of(n: int, sides: Sides, normal: Complexes, motion: Motion) -> Lines:
+    """normal: (s,) of the sides in the frame of their loop. motion: any with the right rotation."""
+    own = normal[sides.side] / np.exp(1j * motion.lattice.quantum * motion.rotation(sides.sheet))
+    order = np.argsort(sides.vertex, kind="stable")
+    vertex = sides.vertex[order]
+    again = np.concatenate([[0], (vertex[1:] == vertex[:-1]).astype(np.int64)])
+    parallel = np.concatenate([[False], abs(own[order][1:] - own[order][:-1]) < 1e-9]) & (again == 1)
+    order, vertex, again = order[~parallel], vertex[~parallel], again[~parallel]
+    normals, side, sheet = (
+        np.zeros((n, 2), dtype=complex),
+        np.full((n, 2), -1),
+        np.zeros((n, 2), dtype=np.int64),
+    )
+    normals[vertex, again] = own[order]
+    side[vertex, again] = sides.side[order]
+    sheet[vertex, again] = sides.sheet[order]
+    entry = np.zeros_like(side)
+    entry[vertex, again] = order
+    return Lines(normals, side, sheet, entry)

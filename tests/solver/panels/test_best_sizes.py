@@ -56,3 +56,28 @@ def test_best_sizes_gain_on_the_inscribed_ones_without_overlap(chart, make, join
     # The inscribed panels are feasible for the programme, whose weights they are.
     assert inscribed @ fitted.limit >= inscribed @ inscribed * (1 - 1e-6)
     assert (fitted.limit >= inscribed * (1 - 2e-3)).all()
+
+
+@pytest.mark.parametrize("chart", CHARTS.values(), ids=CHARTS)
+@pytest.mark.parametrize("cost", ["area", "worst"])
+@pytest.mark.parametrize("edges", [None, (0.9, 1.02)])
+def test_few_classes_never_cover_less_than_those_of_the_inscribed_panels(chart, cost, edges):
+    pattern, cmap = hex_pattern(chart, 24, 8, -0.6), grid_map(chart, 60, 40, -0.7, 1.8)
+    fitted = {
+        target: fit_panels(cmap, pattern, PanelSettings(target=target)) for target in ("best", "inscribed")
+    }
+    middle = float(np.median(fitted["inscribed"].limit))
+    allowed = None if edges is None else (edges[0] * middle, edges[1] * middle)
+    for classes in (1, 2, 3, 5, 11, 40, None):
+        wanted = PanelSettings(sizes=classes, size_cost=cost, edge_range=allowed)
+        best, inscribed = (quantize(fitted[target], wanted) for target in ("best", "inscribed"))
+        assert len(best.outside) <= len(inscribed.outside)
+        if len(best.outside) == len(inscribed.outside) and cost == "area":
+            assert (best.edge_length**2).sum() >= (inscribed.edge_length**2).sum() * (1 - 1e-12)
+        curves = [
+            made.trade_off.uncovered if cost == "area" else made.trade_off.worst_gap
+            for made in (best, inscribed)
+        ]
+        shared = min(map(len, curves))
+        assert (curves[0][:shared] <= curves[1][:shared] + 1e-12).all()
+        assert measure(cmap, pattern, best).overlaps == 0

@@ -9,8 +9,8 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from hexwrap_solver.arrays import Floats, Ints, Progress, Ragged, no_progress
+from hexwrap_solver.conformal.normal_matrix import NormalMatrix
 from hexwrap_solver.panels.energy.residuals import jacobian, plane_distances, residuals, surface_residuals
-from hexwrap_solver.panels.normal_matrix import NormalMatrix
 from hexwrap_solver.panels.types import Weights
 from hexwrap_solver.pattern.types import Pattern
 from hexwrap_solver.surface.closest import TriangleTree

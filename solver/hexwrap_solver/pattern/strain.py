@@ -1,0 +1,72 @@
+"""What it costs to move the sides of a domain: the conformal error of the least deformation that does it.
+
+The least-squares deformation of ``deform`` is linear in the distances by which the sides are moved, so that
+one solution per side tells the error of every way of choosing lines. The estimate leaves out what reweighting
+gains later, and is good enough to choose by.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hexwrap_solver.arrays import Complexes, Floats
+from hexwrap_solver.pattern.deform import System
+from hexwrap_solver.pattern.sides import Lines, Sides
+
+
+@dataclass(frozen=True)
+class Strain:
+    """Columns: one per side, moved by 1 into the domain; on translations two more, for the deck
+    transformation moved by 1 and by i; and one for a scale of 1 itself, at which sides that are turned out of
+    the lattice's directions are turned back. response: (m, columns) ∂/∂z̄ of the least deformation. area:
+    (m,) parts of the whole. squares: (columns, columns) ∫ of products of the columns."""
+
+    response: Complexes
+    area: Floats
+    squares: Floats
+
+    @classmethod
+    def of(cls, system: System, sides: Sides, lines: Lines, turned: Floats) -> Strain:
+        """system: for the sides' lines. turned: (k,) how much deeper, at scale 1, the sides' mean depth is
+        than their vertices are."""
+        change, freedom = system.change, system.freedom
+        area = change.area / change.area.sum()
+        weight = np.sqrt(area)
+        still = np.zeros(freedom.basis.shape[1])
+        moves = [(np.where(lines.side == k, 1.0, 0.0), 0j) for k in range(sides.n)]
+        if system.cmap.deck.apex is None:
+            moves += [(-(lines.normal.conj() * lines.sheet * step).real, step) for step in (1 + 0j, 1j)]
+        moves.append((np.where(lines.side >= 0, turned[lines.entry], 0.0), 0j))
+        columns = []
+        for depth, step in moves:
+            fixed = freedom.place_on_lines(depth)
+            shift = change.of_shift(np.asarray(system.cmap.sheet * step))
+            angles, sizes = change.of(fixed, shift)
+            columns.append(change.of(fixed + system.solve(weight, -angles, -sizes, still), shift)[0])
+        response = np.stack(columns, axis=1)
+        squares = ((response.conj() * area[:, None]).T @ response).real
+        return cls(response, np.asarray(area), np.asarray(squares))
+
+    def mean(self, moved: Floats) -> float:
+        """Root mean square of |∂/∂z̄| where the columns are moved by so much."""
+        return float(np.sqrt(max(float(moved @ self.squares @ moved), 0.0)))
+
+    def sharp(self, moved: Floats) -> float:
+        """Its fourth-power mean, which heeds the worst places more."""
+        return float((self.area @ np.abs(self.response @ moved) ** 4) ** 0.25)
+
+    def nearest(self, moved: Floats, period: float, sides: int) -> Floats:
+        """Moves of the first ``sides`` columns changed by multiples of the period, as long as any single
+        change lessens ``mean``."""
+        moved = moved.copy()
+        own = period * period * np.diag(self.squares)[:sides]
+        for _ in range(4 * sides):
+            slope = 2 * period * (self.squares @ moved)[:sides]
+            gain = own - np.abs(slope)
+            k = int(np.argmin(gain))
+            if gain[k] >= -1e-12 * own[k]:
+                break
+            moved[k] -= period * np.sign(slope[k])
+        return moved
