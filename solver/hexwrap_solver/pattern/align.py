@@ -12,7 +12,7 @@ from hexwrap_solver.pattern.deform import System, deform, distortion_of
 from hexwrap_solver.pattern.lattice import Lattice, Motion
 from hexwrap_solver.pattern.placement import Placement, edge_angle
 from hexwrap_solver.pattern.rows import Rows, rows_along
-from hexwrap_solver.pattern.sides import Sides, lines_of, sides_of
+from hexwrap_solver.pattern.sides import Lines, Sides, lines_of, sides_of
 from hexwrap_solver.pattern.size import size_spread, wanted_edge, width_per_cell
 from hexwrap_solver.pattern.strain import Strain
 from hexwrap_solver.pattern.types import PatternSettings
@@ -75,16 +75,33 @@ class _Frame:
         return np.asarray(self.depth[side] - (self.normal[side].conj() * place).real)
 
 
-def place_by_sides(
-    cmap: ConformalMap, lattice: Lattice, settings: PatternSettings, turns: int, loops: list[int]
-) -> Placement:
+@dataclass(frozen=True)
+class Straightening:
+    """All that moving the sides of a domain onto lattice lines takes, whatever the size of the cells."""
+
+    frame: _Frame
+    lines: Lines
+    system: System
+    strain: Strain
+
+    @classmethod
+    def of(
+        cls, cmap: ConformalMap, lattice: Lattice, settings: PatternSettings, turns: int, loops: list[int]
+    ) -> Straightening:
+        """settings: their sizes do not matter. loops: the ones to straighten, polygons."""
+        frame = _frame(cmap, lattice, settings, turns, loops)
+        rotation = Motion(lattice, turns, (0, 0))
+        lines = lines_of(len(cmap.uv), frame.sides, frame.normal, rotation)
+        system = System(cmap, rotation, lines.normal)
+        return cls(frame, lines, system, Strain.of(system, frame.sides, lines, frame.turned))
+
+
+def place_by_sides(straightening: Straightening, settings: PatternSettings) -> Placement:
     """Scale, centre and lines whose deformation distorts least, then that deformation."""
+    frame, lines = straightening.frame, straightening.lines
+    system, strain = straightening.system, straightening.strain
+    cmap, lattice = frame.cmap, frame.lattice
     angle = edge_angle(lattice, settings)
-    frame = _frame(cmap, lattice, settings, turns, loops)
-    rotation = Motion(lattice, turns, (0, 0))
-    lines = lines_of(len(cmap.uv), frame.sides, frame.normal, rotation)
-    system = System(cmap, rotation, lines.normal)
-    strain = Strain.of(system, frame.sides, lines, frame.turned)
     size = lattice.edge / wanted_edge(cmap, lattice, settings, angle)
     spread = size_spread(settings)
     trials = [
@@ -102,7 +119,7 @@ def place_by_sides(
     distortion, best, place = min(tried, key=lambda found: found[0] + found[1].extra)
     width = width_per_cell(lattice, angle) * lattice.edge
     around = round(cmap.circumference * abs(best.scale) / width)
-    if turns == 0:
+    if frame.turns == 0:
         around = int(lattice.cells_around(np.array(best.motion.shift)))
     notes = (
         ("phase has no effect: lattice lines on all sides leave no freedom.",) if any(settings.phase) else ()

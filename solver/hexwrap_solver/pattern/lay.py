@@ -20,7 +20,7 @@ from hexwrap_solver.pattern.cells import is_simple, largest_part, manifold_corne
 from hexwrap_solver.pattern.lattice import LATTICES, Lattice
 from hexwrap_solver.pattern.links import link_nodes
 from hexwrap_solver.pattern.nodes import Layout, find_nodes
-from hexwrap_solver.pattern.place import place_lattice
+from hexwrap_solver.pattern.place import Placing
 from hexwrap_solver.pattern.placement import Placement, anchor_vertex
 from hexwrap_solver.pattern.rings import places, rows_from, turns_around, winding
 from hexwrap_solver.pattern.rotation import with_rotation
@@ -49,7 +49,8 @@ def lay_pattern(cmap: ConformalMap, settings: PatternSettings, progress: Progres
     """
     lattice = LATTICES[settings.kind]
     settings, notes = with_rotation(cmap, lattice, settings)
-    pattern = _lay(cmap, lattice, settings, progress)
+    placing = Placing.of(cmap, lattice, settings)
+    pattern = _lay(placing, settings, progress)
     if settings.around is not None and pattern.around != settings.around:
         notes.append(
             f"{pattern.around} cells around instead of {settings.around}: the nearest that closes up."
@@ -57,7 +58,7 @@ def lay_pattern(cmap: ConformalMap, settings: PatternSettings, progress: Progres
     wanted = settings.edge_length
     if wanted is not None and abs(pattern.edge_length / wanted - 1) > CLOSE:
         corrected = replace(settings, edge_length=wanted**2 / pattern.edge_length)
-        again = _lay(cmap, lattice, corrected, no_progress)
+        again = _lay(placing, corrected, no_progress)
         if abs(again.edge_length / wanted - 1) < abs(pattern.edge_length / wanted - 1):
             pattern = again
         if abs(pattern.edge_length / wanted - 1) > ASKED:
@@ -68,8 +69,9 @@ def lay_pattern(cmap: ConformalMap, settings: PatternSettings, progress: Progres
     return replace(pattern, notes=(*notes, *pattern.notes))
 
 
-def _lay(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings, progress: Progress) -> Pattern:
-    placement = place_lattice(cmap, lattice, settings)
+def _lay(placing: Placing, settings: PatternSettings, progress: Progress) -> Pattern:
+    cmap, lattice = placing.cmap, placing.lattice
+    placement = placing.at(settings)
     progress(0.1, "placing the lattice")
     layout = layout_of(cmap, lattice, placement)
     _check_count(cmap, layout, settings)

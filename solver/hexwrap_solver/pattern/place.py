@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from hexwrap_solver.conformal.types import ConformalMap
-from hexwrap_solver.pattern.align import place_by_sides, turn_between_loops
+from hexwrap_solver.pattern.align import Straightening, place_by_sides, turn_between_loops
 from hexwrap_solver.pattern.cone import place_on_cone, place_on_flat_ring
 from hexwrap_solver.pattern.cylinder import place_on_cylinder
 from hexwrap_solver.pattern.lattice import Lattice
@@ -21,48 +22,75 @@ BEARABLE = 0.5
 
 def place_lattice(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings) -> Placement:
     """The way of placing that suits the domain and what is to be aligned."""
-    turns = quantum_turns(cmap, lattice)
-    loops, notes = loops_to_align(cmap, lattice, settings)
-    if turns == 0 and not any(has_corners(cmap, lattice, loop) for loop in loops):
-        placement = place_on_cylinder(cmap, lattice, settings, loops)
-    elif loops:
-        placement = _place_by_sides(cmap, lattice, settings, turns, loops)
-    else:
-        placement = _place_freely(cmap, lattice, settings, turns)
-    return replace(placement, notes=(*notes, *placement.notes))
+    return Placing.of(cmap, lattice, settings).at(settings)
 
 
-def _place_freely(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings, turns: int) -> Placement:
-    """Aligned nowhere."""
-    if turns == 0:
-        return place_on_cylinder(cmap, lattice, settings, [])
-    if cmap.deck.is_translation:
-        return place_on_flat_ring(cmap, lattice, settings, turns)
-    return place_on_cone(cmap, lattice, settings, turns)
+@dataclass(frozen=True)
+class Placing:
+    """Ways of placing that differ in the size of the cells alone: what they share is computed once.
 
+    loops: those to align. shape: settings whose sizes do not matter.
+    """
 
-def _place_by_sides(
-    cmap: ConformalMap, lattice: Lattice, settings: PatternSettings, turns: int, loops: list[int]
-) -> Placement:
-    """Aligned on as many of the loops as bearable deformations allow."""
-    tried = place_by_sides(cmap, lattice, settings, turns, loops)
-    if tried.distortion <= BEARABLE:
-        return tried
-    cost = f"distort cells by {tried.distortion:.2f}, more than {BEARABLE:g}"
-    if not np.isfinite(tried.distortion):
-        cost = "fold the layout over"
-    told = (
-        f"To align loop {' and loop '.join(map(str, loops))} at this size would {cost}: smaller cells, or "
-        "corners elsewhere, fit better."
-    )
-    turned = abs(np.rad2deg(turn_between_loops(cmap, lattice, loops)))
-    if turned > 1:
-        told += f" The sides of the two loops stand at {turned:.1f}° to each other about the apex."
-    fewer = [place_by_sides(cmap, lattice, settings, turns, [loop]) for loop in loops if len(loops) == 2]
-    best = min(fewer, key=lambda placement: placement.distortion, default=tried)
-    if best.distortion > BEARABLE:
-        best = _place_freely(cmap, lattice, settings, turns)
-    return replace(best, notes=(told, *best.notes))
+    cmap: ConformalMap
+    lattice: Lattice
+    shape: PatternSettings
+    turns: int
+    loops: list[int]
+    notes: list[str]
+
+    @classmethod
+    def of(cls, cmap: ConformalMap, lattice: Lattice, settings: PatternSettings) -> Placing:
+        loops, notes = loops_to_align(cmap, lattice, settings)
+        return cls(cmap, lattice, settings, quantum_turns(cmap, lattice), loops, notes)
+
+    def at(self, settings: PatternSettings) -> Placement:
+        """settings: those it was made for, but for the size."""
+        cmap, lattice, loops = self.cmap, self.lattice, self.loops
+        if self.turns == 0 and not any(has_corners(cmap, lattice, loop) for loop in loops):
+            placement = place_on_cylinder(cmap, lattice, settings, loops)
+        elif loops:
+            placement = self._by_sides(settings)
+        else:
+            placement = self._freely(settings)
+        return replace(placement, notes=(*self.notes, *placement.notes))
+
+    @cached_property
+    def _straightening(self) -> Straightening:
+        return Straightening.of(self.cmap, self.lattice, self.shape, self.turns, self.loops)
+
+    def _freely(self, settings: PatternSettings) -> Placement:
+        """Aligned nowhere."""
+        if self.turns == 0:
+            return place_on_cylinder(self.cmap, self.lattice, settings, [])
+        if self.cmap.deck.is_translation:
+            return place_on_flat_ring(self.cmap, self.lattice, settings, self.turns)
+        return place_on_cone(self.cmap, self.lattice, settings, self.turns)
+
+    def _by_sides(self, settings: PatternSettings) -> Placement:
+        """Aligned on as many of the loops as bearable deformations allow."""
+        cmap, lattice, loops = self.cmap, self.lattice, self.loops
+        tried = place_by_sides(self._straightening, settings)
+        if tried.distortion <= BEARABLE:
+            return tried
+        cost = f"distort cells by {tried.distortion:.2f}, more than {BEARABLE:g}"
+        if not np.isfinite(tried.distortion):
+            cost = "fold the layout over"
+        told = (
+            f"To align loop {' and loop '.join(map(str, loops))} at this size would {cost}: smaller cells, "
+            "or corners elsewhere, fit better."
+        )
+        turned = abs(np.rad2deg(turn_between_loops(cmap, lattice, loops)))
+        if turned > 1:
+            told += f" The sides of the two loops stand at {turned:.1f}° to each other about the apex."
+        single = [
+            Straightening.of(cmap, lattice, settings, self.turns, [loop]) for loop in loops if len(loops) == 2
+        ]
+        fewer = [place_by_sides(straightening, settings) for straightening in single]
+        best = min(fewer, key=lambda placement: placement.distortion, default=tried)
+        if best.distortion > BEARABLE:
+            best = self._freely(settings)
+        return replace(best, notes=(told, *best.notes))
 
 
 def loops_to_align(
