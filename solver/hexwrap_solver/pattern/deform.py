@@ -24,8 +24,8 @@ SIZE = 0.1
 #: Rounds of reweighting, by which the sum of squares nears one of fourth powers, and its least weight: what
 #: the triangles at corners bear is spread over more of them (worst ratios of 0.04 for 0.18, 0.21 for 0.6).
 ROUNDS, FLOOR = 4, 1e-2
-#: A worst ratio of singular values − 1 that calls for no further round.
-FINE = 0.01
+#: Below this worst ratio of singular values − 1, a round that gains nothing is the last one.
+FINE = 0.03
 
 #: Pull towards the undeformed place, relative: it only settles what nothing else does.
 REST = 1e-9
@@ -49,7 +49,7 @@ def deform(system: System, motion: Motion, scale: complex, rest: Complexes, dept
         worst = _worst(bent, kept)
         if worst < least or best is rest:
             best, least = place, worst
-        if least <= FINE:
+        elif least <= FINE:
             break
         # Half-way in the logarithm: full steps of reweighting oscillate for powers above three.
         weight = np.sqrt(weight * even * (bent**2 / max((bent**2).mean(), 1e-300) + FLOOR))
