@@ -7,17 +7,18 @@ from typing import Literal
 import numpy as np
 import pytest
 
-from hexwrap_solver.arrays import Floats
+from hexwrap_solver.arrays import Floats, no_progress
 from hexwrap_solver.conformal import boundary, conformal_map
 from hexwrap_solver.conformal.cut import cut_open
 from hexwrap_solver.conformal.energy import Energy, opposite_lengths
+from hexwrap_solver.conformal.robust import descent, solve_with_flips
 from hexwrap_solver.conformal.robust import solve as robust
-from hexwrap_solver.conformal.robust import solve_with_flips
 from hexwrap_solver.conformal.robust.delaunay import _flip as flip
 from hexwrap_solver.conformal.robust.delaunay import cosine_sums, make_delaunay
-from hexwrap_solver.conformal.robust.descent import FlipEnergy
+from hexwrap_solver.conformal.robust.descent import FlipEnergy, descend
 from hexwrap_solver.conformal.robust.metric import angle_sums, measure
 from hexwrap_solver.conformal.robust.mirror import MirrorMesh, mirror_mesh
+from hexwrap_solver.conformal.span import MAX_SPAN
 from hexwrap_solver.conformal.types import BoundaryCondition
 from hexwrap_solver.errors import ConvergenceError
 from hexwrap_solver.surface.types import Surface
@@ -130,6 +131,24 @@ def test_gradient_does_not_jump_across_flips_and_newton_direction_is_its_derivat
     gradients = np.array([energy.at(x + t * far)[1] for t in np.linspace(0, 1, 400)])
     assert energy.flips > 20
     assert (np.diff(gradients @ far) > 0).all()
+
+
+def test_steps_that_were_tried_in_vain_leave_no_trace(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Their flips must not stay under the Hessian of the next step."""
+    surface = TORTURE["retriangulated"](np.random.default_rng(0))
+
+    def iterations() -> int:
+        energy = FlipEnergy(Energy(surface, boundary.straight(surface)), _mirrored(surface))
+        return descend(energy, np.zeros(len(surface.vertices)), MAX_SPAN, no_progress).iterations
+
+    def astray(energy: FlipEnergy, x: Floats, gradient: Floats) -> None:
+        energy.at(x + _random_u(len(x), 0.5))
+
+    monkeypatch.setattr(descent, "CHORDS", -1)
+    expected = iterations()
+    monkeypatch.setattr(descent, "CHORDS", np.inf)
+    monkeypatch.setattr(descent, "_chord", astray)
+    assert iterations() == expected
 
 
 @pytest.mark.parametrize("name", [name for name in sorted(MESHES) if MESHES[name].stat().st_size < 2e5])
