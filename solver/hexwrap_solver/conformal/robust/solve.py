@@ -37,7 +37,7 @@ MAX_ROUNDS = 40
 #: From this round on, where no more than so many triangles still turn over, the mesh gets shells around their
 #: vertices every so many rounds; where there are more of them, it is no cascade around single vertices. A
 #: cascade that is left to itself makes edges as short as rounding within a dozen rounds.
-PATIENCE, FEW, SHELLS = 4, 30, 2
+PATIENCE, FEW, SHELLS = 6, 30, 2
 #: Refinement that makes more than so many times the vertices, and so many more, does not come to an end.
 MOST, MOST_MORE = 2, 4000
 #: How exact prescribed boundary angles are, radians.
