@@ -7,23 +7,25 @@ from typing import Literal
 import numpy as np
 import pytest
 
-from hexwrap_solver.arrays import Floats
+from hexwrap_solver.arrays import Floats, no_progress
 from hexwrap_solver.conformal import boundary, conformal_map
 from hexwrap_solver.conformal.cut import cut_open
 from hexwrap_solver.conformal.energy import Energy, opposite_lengths
+from hexwrap_solver.conformal.robust import descent, solve_with_flips
 from hexwrap_solver.conformal.robust import solve as robust
-from hexwrap_solver.conformal.robust import solve_with_flips
+from hexwrap_solver.conformal.robust.delaunay import _flip as flip
 from hexwrap_solver.conformal.robust.delaunay import cosine_sums, make_delaunay
-from hexwrap_solver.conformal.robust.descent import FlipEnergy
+from hexwrap_solver.conformal.robust.descent import FlipEnergy, descend
 from hexwrap_solver.conformal.robust.metric import angle_sums, measure
 from hexwrap_solver.conformal.robust.mirror import MirrorMesh, mirror_mesh
+from hexwrap_solver.conformal.span import MAX_SPAN
 from hexwrap_solver.conformal.types import BoundaryCondition
 from hexwrap_solver.errors import ConvergenceError
 from hexwrap_solver.surface.types import Surface
-from tests.solver.conformal.annuli import bump, catenoid
+from tests.solver.conformal.annuli import annulus, bump, catenoid, grid, uneven
 from tests.solver.conformal.checks import faults
 from tests.solver.conformal.shared import MESHES, load
-from tests.solver.conformal.torture import TORTURE, taken_in
+from tests.solver.conformal.torture import TORTURE, random_flips, taken_in
 
 
 def _mirrored(surface: Surface) -> MirrorMesh:
@@ -72,6 +74,39 @@ def test_flips_there_and_back_restore_every_length() -> None:
     assert np.abs(np.sort(mesh.log_length) - before).max() < 1e-11
 
 
+@pytest.mark.parametrize("euclidean", [True, False])
+def test_flips_over_the_mirror_line_and_back_restore_every_length(euclidean: bool) -> None:
+
+    def staggered(phi: Floats, s: Floats) -> Floats:
+        """Apexes stand above the middles of the boundary edges."""
+        phi, r = phi - np.pi / 24 * (np.rint(5 * s) % 2), 1 + 0.4 * s
+        return np.stack([r * np.cos(phi), r * np.sin(phi), 2 * s], axis=1)
+
+    mesh = _mirrored(grid(24, 5, staggered, alternate=False))
+    length = mesh.log_length.copy()
+    edges = np.flatnonzero(mesh.outer)[::3] >> 1
+    flip(mesh, edges, length, euclidean)
+    assert mesh.crossing[edges].all()
+    assert np.abs(length - mesh.log_length)[edges].min() > 0.1
+    flip(mesh, edges, length, euclidean)
+    assert not mesh.crossing.any()
+    assert np.abs(length - mesh.log_length).max() < 1e-13
+
+
+def test_the_surface_has_one_delaunay_triangulation_however_its_faces_are_numbered() -> None:
+    """Flips in another order take other ways to it, some of them over the mirror line and back."""
+    random = np.random.default_rng(11)
+    tower = grid(4, 3, uneven)
+    vertices = tower.vertices + random.normal(scale=0.4, size=tower.vertices.shape)
+    faces = random_flips(tower.faces, len(vertices), random, 60)
+    found = []
+    for _ in range(8):
+        mesh = _mirrored(annulus(vertices, random.permutation(faces), tower.loops))
+        make_delaunay(mesh, np.zeros(mesh.n), euclidean=True)
+        found.append(np.sort(mesh.log_length))
+    assert np.ptp(found, axis=0).max() < 1e-12
+
+
 def test_gauss_bonnet_holds_in_every_delaunay_metric() -> None:
     surface = bump(24, 10)
     mesh = _mirrored(surface)
@@ -96,6 +131,24 @@ def test_gradient_does_not_jump_across_flips_and_newton_direction_is_its_derivat
     gradients = np.array([energy.at(x + t * far)[1] for t in np.linspace(0, 1, 400)])
     assert energy.flips > 20
     assert (np.diff(gradients @ far) > 0).all()
+
+
+def test_steps_that_were_tried_in_vain_leave_no_trace(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Their flips must not stay under the Hessian of the next step."""
+    surface = TORTURE["retriangulated"](np.random.default_rng(0))
+
+    def iterations() -> int:
+        energy = FlipEnergy(Energy(surface, boundary.straight(surface)), _mirrored(surface))
+        return descend(energy, np.zeros(len(surface.vertices)), MAX_SPAN, no_progress).iterations
+
+    def astray(energy: FlipEnergy, x: Floats, gradient: Floats) -> None:
+        energy.at(x + _random_u(len(x), 0.5))
+
+    monkeypatch.setattr(descent, "CHORDS", -1)
+    expected = iterations()
+    monkeypatch.setattr(descent, "CHORDS", np.inf)
+    monkeypatch.setattr(descent, "_chord", astray)
+    assert iterations() == expected
 
 
 @pytest.mark.parametrize("name", [name for name in sorted(MESHES) if MESHES[name].stat().st_size < 2e5])

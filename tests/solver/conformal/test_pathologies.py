@@ -7,10 +7,11 @@ import pytest
 
 from hexwrap_solver.conformal import conformal_map
 from hexwrap_solver.conformal.types import BoundaryCondition
+from hexwrap_solver.errors import ConvergenceError
 from hexwrap_solver.surface.types import Surface
 from tests.solver.conformal.annuli import annulus, grid, irregular, revolution, ring, uneven
 from tests.solver.conformal.checks import asked_angles, faults
-from tests.solver.conformal.torture import random_flips
+from tests.solver.conformal.torture import MODES, band, extreme, random_flips
 
 CONE = revolution(lambda s: 1 + 2 * s, lambda s: s)
 
@@ -121,3 +122,21 @@ def test_splits_do_not_go_around_a_vertex_for_ever() -> None:
     faces = random_flips(tower.faces, len(tower.vertices), random, 6000)
     found = conformal_map(annulus(tower.vertices, faces, tower.loops), BoundaryCondition())
     assert faults(found) == []
+
+
+def test_cascades_of_splits_around_several_vertices_end() -> None:
+    """Some hundred needles in a few fans, under small angles and wide ones."""
+    random = np.random.default_rng(9)
+    few, many = (random.uniform(0, 2 * np.pi, int(random.integers(*span))) for span in ((3, 8), (20, 200)))
+    surface = band(np.sort(few), np.sort(many), random)
+    condition = extreme(surface, np.random.default_rng(1009))
+    found = conformal_map(surface, condition)
+    assert faults(found, asked_angles(found, surface, condition)) == []
+
+
+def test_angles_that_are_not_exact_are_refused() -> None:
+    """On a band 250 times as long as wide, corners of 30° and 330° want scale factors beyond all doubles."""
+    surface = grid(4, 7, revolution(lambda s: 1 + 0 * s, lambda s: 0.0027 * s))
+    condition = MODES["densified"](surface, np.random.default_rng(1003))
+    with pytest.raises(ConvergenceError, match="double precision"):
+        conformal_map(surface, condition)

@@ -134,16 +134,17 @@ def boundary_caps(random: Random) -> Surface:
 
 def one_wide(random: Random) -> Surface:
     """One ring of triangles between loops of 5 and 90 vertices, unevenly spaced."""
-    return _band(np.sort(random.uniform(0, 2 * np.pi, 5)), np.sort(random.uniform(0, 2 * np.pi, 90)), random)
+    return band(np.sort(random.uniform(0, 2 * np.pi, 5)), np.sort(random.uniform(0, 2 * np.pi, 90)), random)
 
 
 def one_wide_even(random: Random) -> Surface:
     """One ring of triangles between equal loops, in a random zigzag."""
     angles = np.arange(30) * 2 * np.pi / 30
-    return _band(angles, angles + 0.05, random)
+    return band(angles, angles + 0.05, random)
 
 
-def _band(first: Floats, second: Floats, random: Random) -> Surface:
+def band(first: Floats, second: Floats, random: Random) -> Surface:
+    """One ring of triangles in a random zigzag between loops with vertices at these angles."""
     n, m = len(first), len(second)
     lower = np.stack([np.cos(first), np.sin(first), np.zeros(n)], axis=1)
     upper = np.stack([1.5 * np.cos(second), 1.2 * np.sin(second), np.full(m, 0.4)], axis=1)

@@ -210,9 +210,9 @@ def _flip_up(mesh: MirrorMesh, edges: Ints, length: Floats, euclidean: bool) -> 
     m, m_i, m_j = length[edges], mesh.cross_length(left, length), mesh.cross_length(after, length)
     a, b = length[left >> 1], length[right >> 1]
     if euclidean:
-        fall, rise = (np.exp(m - a) - np.exp(m_i - a)) / 2, (np.exp(m_j - b) - np.exp(m - b)) / 2
-        along = _along(fall) + np.exp(b - a) * _along(rise)
-        length[edges] = a + np.log(np.hypot(along, fall - np.exp(b - a) * rise))
+        first, second = (np.exp(m - a) - np.exp(m_i - a)) / 2, (np.exp(m_j - b) - np.exp(m - b)) / 2
+        along = _along(first) + np.exp(b - a) * _along(second)
+        length[edges] = a + np.log(np.hypot(along, first + np.exp(b - a) * second))
     else:
         length[edges] = (
             np.logaddexp(a + 0.5 * np.logaddexp(2 * b, m + m_j), b + 0.5 * np.logaddexp(2 * a, m + m_i)) - m

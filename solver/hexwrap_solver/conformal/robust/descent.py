@@ -142,6 +142,8 @@ def descend(energy: FlipEnergy, start: Floats, span: float, progress: Progress) 
         )
         step = _chord(energy, x, gradient) if chord else None
         if step is None:
+            if chord:
+                metric, gradient = energy.at(x)  # the step that was tried has flipped edges
             step = _line_search(energy, x, energy.newton_direction(metric, gradient), gradient)
         if step is None:
             break
@@ -149,6 +151,8 @@ def descend(energy: FlipEnergy, start: Floats, span: float, progress: Progress) 
         gain = _largest(step.gradient) / residual
         if gain < 1 or residual > ACCEPTED:
             x, metric, gradient = step.x, step.metric, step.gradient
+        else:
+            metric, gradient = energy.at(x)
         stalls += gain > STAGNATION and residual <= ACCEPTED
         if stalls and (stalls == STALLS or residual <= LAST_ROUNDINGS):
             break  # nothing but rounding is left

@@ -35,10 +35,13 @@ from hexwrap_solver.surface.types import Surface
 #: Rounds of refinement; meshes seen so far need up to a handful.
 MAX_ROUNDS = 40
 #: From this round on, where no more than so many triangles still turn over, the mesh gets shells around their
-#: vertices every so many rounds; where there are more of them, it is no cascade around single vertices.
-PATIENCE, FEW, SHELLS = 8, 4, 4
+#: vertices every so many rounds; where there are more of them, it is no cascade around single vertices. A
+#: cascade that is left to itself makes edges as short as rounding within a dozen rounds.
+PATIENCE, FEW, SHELLS = 6, 30, 2
 #: Refinement that makes more than so many times the vertices, and so many more, does not come to an end.
 MOST, MOST_MORE = 2, 4000
+#: How exact prescribed boundary angles are, radians.
+PROMISED = 1e-9
 REFINED = "The mesh was refined:"
 
 
@@ -154,7 +157,7 @@ def _flatten(problem: Problem, progress: Progress) -> _Flat:
     known = sums if free else targets.angle
     angle = cone_angle_of(targets, known, surface)
     check_span(descent.u, angle)
-    if not descent.residual <= ACCEPTED:
+    if not (descent.residual <= ACCEPTED and _met(targets, sums, surface)):
         raise ConvergenceError(
             f"Newton's method with flips ended after {descent.iterations} steps with angle sums still "
             f"{descent.residual:.1e} rad off: double precision cannot hold the map of this surface; "
@@ -191,6 +194,13 @@ def _draw(problem: Problem, flat: _Flat) -> ConformalMap:
         flips=flat.flips,
         closing_error=laid.gap,
     )
+
+
+def _met(targets: Targets, sums: Floats, surface: Surface) -> bool:
+    """Whether the prescribed boundary angles are as exact as promised."""
+    loops = np.concatenate(surface.loops)
+    listed = loops[targets.tie[loops] < 0]
+    return bool((np.abs(sums - targets.angle)[listed] <= PROMISED).all())
 
 
 def _centred(descent: Descent, targets: Targets) -> tuple[Floats, Metric]:

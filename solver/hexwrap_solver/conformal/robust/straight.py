@@ -43,7 +43,7 @@ def _project(uv: Complexes, loop: Ints, corner: np.ndarray, step: Ints, deck: De
     side = np.cumsum(corner) - 1
     start = place[ends[side]]
     direction = place[ends[side + 1]] - start
-    direction /= np.abs(direction)
+    direction /= np.maximum(np.abs(direction), np.finfo(float).tiny)  # a side may have no length in doubles
     moved = start + (np.conj(direction) * (place[:-1] - start)).real * direction
     inside = ~corner
     uv[loop[inside]] = deck.apply(moved[inside], -power[:-1][inside])
