@@ -127,7 +127,7 @@ def _close(surface: Surface, corners: Complexes, cut: Cut, cone_angle: float) ->
     disagreement = float(np.abs(offsets - translation).max())
     uv = right
     deck = Deck(cone_angle, translation)
-    uv, deck, circumference = normalise(uv, deck, int(cut.path[0]), surface.loops)
+    uv, deck, circumference = normalise(surface, uv, cut.sheet, deck, int(cut.path[0]))
     return Layout(uv, cut.sheet, deck, circumference, disagreement / circumference)
 
 
@@ -139,11 +139,11 @@ def _mean_position(vertex: Ints, position: Complexes, n: int) -> Complexes:
 
 
 def normalise(
-    uv: Complexes, deck: Deck, foot_vertex: int, loops: tuple[Ints, Ints]
+    surface: Surface, uv: Complexes, sheet: Ints, deck: Deck, foot_vertex: int
 ) -> tuple[Complexes, Deck, float]:
     """Moves the sheet, whose cut starts at ``foot_vertex`` on loop 0, into its standard place (see lay_out).
     Also gives the circumference."""
-    foot = complex(uv[foot_vertex])
+    loops, foot = surface.loops, complex(uv[foot_vertex])
     apex = deck.apex
     if apex is not None:
         distance = np.abs(uv - apex)
@@ -155,11 +155,18 @@ def normalise(
         moved, deck = _upright(uv, deck, foot)
         moved -= 1j * moved[loops[0]].imag.mean()
         return moved, Deck(deck.angle, complex(deck.translation.real)), abs(deck.translation)
-    moved = uv - uv[loops[0]].mean()
-    radii = [float(np.abs(moved[loop] - moved[loop].mean()).mean()) for loop in loops]
-    length = abs(deck.angle) * float(np.sqrt(radii[0] * radii[1]))
+    length = _loop_length(surface, uv, sheet, deck)
     short = abs(deck.translation) <= NO_TRANSLATION * length
-    return moved, Deck(deck.angle, 0j if short else deck.translation), length
+    return uv - uv[loops[0]].mean(), Deck(deck.angle, 0j if short else deck.translation), length
+
+
+def _loop_length(surface: Surface, uv: Complexes, sheet: Ints, deck: Deck) -> float:
+    """Geometric mean of the two loops' lengths in the domain, whatever copies the cut has picked."""
+    corner = deck.apply(uv[surface.faces], sheet).ravel()
+    rim = np.flatnonzero(surface.twin < 0)
+    edge = np.abs(corner[next_half_edge(rim)] - corner[rim])
+    first = np.isin(surface.faces.ravel()[rim], surface.loops[0])
+    return float(np.sqrt(edge[first].sum()) * np.sqrt(edge[~first].sum()))
 
 
 def _upright(uv: Complexes, deck: Deck, foot: complex) -> tuple[Complexes, Deck]:

@@ -107,7 +107,8 @@ class ConformalMap:
     positively oriented triangle.
     boundary_angles: per loop, angle sums in the domain, aligned with surface.loops.
     circumference: length of one turn: |translation| on a cylinder; on a cone |K| × apex distance of its
-    middle ring (the geometric mean of the loops' mean distances).
+    middle ring (the geometric mean of the loops' mean distances); on a ring without an apex (K = 2πm) the
+    geometric mean of the loops' lengths.
     residual: max |angle sum − target|. flips: number of edges flipped; inserted: number of vertices inserted.
     closing_error: largest disagreement of the layout around the annulus / length of one turn.
     notes: sentences for the user.

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hexwrap_solver.arrays import Complexes, Floats
+from hexwrap_solver.arrays import Complexes, Floats, Ints
 from hexwrap_solver.conformal import boundary, conformal_map
 from hexwrap_solver.conformal.energy import Energy
 from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap, Deck
@@ -107,17 +107,7 @@ def test_a_far_origin_costs_only_the_digits_the_data_has_lost() -> None:
 @settings(max_examples=12, deadline=None)
 @given(seeds, isometric_conditions | st.just(BoundaryCondition()))
 def test_labels_and_the_place_of_the_cut_change_nothing(seed: int, condition: BoundaryCondition) -> None:
-    random = np.random.default_rng(seed)
-    n = len(TOWER.vertices)
-    name = random.permutation(n)
-    vertices = np.empty_like(TOWER.vertices)
-    vertices[name] = TOWER.vertices
-    faces = random.permutation(name[TOWER.faces])
-    faces = np.stack(
-        [np.roll(face, k) for face, k in zip(faces, random.integers(3, size=len(faces)), strict=True)]
-    )
-    loops = tuple(np.roll(name[loop], random.integers(len(loop))) for loop in TOWER.loops)
-    relabelled = replace(TOWER, vertices=vertices, faces=faces, loops=(loops[0], loops[1]))
+    relabelled, name = shuffled(TOWER, seed)
     before, after = conformal_map(TOWER, condition), conformal_map(relabelled, condition)
     np.testing.assert_allclose(after.log_scale[name], before.log_scale, atol=1e-10)
     assert after.deck.angle == pytest.approx(before.deck.angle, abs=1e-10)
@@ -126,6 +116,33 @@ def test_labels_and_the_place_of_the_cut_change_nothing(seed: int, condition: Bo
     np.testing.assert_allclose(across_after, across_before, atol=1e-9 * before.circumference)
     turns = around_after - around_before
     assert np.abs(np.exp(2j * np.pi * (turns - turns[0])) - 1).max() < 1e-9
+
+
+@settings(max_examples=8, deadline=None)
+@given(seeds)
+def test_the_circumference_of_a_ring_without_an_apex_does_not_depend_on_the_cut(seed: int) -> None:
+    plane = grid(30, 8, ring())
+    condition = BoundaryCondition("isometric", quantum=np.pi / 3)
+    before, after = conformal_map(plane, condition), conformal_map(shuffled(plane, seed)[0], condition)
+    assert before.deck.apex is None
+    assert before.kind == "cone"
+    assert after.circumference == pytest.approx(before.circumference, rel=1e-9)
+    inner, outer = 2 * np.pi * 0.3, 2 * np.pi
+    assert before.circumference == pytest.approx(np.sqrt(inner * outer), rel=0.02)
+
+
+def shuffled(surface: Surface, seed: int) -> tuple[Surface, Ints]:
+    """The surface with vertices, faces and corners in another order, and the new name of each vertex."""
+    random = np.random.default_rng(seed)
+    name = random.permutation(len(surface.vertices))
+    vertices = np.empty_like(surface.vertices)
+    vertices[name] = surface.vertices
+    faces = random.permutation(name[surface.faces])
+    faces = np.stack(
+        [np.roll(face, k) for face, k in zip(faces, random.integers(3, size=len(faces)), strict=True)]
+    )
+    first, second = (np.roll(name[loop], random.integers(len(loop))) for loop in surface.loops)
+    return replace(surface, vertices=vertices, faces=faces, loops=(first, second)), name
 
 
 def polar(cmap: ConformalMap, z: Complexes) -> tuple[Floats, Floats]:

@@ -173,14 +173,13 @@ def _draw(problem: Problem, flat: _Flat) -> ConformalMap:
     check_reach(u, flat.cone_angle)
     foot = int(surface.loops[0][0])
     laid = develop(flat.mesh, metric, flat.cone_angle)
-    unit = np.exp(flat.unit)
-    uv, deck, circumference = normalise(
-        laid.uv * unit, Deck(flat.cone_angle, laid.translation * unit), foot, surface.loops
-    )
     lift = laid.lift[surface.faces]
     sheet = lift[:, :1] - lift
     sheet[:, 1] += flat.turn[:, 0]
     sheet[:, 2] -= flat.turn[:, 2]
+    unit = np.exp(flat.unit)
+    deck = Deck(flat.cone_angle, laid.translation * unit)
+    uv, deck, circumference = normalise(surface, laid.uv * unit, sheet, deck, foot)
     return ConformalMap(
         surface=surface,
         log_scale=u,
