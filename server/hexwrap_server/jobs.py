@@ -14,14 +14,15 @@ from typing import Any
 
 from isal import isal_zlib
 
+from hexwrap_server.answers import GZIP_WINDOW
 from hexwrap_server.codec import digest
 from hexwrap_server.engine import Engine
 from hexwrap_server.metrics import Metrics
 from hexwrap_server.parts import chosen
 from hexwrap_server.problems import FormError, HttpError, not_found, plain, problem
-from hexwrap_server.requests import CacheSettings, Outcome, ParsedRequest
+from hexwrap_server.requests import CacheSettings, Order, Outcome, ParsedRequest
 from hexwrap_server.settings import MIB, Settings
-from hexwrap_server.store import GZIP_WINDOW, Job, Store, Work
+from hexwrap_server.store import Job, Store, Work
 from hexwrap_server.version import service_version
 from hexwrap_server.worker import InternalError, WorkError
 from hexwrap_solver.errors import HexwrapError
@@ -254,9 +255,9 @@ class JobManager:
             now = time.time()
             self._change(item, written=True, status="running", started=now)
             outcome = await self._compute(item)
-            await asyncio.to_thread(self.store.keep_outcome, identity, outcome)
+            packed = await asyncio.to_thread(self.store.keep_outcome, identity, outcome)
             self.store.finish_work(identity, outcome)
-            self._heat(identity, outcome.result)
+            self._heat(identity, packed)
             self._end([_done(job, outcome) for job in item.jobs.values()])
         except asyncio.CancelledError:
             self.store.take_back(identity)
@@ -276,23 +277,27 @@ class JobManager:
             self._pump()
 
     async def _compute(self, item: _Item) -> Outcome:
-        surface = await asyncio.to_thread(self.store.surface, item.work.surface)
-        if surface is None:
-            raise FormError.at("/surface/id", "the surface is no longer kept here; send it again")
-
         def report(stage: str, fraction: float, what: str) -> None:
             self._change(item, stage=stage, progress=round(max(0.0, min(1.0, fraction)), 4))
 
         outcome: Outcome = await self._engine.run(
             "hexwrap_server.work:solve",
-            surface,
-            item.work.wanted,
+            await self._order(item.work),
             self.caching,
             report=report,
             seconds=self._settings.job_seconds,
             mib=self._settings.job_mib,
         )
         return outcome
+
+    async def _order(self, work: Work) -> Order:
+        """Workers on this machine read and write the files themselves."""
+        if self._engine.shares_disk:
+            surface = str(self.store.surface_path(work.surface))
+            files = (str(self.store.result_path(work.identity)), str(self.store.solution_path(work.identity)))
+            return Order(work.surface, surface, work.wanted, files)
+        data = await asyncio.to_thread(self.store.surface, work.surface)
+        return Order(work.surface, data or b"", work.wanted, None)
 
     def _change(self, item: _Item, *, written: bool = False, **changes: Any) -> None:
         for id, job in item.jobs.items():

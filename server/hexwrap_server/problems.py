@@ -3,7 +3,7 @@
 HexwrapError            (hexwrap_solver.errors) refused by the solver: 422
 ├── FormError           the body does not have the form it should: 400, 413 or 422
 ├── HttpError           about the request as such: no such job, host not allowed, queue full …
-└── WorkError           (worker) the job ended without a result: limits 422, a dead worker 503, a bug 500
+└── WorkError           (worker) no result: limits 422, a dead worker or a full disk 503, a bug 500
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from hexwrap_solver.errors import HexwrapError
 
 MEDIA_TYPE = "application/problem+json"
 #: Statuses of the errors that are not 422.
-STATUS = {"not-json": 400, "gone": 410, "worker-died": 503, "internal": 500}
+STATUS = {"not-json": 400, "gone": 410, "worker-died": 503, "storage": 503, "internal": 500}
 #: A pointer into the arrays of a sent mesh.
 _ELEMENT = re.compile(r"(?:/surface)?/(vertices|faces)/(\d+)")
 #: More faults than these are not listed, the first ones tell enough.

@@ -40,6 +40,13 @@ async def call(e: ProcessEngine, name: str, *arguments: Any, seconds: float = 30
     return await e.run(CALLS + name, *arguments, report=nobody, seconds=seconds, mib=mib)
 
 
+async def made(mark: Path) -> None:
+    deadline = time.monotonic() + 10
+    while not mark.exists():
+        assert time.monotonic() < deadline
+        await asyncio.sleep(0.01)
+
+
 def run(story: Coroutine[Any, Any, T]) -> T:
     return asyncio.run(story)
 
@@ -83,6 +90,18 @@ def test_refusals_keep_their_data_and_the_worker() -> None:
     run(story())
 
 
+def test_what_is_put_off_is_done_after_the_answer_and_before_the_next(tmp_path: Path) -> None:
+    async def story() -> None:
+        async with engine() as e:
+            for mark in (tmp_path / "at once", tmp_path / "in a pause"):
+                assert not await call(e, "put_off", str(mark))
+                if mark.name == "at once":
+                    assert await call(e, "exists", str(mark))
+            await made(tmp_path / "in a pause")
+
+    run(story())
+
+
 def test_limits_end_one_call_and_the_next_one_runs() -> None:
     async def story() -> None:
         async with engine() as e:
@@ -115,8 +134,7 @@ def test_cancelling_kills_within_moments(tmp_path: Path) -> None:
         async with engine() as e:
             pid = await call(e, "pid")
             task = asyncio.create_task(call(e, "sleep", 60, str(tmp_path / "started")))
-            while not (tmp_path / "started").exists():
-                await asyncio.sleep(0.01)
+            await made(tmp_path / "started")
             start = time.monotonic()
             task.cancel()
             with pytest.raises(asyncio.CancelledError):
