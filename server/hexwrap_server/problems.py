@@ -18,7 +18,7 @@ from hexwrap_solver.errors import HexwrapError
 
 MEDIA_TYPE = "application/problem+json"
 #: Statuses of the errors that are not 422.
-STATUS = {"not-json": 400, "gone": 410, "worker-died": 503, "storage": 503, "internal": 500}
+STATUS = {"not-json": 400, "gone": 410, "worker-died": 503, "storage": 503, "cluster": 503, "internal": 500}
 #: A pointer into the arrays of a sent mesh.
 _ELEMENT = re.compile(r"(?:/surface)?/(vertices|faces)/(\d+)")
 #: More faults than these are not listed, the first ones tell enough.
