@@ -23,7 +23,7 @@ from isal import isal_zlib
 
 from hexwrap_server import codec
 from hexwrap_server.answers import GZIP_WINDOW
-from hexwrap_server.disk import prune, read_whole, write_whole
+from hexwrap_server.disk import StorageError, prune, read_whole, write_whole
 from hexwrap_server.requests import Outcome, Wanted
 
 Status = Literal["queued", "running", "done", "failed", "cancelled"]
@@ -99,7 +99,10 @@ class DamagedError(Exception):
 
 
 class Store:
-    """All methods are short; those that read or write whole files say so."""
+    """All methods are short; those that read or write whole files say so.
+
+    Those that write raise StorageError where the disk does not take it.
+    """
 
     def __init__(self, folder: Path) -> None:
         """Raises FolderInUseError, DamagedError, OSError."""
@@ -166,7 +169,8 @@ class Store:
         work = self.work(identity)
         if work is None or work.parts is None or not self.has_outcome(identity):
             return None
-        self._db.execute("UPDATE works SET used = ? WHERE identity = ?", (time.time(), identity))
+        with contextlib.suppress(StorageError):  # it can be read all the same
+            self._write("UPDATE works SET used = ? WHERE identity = ?", time.time(), identity)
         return work
 
     def keep_outcome(self, identity: str, outcome: Outcome) -> bytes:
@@ -207,22 +211,24 @@ class Store:
             self._db.execute(f"INSERT INTO jobs ({_COLUMNS}) VALUES ({marks})", _row(job))
 
     def start_work(self, identity: str) -> None:
-        self._db.execute(
-            "UPDATE works SET attempts = attempts + 1, parts = NULL WHERE identity = ?", (identity,)
-        )
+        self._write("UPDATE works SET attempts = attempts + 1, parts = NULL WHERE identity = ?", identity)
 
     def take_back(self, identity: str) -> None:
         """The server stops before the work is done, through no fault of the work."""
-        self._db.execute("UPDATE works SET attempts = MAX(attempts - 1, 0) WHERE identity = ?", (identity,))
+        self._write("UPDATE works SET attempts = MAX(attempts - 1, 0) WHERE identity = ?", identity)
 
     def settle(self, identity: str) -> None:
         """The work ended without a result; whoever asks for it again starts from the first attempt."""
-        self._db.execute("UPDATE works SET attempts = 0 WHERE identity = ?", (identity,))
+        self._write("UPDATE works SET attempts = 0 WHERE identity = ?", identity)
 
     def finish_work(self, identity: str, outcome: Outcome) -> None:
-        self._db.execute(
+        self._write(
             "UPDATE works SET attempts = 0, parts = ?, size = ?, timings = ?, used = ? WHERE identity = ?",
-            (json.dumps(outcome.parts), outcome.size, json.dumps(outcome.timings), time.time(), identity),
+            json.dumps(outcome.parts),
+            outcome.size,
+            json.dumps(outcome.timings),
+            time.time(),
+            identity,
         )
 
     def update(self, jobs: Iterable[Job]) -> None:
@@ -251,7 +257,7 @@ class Store:
         return [replace(_job(row), status="queued", stage="", progress=0.0, started=None) for row in rows]
 
     def forget(self, id: str) -> None:
-        self._db.execute("DELETE FROM jobs WHERE id = ?", (id,))
+        self._write("DELETE FROM jobs WHERE id = ?", id)
 
     def prune_rows(self, days: float, result_bytes: float) -> dict[str, str]:
         """Forget jobs and works that are too old or too much, oldest first; the rest with surfaces."""
@@ -279,15 +285,27 @@ class Store:
         prune(self.surfaces, result_bytes, keep=lambda name: name.partition(".")[0] in surfaces)
         prune(self.stages, stage_bytes)
 
+    def _write(self, statement: str, *values: Any) -> None:
+        with self._transaction():
+            self._db.execute(statement, values)
+
     @contextlib.contextmanager
     def _transaction(self) -> Any:
-        self._db.execute("BEGIN IMMEDIATE")
         try:
+            self._db.execute("BEGIN IMMEDIATE")
             yield
+            self._db.execute("COMMIT")
+        except sqlite3.OperationalError as error:
+            self._roll_back()
+            raise StorageError.of(error) from error
         except BaseException:
-            self._db.execute("ROLLBACK")
+            self._roll_back()
             raise
-        self._db.execute("COMMIT")
+
+    def _roll_back(self) -> None:
+        if self._db.in_transaction:  # on a full disk SQLite may have done so already
+            with contextlib.suppress(sqlite3.OperationalError):
+                self._db.execute("ROLLBACK")
 
 
 def _is_packed(data: bytes) -> bool:

@@ -124,6 +124,7 @@ def test_killed_machine_costs_its_own_job_only(tmp_path: Path) -> None:
     run(story())
 
 
+@pytest.mark.long
 @pytest.mark.filterwarnings("ignore")
 def test_lost_scheduler_fails_its_job_and_is_found_again(tmp_path: Path) -> None:
     from hexwrap_server.dask_engine import ClusterError, DaskEngine
