@@ -11,7 +11,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Path, Query, Request
 from starlette.responses import Response, StreamingResponse
 
-from hexwrap_server import codec, describe
+from hexwrap_server import codec, describe, head
 from hexwrap_server.answers import (
     JSON,
     json_response,
@@ -118,11 +118,10 @@ async def events(request: Request, id: JobId) -> Response:
     """A job's progress as Server-Sent Events."""
     manager = manager_of(request)
     manager.get(id)
-    return StreamingResponse(
-        _events(manager, id),
-        media_type="text/event-stream",
-        headers={"Cache-Control": "no-store", "X-Accel-Buffering": "no"},
-    )
+    headers = {"Cache-Control": "no-store", "X-Accel-Buffering": "no"}
+    if request.scope.get(head.MARK):  # nobody listens
+        return Response(headers=headers, media_type="text/event-stream")
+    return StreamingResponse(_events(manager, id), headers=headers, media_type="text/event-stream")
 
 
 @router.get("/v1/jobs/{id}/result", openapi_extra=describe.RESULT)
