@@ -282,7 +282,13 @@ class JobManager:
 
     def _fail(self, item: _Item, error: HexwrapError) -> None:
         self._settle(item.work.identity)
-        self._end([_failed(job, error) for job in item.jobs.values()])
+        try:
+            ended = [_failed(job, error) for job in item.jobs.values()]
+        except Exception:  # whatever cannot be told must not keep the jobs from ending
+            log.exception("a problem cannot be told")
+            fault = InternalError(f"The job failed, and its problem cannot be told ({error}); report it.")
+            ended = [_failed(job, fault) for job in item.jobs.values()]
+        self._end(ended)
 
     def _settle(self, identity: str) -> None:
         with contextlib.suppress(StorageError):  # then it counts as an attempt

@@ -99,7 +99,22 @@ def _document(
 
 def dumped(document: object) -> bytes:
     """JSON of a small document, numpy numbers included; numbers that JSON does not have become null."""
-    return orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_NON_STR_KEYS, default=str)
+    options = orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_NON_STR_KEYS
+    try:
+        return orjson.dumps(document, option=options, default=str)
+    except TypeError:  # an integer of more than 64 bits, such as a number of cells beyond all limits
+        return orjson.dumps(_within_64_bits(document), option=options, default=str)
+
+
+def _within_64_bits(value: object) -> object:
+    """Larger integers as floats."""
+    if isinstance(value, dict):
+        return {name: _within_64_bits(inner) for name, inner in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_within_64_bits(inner) for inner in value]
+    if isinstance(value, int) and not -(2**63) <= value < 2**64:
+        return float(value) if abs(value) < 2**1000 else str(value)
+    return value
 
 
 def plain(document: dict[str, Any]) -> dict[str, Any]:

@@ -35,6 +35,10 @@ def refuse(report: Report) -> None:
     raise RequestError("It cannot be.", vertices=[3], data={"missing": 0.5})
 
 
+def refuse_with(report: Report, data: dict[str, Any], *arguments: Any) -> None:
+    raise RequestError("It cannot be.", data=data)
+
+
 def stumble(report: Report) -> None:
     raise KeyError("a bug")
 
