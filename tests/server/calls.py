@@ -7,6 +7,8 @@ import time
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from hexwrap_server import later
 from hexwrap_server.worker import Report
 from hexwrap_solver.errors import RequestError
@@ -65,6 +67,12 @@ def sleep(report: Report, seconds: float, mark: str = "") -> str:
     while time.monotonic() < end:
         time.sleep(0.01)
     return "slept"
+
+
+def crunch(report: Report, n: int, mark: str) -> None:
+    """Inside of one numpy call for a long time."""
+    Path(mark).touch()
+    np.linalg.svd(np.ones((n, n)) + np.eye(n))
 
 
 def hoard(report: Report, mib: int) -> int:

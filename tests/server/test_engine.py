@@ -62,6 +62,16 @@ def test_values_go_there_and_back() -> None:
     run(story())
 
 
+def test_calls_one_after_the_other_go_to_the_worker_that_remembers_most() -> None:
+    async def story() -> None:
+        async with engine(2) as e:
+            while not e.is_ready:
+                await asyncio.sleep(0.05)
+            assert len({await call(e, "pid") for _ in range(4)}) == 1
+
+    run(story())
+
+
 def test_progress_arrives_in_order_and_printing_does_no_harm() -> None:
     heard: list[tuple[str, float, str]] = []
 
@@ -129,12 +139,14 @@ def test_death_of_a_worker_harms_its_own_call_only() -> None:
     run(story())
 
 
-def test_cancelling_kills_within_moments(tmp_path: Path) -> None:
+@pytest.mark.parametrize("busy", [("sleep", 60), ("crunch", 6000)])
+def test_cancelling_kills_within_moments(tmp_path: Path, busy: tuple[str, float]) -> None:
     async def story() -> None:
         async with engine() as e:
             pid = await call(e, "pid")
-            task = asyncio.create_task(call(e, "sleep", 60, str(tmp_path / "started")))
+            task = asyncio.create_task(call(e, *busy, str(tmp_path / "started")))
             await made(tmp_path / "started")
+            await asyncio.sleep(0.2)
             start = time.monotonic()
             task.cancel()
             with pytest.raises(asyncio.CancelledError):

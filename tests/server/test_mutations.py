@@ -6,7 +6,7 @@ import json
 import subprocess
 import sys
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from typing import Any
@@ -194,7 +194,7 @@ def awake(client: httpx.Client, longest: float) -> Iterator[None]:
     assert max(times) < longest
 
 
-def attack(client: httpx.Client, seeds: range) -> Counter[int]:
+def attack(client: httpx.Client, seeds: Iterable[int]) -> Counter[int]:
     """Statuses and how often they came."""
     with ThreadPoolExecutor(CLIENTS) as threads:
         return Counter(threads.map(lambda seed: answered(client, seed), seeds))
@@ -218,8 +218,8 @@ def answered(client: httpx.Client, seed: int) -> int:
 def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[httpx.Client]:
     port = free_port()
     with (
-        served(tmp_path_factory.mktemp("data"), port, workers=2, job_seconds=60.0, max_panels=20_000),
-        httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=90, trust_env=False) as client,
+        served(tmp_path_factory.mktemp("data"), port, workers=2, job_seconds=250.0, max_panels=20_000),
+        httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=300, trust_env=False) as client,
     ):
         yield client
 
@@ -229,6 +229,11 @@ def test_mutated_meshes_get_an_answer(client: httpx.Client) -> None:
         counts = attack(client, range(200))
     assert counts[200] > 20
     assert counts[422] > 20
+
+
+def test_meshes_that_failed_once_get_an_answer(client: httpx.Client) -> None:
+    """A step of the energy that overflows; a problem with a number of more than 64 bits."""
+    attack(client, [565, 931])
 
 
 @pytest.mark.long
