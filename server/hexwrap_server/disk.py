@@ -14,6 +14,8 @@ from hexwrap_server.worker import WorkError
 
 #: Seconds for which pruning leaves a file alone.
 YOUNG = 300.0
+#: Suffix of files that are being written.
+PART = ".part"
 log = logging.getLogger("hexwrap.disk")
 
 
@@ -32,7 +34,7 @@ class StorageError(WorkError):
 
 def write_whole(path: Path, content: Iterable[bytes | memoryview]) -> None:
     """Write a file that other processes see whole or not at all. Raises StorageError."""
-    part = path.with_name(f"{path.name}.{uuid.uuid4().hex}.part")
+    part = path.with_name(f"{path.name}.{uuid.uuid4().hex}{PART}")
     try:
         with part.open("wb") as file:
             file.writelines(content)
@@ -60,14 +62,17 @@ def read_whole(path: Path, is_whole: Callable[[bytes], bool]) -> bytes | None:
 def prune(folder: Path, limit_bytes: float, keep: Callable[[str], bool] = lambda name: False) -> None:
     """Delete the longest unused files until the rest fits into limit_bytes.
 
-    keep: names that stay. Files of the last minutes stay too: their owner may be about to name them.
+    keep: names that stay. Files of the last minutes stay too: their owner may be about to name them. What a
+    process that was killed had begun to write goes in any case.
     """
     entries = []
     total = 0
     for path in folder.glob("*"):
         with contextlib.suppress(OSError):
             state = path.stat()
-            if not keep(path.name):
+            if path.suffix == PART and state.st_mtime <= time.time() - YOUNG:
+                path.unlink()
+            elif not keep(path.name):
                 entries.append((state.st_mtime, state.st_size, path))
                 total += state.st_size
     for used, size, path in sorted(entries):

@@ -180,10 +180,13 @@ class Store:
         """
         if outcome.solution is not None:
             write_whole(self.solution_path(identity), [outcome.solution])
-        if outcome.result is None:
+        if outcome.result is not None:
+            write_whole(self.result_path(identity), [outcome.result])
+            return outcome.result
+        try:
             return self.result_path(identity).read_bytes()
-        write_whole(self.result_path(identity), [outcome.result])
-        return outcome.result
+        except OSError as error:
+            raise StorageError.of(error) from error
 
     def result(self, identity: str) -> bytes | None:
         """Reads a packed result; None where it is gone or damaged, and then it is forgotten."""

@@ -108,6 +108,9 @@ def test_what_is_put_off_is_done_after_the_answer_and_before_the_next(tmp_path: 
                 if mark.name == "at once":
                     assert await call(e, "exists", str(mark))
             await made(tmp_path / "in a pause")
+            worker = await call(e, "pid")
+            await call(e, "put_off_a_fault")
+            assert await call(e, "pid") == worker
 
     run(story())
 

@@ -175,10 +175,17 @@ def test_pruning_keeps_the_last_used(tmp_path: Path) -> None:
         write_whole(tmp_path / f"{i}.stage", [bytes(1000)])
         os.utime(tmp_path / f"{i}.stage", (time.time() - 10_000 + i,) * 2)
     os.utime(tmp_path / "0.stage")
+    for name, age in (("2.stage.ab.part", 10_000), ("3.stage.cd.part", 0)):
+        write_whole(tmp_path / name, [b""])
+        os.utime(tmp_path / name, (time.time() - age,) * 2)
     prune(tmp_path, 3000, keep=lambda name: name == "1.stage")
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["0.stage", "1.stage", "3.stage", "4.stage"]
+    left = ["0.stage", "1.stage", "3.stage", "3.stage.cd.part", "4.stage"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == left
     prune(tmp_path, 0)
-    assert [p.name for p in tmp_path.iterdir()] == ["0.stage"]  # young: somebody may be about to name it
+    assert sorted(p.name for p in tmp_path.iterdir()) == [
+        "0.stage",
+        "3.stage.cd.part",
+    ]  # young: somebody may be about to name it
 
 
 def test_sizes_count_arrays() -> None:
