@@ -18,6 +18,8 @@ JSON = "application/json"
 WORTH_PACKING = 1024
 #: Higher ones take longer and hardly make numbers smaller.
 GZIP_LEVEL = 1
+#: zlib's way to say: a gzip header, and the largest window.
+GZIP_WINDOW = 31
 
 
 def json_response(document: object, status: int = 200, headers: dict[str, str] | None = None) -> Response:

@@ -22,6 +22,7 @@ from hexwrap_server import __version__
 from hexwrap_server.answers import WORTH_PACKING, problem_response
 from hexwrap_server.docs import add_docs
 from hexwrap_server.engine import Engine
+from hexwrap_server.head import Head
 from hexwrap_server.hops import hops_router
 from hexwrap_server.observe import Observer, set_up_logging
 from hexwrap_server.problems import HttpError
@@ -77,6 +78,7 @@ def create_app(settings: Settings | None = None, engine: Engine | None = None) -
     app.add_exception_handler(RequestValidationError, _on_parameters)
     app.add_exception_handler(Exception, _on_fault)
     app.add_middleware(GZipMiddleware, minimum_size=WORTH_PACKING, compresslevel=1)
+    app.add_middleware(Head)
     app.add_middleware(Doorkeeper, settings=settings)
     app.add_middleware(Observer, metrics=service.metrics)
     return app

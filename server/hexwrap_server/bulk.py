@@ -23,7 +23,11 @@ class Fault(ValueError):
 
 
 def table(rows: object, pointer: str, width: int, most: int) -> Floats:
-    """(n, width) finite numbers. Raises Fault."""
+    """(n, width) finite numbers, from lists or from an array that was read as one. Raises Fault."""
+    if isinstance(rows, np.ndarray):
+        if rows.shape[1] == width and len(rows) <= most:
+            return rows
+        rows = rows.tolist()
     listed = _rows(rows, pointer, (width,), most)
     return _finite(listed, pointer, width).reshape(-1, width)
 
@@ -47,26 +51,38 @@ def numbers(row: object, pointer: str, most: int) -> Floats:
 
 
 def faces(rows: object, pointer: str, n_vertices: int, most: int) -> Ragged:
-    """Rows of three or four indices in 0 … n_vertices − 1. Raises Fault."""
+    """Rows of three or four indices in 0 … n_vertices − 1, from lists or read as one. Raises Fault."""
+    read = rows if isinstance(rows, Ragged) else _corners(rows, pointer, n_vertices, most)
+    if read.n_rows > most:
+        raise _too_many(read.n_rows, pointer, most)
+    wrong = np.flatnonzero((read.values < 0) | (read.values >= n_vertices))
+    if len(wrong):
+        raise _no_vertex(read.offsets, int(wrong[0]), int(read.values[wrong[0]]), pointer, n_vertices)
+    return read
+
+
+def _corners(rows: object, pointer: str, n_vertices: int, most: int) -> Ragged:
     listed = _rows(rows, pointer, (3, 4), most, PolygonSizeError)
     lengths = np.fromiter(map(len, listed), dtype=np.int64, count=len(listed))
     offsets = np.concatenate([[0], np.cumsum(lengths)])
-    if not set(map(type, chain.from_iterable(listed))) <= {int}:
+    flat = list(chain.from_iterable(listed))
+    if not set(map(type, flat)) <= {int}:
         _raise_not_whole(listed, pointer)
     try:
-        values: Ints = np.fromiter(chain.from_iterable(listed), dtype=np.int64, count=int(offsets[-1]))
+        return Ragged(np.fromiter(flat, dtype=np.int64, count=len(flat)), offsets)
     except OverflowError:
-        values = np.array([min(x, 2**62) for x in chain.from_iterable(listed)], dtype=np.int64)
-    wrong = np.flatnonzero((values < 0) | (values >= n_vertices))
-    if len(wrong):
-        face = int(np.searchsorted(offsets, wrong[0], side="right")) - 1
-        corner = int(wrong[0] - offsets[face])
-        raise Fault(
-            f"{pointer}/{face}/{corner}",
-            f"vertex {listed[face][corner]} of a mesh of {n_vertices} vertices (0 to {n_vertices - 1})",
-            IndexRangeError,
-        )
-    return Ragged(values, offsets)
+        i = next(i for i, x in enumerate(flat) if abs(x) >= 2**63)
+        raise _no_vertex(offsets, i, flat[i], pointer, n_vertices) from None
+
+
+def _no_vertex(offsets: Ints, i: int, said: int, pointer: str, n_vertices: int) -> Fault:
+    """i: the place in all corners of all faces."""
+    face = int(np.searchsorted(offsets, i, side="right")) - 1
+    return Fault(
+        f"{pointer}/{face}/{i - int(offsets[face])}",
+        f"vertex {said} of a mesh of {n_vertices} vertices (0 to {n_vertices - 1})",
+        IndexRangeError,
+    )
 
 
 def _rows(
@@ -75,7 +91,7 @@ def _rows(
     if not isinstance(rows, list):
         raise Fault(pointer, f"must be a list, not {_kind(rows)}")
     if len(rows) > most:
-        raise Fault(pointer, f"{len(rows)} entries, this server takes at most {most}")
+        raise _too_many(len(rows), pointer, most)
     wanted = " or ".join(map(str, widths))
     if not set(map(type, rows)) <= {list}:
         i = next(i for i, row in enumerate(rows) if type(row) is not list)
@@ -84,6 +100,10 @@ def _rows(
         i = next(i for i, row in enumerate(rows) if len(row) not in widths)
         raise Fault(f"{pointer}/{i}", f"must be a list of {wanted} numbers, not of {len(rows[i])}", kind)
     return rows
+
+
+def _too_many(count: int, pointer: str, most: int) -> Fault:
+    return Fault(pointer, f"{count} entries, this server takes at most {most}")
 
 
 def _finite(rows: list[list[Any]], pointer: str, width: int) -> Floats:

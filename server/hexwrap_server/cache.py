@@ -6,21 +6,20 @@ stages of one worker are kept in its memory, those of all workers of a machine i
 
 from __future__ import annotations
 
-import contextlib
 import logging
 import os
 import time
-import uuid
 from collections import OrderedDict
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 
-from hexwrap_server.codec import CodecError, decode, digest, encode
+from hexwrap_server import later
+from hexwrap_server.codec import CodecError, decode, digest, pieces
+from hexwrap_server.disk import StorageError, write_whole
 from hexwrap_server.version import solver_version
 from hexwrap_solver.arrays import Progress
 
@@ -39,9 +38,8 @@ SHARES = {
     "support": 0.03,
 }
 
-
-#: Seconds for which pruning leaves a file alone.
-YOUNG = 300.0
+#: Stages that took this many seconds are written at once, others when the answer is sent.
+PRECIOUS = 1.0
 
 
 class StageCache:
@@ -52,8 +50,6 @@ class StageCache:
         self.memory_bytes = memory_bytes
         self._kept: OrderedDict[str, tuple[Any, int]] = OrderedDict()
         self._used = 0
-        # beside the next stage; one thread, so that stages do not pile up in memory
-        self._writer = ThreadPoolExecutor(1, thread_name_prefix="hexwrap-cache")
 
     def get(self, key: str) -> tuple[Any, str] | None:
         """The stage and where it was found (``memory`` or ``disk``), or None."""
@@ -66,21 +62,20 @@ class StageCache:
         self._keep(key, value)
         return value, "disk"
 
-    def put(self, key: str, value: Any) -> None:
+    def put(self, key: str, value: Any, seconds: float = 0.0) -> None:
+        """seconds: what it cost."""
         self._keep(key, value)
-        if self.folder is not None:
-            self._writer.submit(self._write, key, value)
-
-    def settle(self) -> None:
-        """Until everything that was put is on the disk."""
-        self._writer.submit(int).result()
+        if self.folder is None:
+            return
+        if seconds >= PRECIOUS:
+            self._write(key, value)
+        else:
+            later.put_off(lambda: self._write(key, value))
 
     def _write(self, key: str, value: Any) -> None:
         try:
-            path = self._path(key)
-            path.parent.mkdir(parents=True, exist_ok=True)
-            write_whole(path, encode(value))
-        except OSError as error:  # a full disk costs speed, not the job
+            write_whole(self._path(key), pieces(value))
+        except StorageError as error:  # a full disk costs speed, not the job
             log.warning("a stage could not be written to the cache: %s", error)
 
     def _keep(self, key: str, value: Any) -> None:
@@ -109,17 +104,28 @@ class StageCache:
         return self.folder / f"{key}.stage"
 
 
+def nothing(stage: str, value: Any) -> None:
+    """A listener that does not care."""
+
+
 class CachingRunner:
     """A StageRunner that looks every stage up first.
 
     timings: seconds per stage, hits included. found: per stage ``memory``, ``disk`` or ``computed``.
+    made: told of each stage that is done, and of what it made.
     """
 
-    def __init__(self, cache: StageCache, report: Callable[[str, float, str], None]) -> None:
+    def __init__(
+        self,
+        cache: StageCache,
+        report: Callable[[str, float, str], None],
+        made: Callable[[str, Any], None] = nothing,
+    ) -> None:
         self.timings: dict[str, float] = {}
         self.found: dict[str, str] = {}
         self.cache = cache
         self._report = report
+        self._made = made
         self._key = solver_version()
         self._done = 0.0
 
@@ -136,12 +142,13 @@ class CachingRunner:
         hit = self.cache.get(self._key)
         if hit is None:
             result = compute(progress)
-            self.cache.put(self._key, result)
+            self.cache.put(self._key, result, time.perf_counter() - start)
             self.found[stage] = "computed"
         else:
             result, self.found[stage] = hit
         self._done = done + share
         self.timings[stage] = time.perf_counter() - start
+        self._made(stage, result)
         return result
 
 
@@ -154,36 +161,3 @@ def size_of(value: Any) -> int:
     if is_dataclass(value):
         return 64 + sum(size_of(getattr(value, f.name)) for f in fields(value))
     return 64
-
-
-def write_whole(path: Path, data: bytes) -> None:
-    """Write a file that other processes see whole or not at all. Raises OSError."""
-    part = path.with_name(f"{path.name}.{uuid.uuid4().hex}.part")
-    try:
-        part.write_bytes(data)
-        os.replace(part, path)
-    except OSError:
-        with contextlib.suppress(OSError):
-            part.unlink()
-        raise
-
-
-def prune(folder: Path, limit_bytes: float, keep: Callable[[str], bool] = lambda name: False) -> None:
-    """Delete the longest unused files until the rest fits into limit_bytes.
-
-    keep: names that stay. Files of the last minutes stay too: their owner may be about to name them.
-    """
-    entries = []
-    total = 0
-    for path in folder.glob("*"):
-        with contextlib.suppress(OSError):
-            state = path.stat()
-            if not keep(path.name):
-                entries.append((state.st_mtime, state.st_size, path))
-                total += state.st_size
-    for used, size, path in sorted(entries):
-        if total <= limit_bytes or used > time.time() - YOUNG:
-            break
-        with contextlib.suppress(OSError):  # in use, on Windows
-            path.unlink()
-            total -= size

@@ -31,9 +31,17 @@ class CodecError(ValueError):
 
 def encode(value: Any) -> bytes:
     """Bytes of a dataclass, array, number, text, or list, tuple or dict of such. Raises TypeError."""
+    return b"".join(pieces(value))
+
+
+def pieces(value: Any) -> list[bytes | memoryview]:
+    """What ``encode`` joins; the arrays are not copied."""
     header, arrays = _split(value)
-    body = b"".join([header, *_padded(len(header), arrays)])
-    return _HEAD.pack(_MAGIC, len(header), zlib.crc32(body)) + body
+    body = [header, *_padded(len(header), arrays)]
+    checksum = 0
+    for piece in body:
+        checksum = zlib.crc32(piece, checksum)
+    return [_HEAD.pack(_MAGIC, len(header), checksum), *body]
 
 
 def is_whole(data: bytes) -> bool:
@@ -65,7 +73,7 @@ def digest(*values: Any) -> str:
         header, arrays = _split(value)
         sha.update(header)
         for array in arrays:
-            sha.update(array.tobytes())
+            sha.update(_raw(array))
     return sha.hexdigest()
 
 
@@ -117,12 +125,17 @@ def _join(tree: Any, arrays: list[np.ndarray[Any, Any]]) -> Any:
     return tuple(items) if kind == "tuple" else items
 
 
-def _padded(position: int, arrays: list[np.ndarray[Any, Any]]) -> Iterator[bytes]:
+def _padded(position: int, arrays: list[np.ndarray[Any, Any]]) -> Iterator[bytes | memoryview]:
     for array in arrays:
         gap = -position % _ALIGNMENT
         yield bytes(gap)
-        yield array.tobytes()
+        yield _raw(array)
         position += gap + array.nbytes
+
+
+def _raw(array: np.ndarray[Any, Any]) -> memoryview:
+    """The bytes of a contiguous array, in place."""
+    return array.reshape(-1).view(np.uint8).data
 
 
 def _arrays(shapes: list[Any], body: memoryview, position: int) -> list[np.ndarray[Any, Any]]:

@@ -18,7 +18,8 @@ from typing import Any
 from distributed import Client, get_worker
 
 from hexwrap_server.engine import ENGINE_PRELOAD
-from hexwrap_server.worker import Report, WorkerDiedError, WorkerProcess
+from hexwrap_server.worker import Report, WorkerDiedError, WorkerProcess, WorkError
+from hexwrap_solver.errors import HexwrapError
 
 #: Seconds between two looks at whether the machine of a job is still there.
 CHECK_INTERVAL = 0.5
@@ -26,6 +27,11 @@ CHECK_INTERVAL = 0.5
 CONNECT_SECONDS = 15
 _TOPIC = "hexwrap-progress"
 log = logging.getLogger("hexwrap.dask")
+
+
+class ClusterError(WorkError):
+    slug = "cluster"
+    title = "The cluster could not run the job"
 
 
 class DaskEngine:
@@ -51,10 +57,7 @@ class DaskEngine:
 
     async def start(self) -> None:
         """Raises OSError when the scheduler does not answer."""
-        client: Any = Client
-        self._client = await client(self._address, asynchronous=True, timeout=CONNECT_SECONDS)
-        self._client.subscribe_topic(_TOPIC, self._hear)
-        await self._look()
+        await self._connect()
         self._looking = asyncio.create_task(self._keep_looking())
 
     async def stop(self) -> None:
@@ -70,7 +73,10 @@ class DaskEngine:
             await self._client.close()
 
     async def run(self, function: str, *arguments: Any, report: Report, seconds: float, mib: float) -> Any:
-        assert self._client is not None
+        if not self._machines:
+            raise ClusterError(
+                f"The dask cluster at {self._address} has no machines; send the job again later."
+            )
         ticket = uuid.uuid4().hex
         self._listeners[ticket] = report
         future = self._client.submit(
@@ -100,7 +106,7 @@ class DaskEngine:
             while True:
                 done, _ = await asyncio.wait([answer], timeout=CHECK_INTERVAL)
                 if done:
-                    return answer.result()
+                    return _content(answer)
                 place = self._places.get(ticket, "")
                 first = first or place
                 if first and (place != first or first not in self._machines):
@@ -113,9 +119,15 @@ class DaskEngine:
 
     async def _kill(self, future: Any, ticket: str) -> None:
         assert self._client is not None
-        with contextlib.suppress(OSError, asyncio.CancelledError):
+        with contextlib.suppress(OSError, RuntimeError, asyncio.CancelledError):
             await future.cancel(force=True)
             await self._client.run(_stop, ticket, on_error="ignore")
+
+    async def _connect(self) -> None:
+        client: Any = Client
+        self._client = await client(self._address, asynchronous=True, timeout=CONNECT_SECONDS)
+        self._client.subscribe_topic(_TOPIC, self._hear)
+        await self._look()
 
     async def _look(self) -> None:
         """Ask the scheduler which machines there are."""
@@ -126,8 +138,8 @@ class DaskEngine:
         while True:
             await asyncio.sleep(CHECK_INTERVAL)
             try:
-                await self._look()
-            except OSError as error:
+                await (self._look() if self._client.status == "running" else self._connect())
+            except (OSError, RuntimeError) as error:
                 self._machines = {}
                 log.warning("the dask scheduler does not answer: %s", error)
 
@@ -143,6 +155,18 @@ class DaskEngine:
 
 async def _result(future: Any) -> Any:
     return await future
+
+
+def _content(answer: asyncio.Future[Any]) -> Any:
+    """What a task answered. Raises what it raised, ClusterError where that was no word of a worker's."""
+    try:
+        return answer.result()
+    except HexwrapError:
+        raise
+    except asyncio.CancelledError:  # not by us: we would not be here
+        raise ClusterError("The dask scheduler left while the job ran; send the job again.") from None
+    except Exception as error:
+        raise ClusterError(f"The cluster could not run the job ({type(error).__name__}: {error}).") from error
 
 
 # What follows runs on the cluster's machines.

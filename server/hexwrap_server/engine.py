@@ -59,7 +59,7 @@ class ProcessEngine:
 
     def __init__(self, workers: int, preload: str = ENGINE_PRELOAD) -> None:
         self._workers = [WorkerProcess(preload) for _ in range(workers)]
-        self._idle: asyncio.Queue[WorkerProcess] = asyncio.Queue()
+        self._idle: asyncio.LifoQueue[WorkerProcess] = asyncio.LifoQueue()  # the one that remembers most
         self._threads = ThreadPoolExecutor(2 * workers, thread_name_prefix="hexwrap-engine")
         self._starting: set[asyncio.Task[None]] = set()
         self._stopping = False

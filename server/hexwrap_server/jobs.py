@@ -14,14 +14,17 @@ from typing import Any
 
 from isal import isal_zlib
 
+from hexwrap_server.answers import GZIP_WINDOW
 from hexwrap_server.codec import digest
+from hexwrap_server.disk import StorageError
 from hexwrap_server.engine import Engine
+from hexwrap_server.ledger import Ledger
 from hexwrap_server.metrics import Metrics
 from hexwrap_server.parts import chosen
 from hexwrap_server.problems import FormError, HttpError, not_found, plain, problem
-from hexwrap_server.requests import CacheSettings, Outcome, ParsedRequest
+from hexwrap_server.requests import CacheSettings, Order, Outcome, ParsedRequest
 from hexwrap_server.settings import MIB, Settings
-from hexwrap_server.store import GZIP_WINDOW, Job, Store, Work
+from hexwrap_server.store import Job, Store, Work
 from hexwrap_server.version import service_version
 from hexwrap_server.worker import InternalError, WorkError
 from hexwrap_solver.errors import HexwrapError
@@ -30,6 +33,8 @@ from hexwrap_solver.errors import HexwrapError
 MAX_ATTEMPTS = 3
 #: Seconds between two rounds of pruning.
 PRUNE_INTERVAL = 600.0
+#: Seconds between two attempts to write what a full disk refused.
+CATCH_UP_INTERVAL = 2.0
 #: Results kept in memory as they go over the wire.
 HOT_RESULT_BYTES = 64 * MIB
 log = logging.getLogger("hexwrap.jobs")
@@ -54,6 +59,7 @@ class JobManager:
 
     def __init__(self, store: Store, engine: Engine, settings: Settings, metrics: Metrics) -> None:
         self.store = store
+        self._ledger = Ledger(store)
         self._engine = engine
         self._settings = settings
         self._metrics = metrics
@@ -63,7 +69,7 @@ class JobManager:
         self._running: set[_Item] = set()
         self._changed: dict[str, asyncio.Event] = {}
         self._hot: OrderedDict[str, bytes] = OrderedDict()
-        self._pruning: asyncio.Task[None] | None = None
+        self._chores: list[asyncio.Task[None]] = []
         self._closing = asyncio.Event()
 
     @property
@@ -83,7 +89,7 @@ class JobManager:
         """Take up what an earlier server left."""
         for job in self.store.unfinished():
             self._resume(job)
-        self._pruning = asyncio.create_task(self._prune_forever())
+        self._chores = [asyncio.create_task(self._prune_forever()), asyncio.create_task(self._catch_up())]
         self._pump()
 
     def close_waits(self) -> None:
@@ -97,13 +103,13 @@ class JobManager:
         self.close_waits()
         self._queue.clear()
         tasks = [item.task for item in self._running if item.task]
-        if self._pruning:
-            tasks.append(self._pruning)
+        tasks += self._chores
         for task in tasks:
             task.cancel()
         # before the tasks come to know: the engine need not replace the workers that they kill
         await self._engine.stop()
         await asyncio.gather(*tasks, return_exceptions=True)
+        self._ledger.catch_up()
 
     # what clients do
 
@@ -139,14 +145,15 @@ class JobManager:
     def get(self, id: str) -> Job:
         """Raises HttpError 404."""
         item = self._live.get(id)
-        job = item.jobs[id] if item else self.store.job(id)
+        job = item.jobs[id] if item else self._ledger.get(id) or self.store.job(id)
         if job is None:
             raise not_found("job", f"There is no job '{id[:64]}' here; it may have been forgotten.")
         return job
 
     def latest(self, limit: int) -> list[Job]:
         """Newest first."""
-        return [self.get(job.id) if job.id in self._live else job for job in self.store.jobs(limit)]
+        listed = self.store.jobs(limit)
+        return [self.get(j.id) if j.id in self._live or j.id in self._ledger else j for j in listed]
 
     def position(self, job: Job) -> int | None:
         """Number of works before this one, None unless it is queued."""
@@ -184,7 +191,7 @@ class JobManager:
         """Stop a job that waits or runs, forget one that is over."""
         job = self.get(id)
         if job.is_over:
-            self.store.forget(id)
+            self._ledger.forget(id)
             return
         item = self._live[id]
         self._end([replace(job, status="cancelled", finished=time.time())])
@@ -232,10 +239,9 @@ class JobManager:
                 f"The server died {work.attempts} times while this job was running, so it is not tried "
                 "again; make the mesh or the pattern coarser."
             )
-            self.store.settle(job.identity)
             self._end([_failed(job, gave_up)])
+            self._settle(job.identity)
         else:
-            self.store.update([job])
             self._attach(job, self._items.get(job.identity), work)
             self._log(job, "taken up again")
 
@@ -254,45 +260,62 @@ class JobManager:
             now = time.time()
             self._change(item, written=True, status="running", started=now)
             outcome = await self._compute(item)
-            await asyncio.to_thread(self.store.keep_outcome, identity, outcome)
+            packed = await asyncio.to_thread(self.store.keep_outcome, identity, outcome)
             self.store.finish_work(identity, outcome)
-            self._heat(identity, outcome.result)
+            self._heat(identity, packed)
             self._end([_done(job, outcome) for job in item.jobs.values()])
         except asyncio.CancelledError:
-            self.store.take_back(identity)
+            with contextlib.suppress(StorageError):
+                self.store.take_back(identity)
             raise
         except HexwrapError as error:
-            self.store.settle(identity)
-            self._end([_failed(job, error) for job in item.jobs.values()])
+            self._fail(item, error)
         except Exception as error:
             log.exception("a job failed unexpectedly")
-            self.store.settle(identity)
             fault = InternalError(f"The server could not finish the job ({type(error).__name__}: {error}).")
-            self._end([_failed(job, fault) for job in item.jobs.values()])
+            self._fail(item, fault)
         finally:
             self._running.discard(item)
             if self._items.get(identity) is item:
                 del self._items[identity]
             self._pump()
 
-    async def _compute(self, item: _Item) -> Outcome:
-        surface = await asyncio.to_thread(self.store.surface, item.work.surface)
-        if surface is None:
-            raise FormError.at("/surface/id", "the surface is no longer kept here; send it again")
+    def _fail(self, item: _Item, error: HexwrapError) -> None:
+        self._settle(item.work.identity)
+        try:
+            ended = [_failed(job, error) for job in item.jobs.values()]
+        except Exception:  # whatever cannot be told must not keep the jobs from ending
+            log.exception("a problem cannot be told")
+            fault = InternalError(f"The job failed, and its problem cannot be told ({error}); report it.")
+            ended = [_failed(job, fault) for job in item.jobs.values()]
+        self._end(ended)
 
+    def _settle(self, identity: str) -> None:
+        with contextlib.suppress(StorageError):  # then it counts as an attempt
+            self.store.settle(identity)
+
+    async def _compute(self, item: _Item) -> Outcome:
         def report(stage: str, fraction: float, what: str) -> None:
             self._change(item, stage=stage, progress=round(max(0.0, min(1.0, fraction)), 4))
 
         outcome: Outcome = await self._engine.run(
             "hexwrap_server.work:solve",
-            surface,
-            item.work.wanted,
+            await self._order(item.work),
             self.caching,
             report=report,
             seconds=self._settings.job_seconds,
             mib=self._settings.job_mib,
         )
         return outcome
+
+    async def _order(self, work: Work) -> Order:
+        """Workers on this machine read and write the files themselves."""
+        if self._engine.shares_disk:
+            surface = str(self.store.surface_path(work.surface))
+            files = (str(self.store.result_path(work.identity)), str(self.store.solution_path(work.identity)))
+            return Order(work.surface, surface, work.wanted, files)
+        data = await asyncio.to_thread(self.store.surface, work.surface)
+        return Order(work.surface, data or b"", work.wanted, None)
 
     def _change(self, item: _Item, *, written: bool = False, **changes: Any) -> None:
         for id, job in item.jobs.items():
@@ -304,7 +327,7 @@ class JobManager:
 
     def _end(self, jobs: list[Job]) -> None:
         """Write the end of jobs, then tell."""
-        self.store.update(jobs)
+        self._ledger.end(jobs)
         for job in jobs:
             item = self._live.pop(job.id, None)
             if item is not None:
@@ -329,9 +352,17 @@ class JobManager:
     async def _prune_forever(self) -> None:
         s = self._settings
         while True:
-            works = self.store.prune_rows(s.results_days, s.results_mib * MIB)
-            await asyncio.to_thread(self.store.prune_files, works, s.results_mib * MIB, s.cache_mib * MIB)
+            try:
+                works = self.store.prune_rows(s.results_days, s.results_mib * MIB)
+                await asyncio.to_thread(self.store.prune_files, works, s.results_mib * MIB, s.cache_mib * MIB)
+            except StorageError as error:
+                log.error("old results cannot be pruned: %s", error)
             await asyncio.sleep(PRUNE_INTERVAL)
+
+    async def _catch_up(self) -> None:
+        while True:
+            await asyncio.sleep(CATCH_UP_INTERVAL)
+            self._ledger.catch_up()
 
     def _log(self, job: Job, what: str) -> None:
         seconds = round(job.finished - job.started, 3) if job.finished and job.started else None

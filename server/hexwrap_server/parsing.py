@@ -9,7 +9,7 @@ import sys
 
 import orjson
 
-from hexwrap_server import codec
+from hexwrap_server import codec, quick
 from hexwrap_server.problems import FormError
 from hexwrap_server.requests import ParsedRequest
 from hexwrap_server.schemas import Request, escaped, parse_request
@@ -32,11 +32,17 @@ def packed(request: Request) -> ParsedRequest:
 
 
 def loads(text: bytes) -> object:
-    """Raises FormError where the text is no JSON, or holds a number that no float is.
+    """The document; large tables in it may be arrays already (``quick``).
 
-    A byte order mark, which some editors put first, is passed over.
+    A byte order mark, which some editors put first, is passed over. Raises FormError where the text is no
+    JSON, or holds a number that no float is.
     """
     text = text.removeprefix(codecs.BOM_UTF8)
+    document = quick.read(text)
+    return _listed(text) if document is None else document
+
+
+def _listed(text: bytes) -> object:
     gc.disable()  # a body of a million numbers holds no cycles, but sets off many searches for them
     try:
         return orjson.loads(text)

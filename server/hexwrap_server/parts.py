@@ -20,17 +20,6 @@ def join_parts(parts: dict[str, bytes]) -> bytes:
     return b"{" + b",".join(b'"%s":%s' % (name.encode(), text) for name, text in parts.items()) + b"}"
 
 
-def places(parts: dict[str, bytes]) -> Places:
-    """Where ``join_parts`` puts each part."""
-    found = {}
-    position = 1
-    for name, text in parts.items():
-        position += len(name) + 3  # quotes and colon
-        found[name] = (position, position + len(text))
-        position += len(text) + 1
-    return found
-
-
 def chosen(text: bytes, where: Places, include: list[str]) -> bytes:
     """The Result with only the named parts."""
     return join_parts({name: text[slice(*where[name])] for name in include if name in where})

@@ -3,7 +3,7 @@
 HexwrapError            (hexwrap_solver.errors) refused by the solver: 422
 ├── FormError           the body does not have the form it should: 400, 413 or 422
 ├── HttpError           about the request as such: no such job, host not allowed, queue full …
-└── WorkError           (worker) the job ended without a result: limits 422, a dead worker 503, a bug 500
+└── WorkError           (worker) no result: limits 422, a dead worker or a full disk 503, a bug 500
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from hexwrap_solver.errors import HexwrapError
 
 MEDIA_TYPE = "application/problem+json"
 #: Statuses of the errors that are not 422.
-STATUS = {"not-json": 400, "gone": 410, "worker-died": 503, "internal": 500}
+STATUS = {"not-json": 400, "gone": 410, "worker-died": 503, "storage": 503, "cluster": 503, "internal": 500}
 #: A pointer into the arrays of a sent mesh.
 _ELEMENT = re.compile(r"(?:/surface)?/(vertices|faces)/(\d+)")
 #: More faults than these are not listed, the first ones tell enough.
@@ -99,7 +99,22 @@ def _document(
 
 def dumped(document: object) -> bytes:
     """JSON of a small document, numpy numbers included; numbers that JSON does not have become null."""
-    return orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_NON_STR_KEYS, default=str)
+    options = orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_NON_STR_KEYS
+    try:
+        return orjson.dumps(document, option=options, default=str)
+    except TypeError:  # an integer of more than 64 bits, such as a number of cells beyond all limits
+        return orjson.dumps(_within_64_bits(document), option=options, default=str)
+
+
+def _within_64_bits(value: object) -> object:
+    """Larger integers as floats."""
+    if isinstance(value, dict):
+        return {name: _within_64_bits(inner) for name, inner in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_within_64_bits(inner) for inner in value]
+    if isinstance(value, int) and not -(2**63) <= value < 2**64:
+        return float(value) if abs(value) < 2**1000 else str(value)
+    return value
 
 
 def plain(document: dict[str, Any]) -> dict[str, Any]:

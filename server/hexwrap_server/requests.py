@@ -49,16 +49,30 @@ class CacheSettings:
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """A finished job. result: the Result, gzip. parts: where each part stands in the unpacked text.
+class Order:
+    """A job for a worker. surface: as sent, encoded, or the file where it is.
 
-    solution: for lift, flatten and files. found: per stage ``memory``, ``disk`` or ``computed``.
+    files: where the result and the solution are to be put; None: they are sent back.
     """
 
-    result: bytes
+    surface_id: str
+    surface: bytes | str
+    wanted: Wanted
+    files: tuple[str, str] | None
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A finished job. result: the Result, gzip; solution: for lift, flatten and files; None: put into files.
+
+    parts: where each part of the Result stands in the unpacked text. size: bytes of both.
+    found: per stage ``memory``, ``disk`` or ``computed``.
+    """
+
+    result: bytes | None
+    solution: bytes | None
     parts: dict[str, tuple[int, int]]
     size: int
-    solution: bytes
     timings: dict[str, float]
     found: dict[str, str]
 

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Path, Query, Request
 from starlette.responses import Response, StreamingResponse
 
-from hexwrap_server import codec, describe
+from hexwrap_server import codec, describe, head
 from hexwrap_server.answers import (
     JSON,
     json_response,
@@ -20,6 +20,7 @@ from hexwrap_server.answers import (
     takes_gzip,
 )
 from hexwrap_server.bodies import read_body
+from hexwrap_server.engine import nobody
 from hexwrap_server.jobs import JobManager, unpacked
 from hexwrap_server.metrics import MEDIA_TYPE as METRICS_TYPE
 from hexwrap_server.parsing import loads, read_request
@@ -32,7 +33,7 @@ from hexwrap_server.settings import MIB
 from hexwrap_server.store import Job
 
 #: Bodies up to this size are read in a thread, larger ones in a process: reading holds the interpreter.
-SMALL_BODY = 1_000_000
+SMALL_BODY = 4_000_000
 #: Longest time that ``?wait=`` holds an answer.
 MAX_WAIT = 60.0
 #: Seconds between two signs of life on an event stream.
@@ -117,11 +118,10 @@ async def events(request: Request, id: JobId) -> Response:
     """A job's progress as Server-Sent Events."""
     manager = manager_of(request)
     manager.get(id)
-    return StreamingResponse(
-        _events(manager, id),
-        media_type="text/event-stream",
-        headers={"Cache-Control": "no-store", "X-Accel-Buffering": "no"},
-    )
+    headers = {"Cache-Control": "no-store", "X-Accel-Buffering": "no"}
+    if request.scope.get(head.MARK):  # nobody listens
+        return Response(headers=headers, media_type="text/event-stream")
+    return StreamingResponse(_events(manager, id), headers=headers, media_type="text/event-stream")
 
 
 @router.get("/v1/jobs/{id}/result", openapi_extra=describe.RESULT)
@@ -234,7 +234,7 @@ async def _read(request: Request) -> ParsedRequest:
         return known[mark]
     limits = (settings.max_vertices, settings.max_panels)
     if len(body) <= SMALL_BODY:
-        parsed = await asyncio.to_thread(read_request, service.nobody, body, *limits)
+        parsed = await service.read(read_request, nobody, body, *limits)
     else:
         parsed = await service.errand("hexwrap_server.parsing:read_request", body, *limits)
     if parsed.surface is not None:

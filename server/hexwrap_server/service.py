@@ -5,9 +5,11 @@ from __future__ import annotations
 import asyncio
 import time
 from collections import OrderedDict
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import platformdirs
 
@@ -19,6 +21,8 @@ from hexwrap_server.requests import ParsedRequest
 from hexwrap_server.settings import Settings
 from hexwrap_server.store import FolderInUseError, Store
 
+T = TypeVar("T")
+
 #: Longest errand (reading a body, writing a file), seconds.
 ERRAND_SECONDS = 120.0
 #: Bodies whose contents are remembered by their hash.
@@ -28,8 +32,6 @@ KNOWN_BODIES = 256
 class Service:
     """Made with the application, started and stopped with the server."""
 
-    nobody = staticmethod(nobody)
-
     def __init__(self, settings: Settings, engine: Engine | None = None) -> None:
         """Raises FolderInUseError, DamagedError, OSError."""
         self.settings = settings
@@ -38,6 +40,7 @@ class Service:
         self.engine = engine or make_engine(settings)
         self.errands = ProcessEngine(1)
         self.manager = JobManager(self.store, self.engine, settings, self.metrics)
+        self._reader = ThreadPoolExecutor(1, thread_name_prefix="hexwrap-reader")
         self.known_bodies: OrderedDict[str, ParsedRequest] = OrderedDict()
         self._since = time.time()
 
@@ -48,6 +51,7 @@ class Service:
 
     async def stop(self) -> None:
         await asyncio.gather(self.manager.stop(), self.errands.stop())
+        self._reader.shutdown()
         self.store.close()
 
     @property
@@ -69,6 +73,10 @@ class Service:
         return await self.errands.run(
             function, *arguments, report=nobody, seconds=ERRAND_SECONDS, mib=self.settings.job_mib
         )
+
+    async def read(self, function: Callable[..., T], *arguments: Any) -> T:
+        """Read a body in the one thread for it: several would keep the event loop from its turn."""
+        return await asyncio.get_running_loop().run_in_executor(self._reader, function, *arguments)
 
     def remember_body(self, mark: str, parsed: ParsedRequest) -> ParsedRequest:
         """The surface itself is on disk; only what points to it is remembered."""

@@ -13,20 +13,20 @@ import logging
 import re
 import sqlite3
 import time
-import zlib
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Literal
 
+from isal import isal_zlib
+
 from hexwrap_server import codec
-from hexwrap_server.cache import prune, write_whole
+from hexwrap_server.answers import GZIP_WINDOW
+from hexwrap_server.disk import StorageError, prune, read_whole, write_whole
 from hexwrap_server.requests import Outcome, Wanted
 
 Status = Literal["queued", "running", "done", "failed", "cancelled"]
-#: zlib's way to say: a gzip header, and the largest window.
-GZIP_WINDOW = 31
 log = logging.getLogger("hexwrap.store")
 HEX_ID = re.compile(r"[0-9a-f]{64}")
 
@@ -99,7 +99,10 @@ class DamagedError(Exception):
 
 
 class Store:
-    """All methods are short; those that read or write whole files say so."""
+    """All methods are short; those that read or write whole files say so.
+
+    Those that write raise StorageError where the disk does not take it.
+    """
 
     def __init__(self, folder: Path) -> None:
         """Raises FolderInUseError, DamagedError, OSError."""
@@ -109,7 +112,6 @@ class Store:
         self.stages = folder / "stages"
         for path in (self.surfaces, self.results, self.stages):
             path.mkdir(parents=True, exist_ok=True)
-        self._last_surface = ("", b"")
         self._lock = _locked(folder / "lock.sqlite3")
         path = folder / "hexwrap.sqlite3"
         try:
@@ -128,21 +130,22 @@ class Store:
     # surfaces (files)
 
     def keep_surface(self, id: str, data: bytes) -> None:
-        """Writes a file; the last one sent is also kept at hand, since a job is going to ask for it."""
-        self._last_surface = (id, data)
-        path = self._surface(id)
+        """Writes a file. Raises StorageError."""
+        path = self.surface_path(id)
         if path.exists() and path.read_bytes() == data:
             path.touch()
         else:
-            write_whole(path, data)
+            write_whole(path, [data])
 
     def has_surface(self, id: str) -> bool:
-        return HEX_ID.fullmatch(id) is not None and self._surface(id).exists()
+        return HEX_ID.fullmatch(id) is not None and self.surface_path(id).exists()
 
     def surface(self, id: str) -> bytes | None:
         """Reads a file; None where it is gone or damaged, and then it is forgotten."""
-        last, data = self._last_surface
-        return data if last == id else _whole(self._surface(id), codec.is_whole)
+        return read_whole(self.surface_path(id), codec.is_whole)
+
+    def surface_path(self, id: str) -> Path:
+        return self.surfaces / f"{id}.surface"
 
     # works
 
@@ -166,17 +169,28 @@ class Store:
         work = self.work(identity)
         if work is None or work.parts is None or not self.has_outcome(identity):
             return None
-        self._db.execute("UPDATE works SET used = ? WHERE identity = ?", (time.time(), identity))
+        with contextlib.suppress(StorageError):  # it can be read all the same
+            self._write("UPDATE works SET used = ? WHERE identity = ?", time.time(), identity)
         return work
 
-    def keep_outcome(self, identity: str, outcome: Outcome) -> None:
-        """The files of a result; ``done`` comes after. Raises OSError."""
-        write_whole(self.solution_path(identity), outcome.solution)
-        write_whole(self.result_path(identity), outcome.result)
+    def keep_outcome(self, identity: str, outcome: Outcome) -> bytes:
+        """Write the files of a result, if the worker did not; ``done`` comes after. The packed result.
+
+        Raises StorageError.
+        """
+        if outcome.solution is not None:
+            write_whole(self.solution_path(identity), [outcome.solution])
+        if outcome.result is not None:
+            write_whole(self.result_path(identity), [outcome.result])
+            return outcome.result
+        try:
+            return self.result_path(identity).read_bytes()
+        except OSError as error:
+            raise StorageError.of(error) from error
 
     def result(self, identity: str) -> bytes | None:
         """Reads a packed result; None where it is gone or damaged, and then it is forgotten."""
-        return _whole(self.result_path(identity), _is_packed)
+        return read_whole(self.result_path(identity), _is_packed)
 
     def has_outcome(self, identity: str) -> bool:
         return self.result_path(identity).exists() and self.solution_path(identity).exists()
@@ -200,23 +214,24 @@ class Store:
             self._db.execute(f"INSERT INTO jobs ({_COLUMNS}) VALUES ({marks})", _row(job))
 
     def start_work(self, identity: str) -> None:
-        self._db.execute(
-            "UPDATE works SET attempts = attempts + 1, parts = NULL WHERE identity = ?", (identity,)
-        )
+        self._write("UPDATE works SET attempts = attempts + 1, parts = NULL WHERE identity = ?", identity)
 
     def take_back(self, identity: str) -> None:
         """The server stops before the work is done, through no fault of the work."""
-        self._db.execute("UPDATE works SET attempts = MAX(attempts - 1, 0) WHERE identity = ?", (identity,))
+        self._write("UPDATE works SET attempts = MAX(attempts - 1, 0) WHERE identity = ?", identity)
 
     def settle(self, identity: str) -> None:
         """The work ended without a result; whoever asks for it again starts from the first attempt."""
-        self._db.execute("UPDATE works SET attempts = 0 WHERE identity = ?", (identity,))
+        self._write("UPDATE works SET attempts = 0 WHERE identity = ?", identity)
 
     def finish_work(self, identity: str, outcome: Outcome) -> None:
-        size = len(outcome.result) + len(outcome.solution)
-        self._db.execute(
+        self._write(
             "UPDATE works SET attempts = 0, parts = ?, size = ?, timings = ?, used = ? WHERE identity = ?",
-            (json.dumps(outcome.parts), size, json.dumps(outcome.timings), time.time(), identity),
+            json.dumps(outcome.parts),
+            outcome.size,
+            json.dumps(outcome.timings),
+            time.time(),
+            identity,
         )
 
     def update(self, jobs: Iterable[Job]) -> None:
@@ -245,7 +260,7 @@ class Store:
         return [replace(_job(row), status="queued", stage="", progress=0.0, started=None) for row in rows]
 
     def forget(self, id: str) -> None:
-        self._db.execute("DELETE FROM jobs WHERE id = ?", (id,))
+        self._write("DELETE FROM jobs WHERE id = ?", id)
 
     def prune_rows(self, days: float, result_bytes: float) -> dict[str, str]:
         """Forget jobs and works that are too old or too much, oldest first; the rest with surfaces."""
@@ -273,41 +288,36 @@ class Store:
         prune(self.surfaces, result_bytes, keep=lambda name: name.partition(".")[0] in surfaces)
         prune(self.stages, stage_bytes)
 
+    def _write(self, statement: str, *values: Any) -> None:
+        with self._transaction():
+            self._db.execute(statement, values)
+
     @contextlib.contextmanager
     def _transaction(self) -> Any:
-        self._db.execute("BEGIN IMMEDIATE")
         try:
+            self._db.execute("BEGIN IMMEDIATE")
             yield
+            self._db.execute("COMMIT")
+        except sqlite3.OperationalError as error:
+            self._roll_back()
+            raise StorageError.of(error) from error
         except BaseException:
-            self._db.execute("ROLLBACK")
+            self._roll_back()
             raise
-        self._db.execute("COMMIT")
 
-    def _surface(self, id: str) -> Path:
-        return self.surfaces / f"{id}.surface"
-
-
-def _whole(path: Path, is_whole: Callable[[bytes], bool]) -> bytes | None:
-    """What a file holds. A damaged one is deleted, so that its work is done again when asked for."""
-    try:
-        data = path.read_bytes()
-    except OSError:
-        return None
-    if is_whole(data):
-        return data
-    log.warning("a damaged file was deleted: %s", path.name)
-    with contextlib.suppress(OSError):
-        path.unlink()
-    return None
+    def _roll_back(self) -> None:
+        if self._db.in_transaction:  # on a full disk SQLite may have done so already
+            with contextlib.suppress(sqlite3.OperationalError):
+                self._db.execute("ROLLBACK")
 
 
 def _is_packed(data: bytes) -> bool:
     """Whether gzip data is complete and its checksum right."""
     try:
-        gunzip = zlib.decompressobj(GZIP_WINDOW)
+        gunzip: Any = isal_zlib.decompressobj(GZIP_WINDOW)
         gunzip.decompress(data)
-        return gunzip.eof
-    except zlib.error:
+        return bool(gunzip.eof)
+    except isal_zlib.error:  # type: ignore[misc]
         return False
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -55,6 +55,13 @@ def part(solution: Solution, name: str, timings: dict[str, float]) -> Any:
             return solution.support and support(solution.support)
         case _:
             return timings
+
+
+#: By stage: the parts that are known once it is done.
+EARLY: dict[str, dict[str, Callable[[Any], Any]]] = {
+    "map": {"mesh": lambda made: mesh(made.surface), "map": lambda made: conformal(made)},
+    "pattern": {"pattern": lambda made: pattern(made)},
+}
 
 
 def dump(value: Any) -> bytes:

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import contextlib
 from collections import OrderedDict
-from functools import cache
+from collections.abc import Callable
+from functools import cache, partial
 from pathlib import Path
-
-from isal import igzip
+from typing import Any
 
 from hexwrap_server import codec, wire
-from hexwrap_server.answers import GZIP_LEVEL
 from hexwrap_server.cache import CachingRunner, StageCache
+from hexwrap_server.disk import read_whole, write_whole
 from hexwrap_server.files import WRITERS, Meta
+from hexwrap_server.packing import Packer
 from hexwrap_server.parsing import loads
-from hexwrap_server.parts import join_parts, places
-from hexwrap_server.requests import CacheSettings, Intake, Outcome, SentSurface, Wanted
+from hexwrap_server.parts import PARTS
+from hexwrap_server.problems import FormError
+from hexwrap_server.requests import CacheSettings, Intake, Order, Outcome, SentSurface, Wanted
 from hexwrap_server.schemas import parse_surface
 from hexwrap_server.worker import Report
 from hexwrap_solver import pipeline
@@ -27,32 +29,72 @@ from hexwrap_solver.surface.types import Surface
 KEPT_SOLUTIONS = 4
 
 
-def solve(report: Report, surface: bytes, wanted: Wanted, caching: CacheSettings) -> Outcome:
-    """The whole way, stage by stage, each looked up first."""
-    sent: SentSurface = codec.decode(surface)
-    runner = CachingRunner(_stages(caching), report)
-    solution = run_stages(sent, wanted, runner)
-    parts = wire.parts_json(solution, runner.timings)
-    text = join_parts(parts)
+def solve(report: Report, order: Order, caching: CacheSettings) -> Outcome:
+    """The whole way, stage by stage, each looked up first. Raises HexwrapError, StorageError."""
+    with Packer(wire.dump) as packer:
+        runner = CachingRunner(_stages(caching), report, _packing(packer))
+        solution = _staged(order.surface_id, lambda: _sent(order), order.wanted, runner)
+        for name in PARTS:
+            if name not in packer:
+                packer.add(name, partial(wire.part, solution, name, runner.timings))
+        return _outcome(order, solution, packer, runner)
+
+
+def _outcome(order: Order, solution: pipeline.Solution, packer: Packer, runner: CachingRunner) -> Outcome:
+    content = codec.pieces(solution)
+    if order.files:  # beside the packing of the last parts
+        write_whole(Path(order.files[1]), content)
+    result = packer.finish()
+    if order.files:
+        write_whole(Path(order.files[0]), [result])
     return Outcome(
-        result=igzip.compress(text, GZIP_LEVEL, mtime=0),
-        parts=places(parts),
-        size=len(text),
-        solution=codec.encode(solution),
+        result=None if order.files else result,
+        solution=None if order.files else b"".join(content),
+        parts=packer.places,
+        size=len(result) + sum(map(len, content)),
         timings=runner.timings,
         found=runner.found,
     )
 
 
+def _packing(packer: Packer) -> Callable[[str, Any], None]:
+    """A listener to stages that packs the parts which are known by then."""
+
+    def made(stage: str, value: Any) -> None:
+        for name, make in wire.EARLY.get(stage, {}).items():
+            packer.add(name, partial(make, value))
+
+    return made
+
+
+def _sent(order: Order) -> SentSurface:
+    """Raises FormError where the surface is gone or damaged, and then it is forgotten."""
+    data = order.surface
+    if isinstance(data, str):
+        data = read_whole(Path(data), codec.is_whole) or b""
+    try:
+        sent: SentSurface = codec.decode(data)
+    except codec.CodecError:
+        raise FormError.at("/surface/id", "the surface is no longer kept here; send it again") from None
+    return sent
+
+
 def run_stages(sent: SentSurface, wanted: Wanted, runner: CachingRunner) -> pipeline.Solution:
     """A sent surface and what is wanted of it → the solution. Raises HexwrapError."""
+    return _staged(codec.digest(sent), lambda: sent, wanted, runner)
+
+
+def _staged(
+    surface_id: str, sent: Callable[[], SentSurface], wanted: Wanted, runner: CachingRunner
+) -> pipeline.Solution:
+    """sent: asked only where the checked surface is not remembered."""
     return pipeline.solve(
-        lambda: take_in(sent),
+        lambda: take_in(sent()),
         wanted.boundary,
         wanted.pattern,
         wanted.panels,
         runner,
-        source=sent,
+        source=surface_id,
         with_support=wanted.support,
     )
 
@@ -74,7 +116,8 @@ def read_surface(report: Report, text: bytes, max_vertices: int, caching: CacheS
 
 def checked(report: Report, sent: SentSurface, caching: CacheSettings) -> Intake:
     runner = CachingRunner(_stages(caching), report)
-    surface = runner("surface", sent, lambda progress: take_in(sent))
+    id = codec.digest(sent)
+    surface = runner("surface", id, lambda progress: take_in(sent))
     loops = [surface.input_vertex[loop].tolist() for loop in surface.loops]
     answer = {
         "vertices": len(surface.vertices),
@@ -82,7 +125,7 @@ def checked(report: Report, sent: SentSurface, caching: CacheSettings) -> Intake
         "loops": loops,
         "repairs": list(surface.repairs),
     }
-    return Intake(codec.digest(sent), codec.encode(sent), answer)
+    return Intake(id, codec.encode(sent), answer)
 
 
 def write_file(

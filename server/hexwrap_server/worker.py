@@ -24,6 +24,7 @@ from typing import IO, Any
 
 import psutil
 
+from hexwrap_server import later
 from hexwrap_solver.errors import HexwrapError
 
 #: Two workers with two BLAS threads each are many times slower than with one each.
@@ -37,12 +38,21 @@ ONE_THREAD = dict.fromkeys(
     ),
     "1",
 )
+#: The GNU C library gives freed memory back at once, and gets it again page by page for the next array: a
+#: sixth of the time of a small job. Elsewhere these names mean nothing.
+KEEP_MEMORY = {"MALLOC_MMAP_THRESHOLD_": str(32 * 2**20), "MALLOC_TRIM_THRESHOLD_": str(256 * 2**20)}
 #: Seconds between two looks at a worker's memory and clock.
 WATCH_INTERVAL = 0.1
 #: Seconds between two progress messages of one job.
 REPORT_INTERVAL = 0.05
+#: Seconds after an answer within which the worker leaves the processor to whoever waits for it.
+PAUSE = 0.02
+#: Seconds after which a thread makes way for another: stages wait for the packing of results otherwise.
+SWITCH_INTERVAL = 0.0005
 _LENGTH = struct.Struct("<Q")
 
+#: A function's name and its arguments.
+Call = tuple[str, tuple[Any, ...]]
 #: A function's listener: stage, fraction of the whole 0..1, a few words.
 Report = Callable[[str, float, str], None]
 
@@ -84,7 +94,7 @@ class WorkerProcess:
         """Start the process; it imports what it needs while the parent goes on."""
         paths = [os.path.abspath(p) for p in sys.path if p]
         self._stopped = False
-        environment = os.environ | ONE_THREAD | {"PYTHONPATH": os.pathsep.join(paths)}
+        environment = os.environ | ONE_THREAD | KEEP_MEMORY | {"PYTHONPATH": os.pathsep.join(paths)}
         self._process = subprocess.Popen(
             [sys.executable, "-P", "-c", "from hexwrap_server.worker import main; main()", self._preload],
             stdin=subprocess.PIPE,
@@ -212,14 +222,24 @@ def main() -> None:
     inlet = os.fdopen(os.dup(0), "rb")
     outlet = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # whatever libraries print must not end up between the frames
-    calls: queue.SimpleQueue[tuple[str, tuple[Any, ...]]] = queue.SimpleQueue()
+    calls: queue.SimpleQueue[Call] = queue.SimpleQueue()
     threading.Thread(target=_listen, args=(inlet, calls), daemon=True).start()
     for module in filter(None, sys.argv[1:]):
         import_module(module)
+    sys.setswitchinterval(SWITCH_INTERVAL)
     _write_frame(outlet, ("ready",))
     while True:
-        function, arguments = calls.get()
+        function, arguments = _next(calls)
         _say(outlet, _answer(function, arguments, _reporter(outlet)))
+
+
+def _next(calls: queue.SimpleQueue[Call]) -> Call:
+    """The next call. What was put off is done in a pause, or else just before it."""
+    call = None
+    with contextlib.suppress(queue.Empty):
+        call = calls.get(timeout=PAUSE)
+    later.catch_up()
+    return call or calls.get()
 
 
 def _say(outlet: IO[bytes], answer: tuple[Any, ...]) -> None:
@@ -230,7 +250,7 @@ def _say(outlet: IO[bytes], answer: tuple[Any, ...]) -> None:
         _write_frame(outlet, ("error", fault))
 
 
-def _listen(inlet: IO[bytes], calls: queue.SimpleQueue[tuple[str, tuple[Any, ...]]]) -> None:
+def _listen(inlet: IO[bytes], calls: queue.SimpleQueue[Call]) -> None:
     while (call := _read_frame(inlet)) is not None:
         calls.put((call[0], call[1]))
     os._exit(0)

@@ -7,6 +7,9 @@ import time
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from hexwrap_server import later
 from hexwrap_server.worker import Report
 from hexwrap_solver.errors import RequestError
 
@@ -34,8 +37,26 @@ def refuse(report: Report) -> None:
     raise RequestError("It cannot be.", vertices=[3], data={"missing": 0.5})
 
 
+def refuse_with(report: Report, data: dict[str, Any], *arguments: Any) -> None:
+    raise RequestError("It cannot be.", data=data)
+
+
 def stumble(report: Report) -> None:
     raise KeyError("a bug")
+
+
+def put_off(report: Report, mark: str) -> bool:
+    """Makes a file when the answer is sent; whether it is there by now."""
+    later.put_off(Path(mark).touch)
+    return Path(mark).exists()
+
+
+def put_off_a_fault(report: Report) -> None:
+    later.put_off(lambda: stumble(report))
+
+
+def exists(report: Report, mark: str) -> bool:
+    return Path(mark).exists()
 
 
 def die(report: Report) -> None:
@@ -50,6 +71,12 @@ def sleep(report: Report, seconds: float, mark: str = "") -> str:
     while time.monotonic() < end:
         time.sleep(0.01)
     return "slept"
+
+
+def crunch(report: Report, n: int, mark: str) -> None:
+    """Inside of one numpy call for a long time."""
+    Path(mark).touch()
+    np.linalg.svd(np.ones((n, n)) + np.eye(n))
 
 
 def hoard(report: Report, mib: int) -> int:

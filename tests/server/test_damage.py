@@ -56,7 +56,7 @@ def test_damaged_files_are_told_and_made_again(tmp_path: Path, damage: Damage) -
 def test_damaged_surface_is_asked_for_again(tmp_path: Path) -> None:
     with running(tmp_path, workers=1) as client:
         surface = {"id": client.post("/v1/surfaces", json=request()["surface"]).json()["id"]}
-    for path in (tmp_path / "surfaces").iterdir():
+    for path in (p for folder in ("surfaces", "stages") for p in (tmp_path / folder).iterdir()):
         path.write_bytes(cut_short(path.read_bytes()))
     with running(tmp_path, workers=1) as client:
         for _ in range(2):

@@ -17,7 +17,7 @@ import pytest
 from hexwrap_server.engine import nobody
 from hexwrap_server.worker import MemoryLimitError, TimeLimitError, WorkerDiedError
 from hexwrap_solver.errors import RequestError
-from tests.server.bodies import request
+from tests.server.bodies import request, tube
 from tests.server.live import finished, running
 
 distributed = pytest.importorskip("distributed", reason="dask.distributed is not installed (extra 'dask')")
@@ -122,6 +122,79 @@ def test_killed_machine_costs_its_own_job_only(tmp_path: Path) -> None:
                 await asyncio.sleep(0.05)
 
     run(story())
+
+
+@pytest.mark.long
+@pytest.mark.filterwarnings("ignore")
+def test_lost_scheduler_fails_its_job_and_is_found_again(tmp_path: Path) -> None:
+    from hexwrap_server.dask_engine import ClusterError, DaskEngine
+
+    async def story() -> None:
+        async with cluster(1) as made, engine(made) as e:
+            port, mark = made.scheduler.port, tmp_path / "one"
+            assert isinstance(e, DaskEngine)
+            task = asyncio.create_task(call(e, "sleep", 60, str(mark)))
+            await made_by([mark])
+            await made.scheduler.close()
+            with pytest.raises((ClusterError, WorkerDiedError)):
+                await task
+            while e.is_ready:
+                await asyncio.sleep(0.05)
+            with pytest.raises(ClusterError, match="no machines"):
+                await call(e, "echo", 1)
+            async with (
+                distributed.Scheduler(port=port, dashboard_address=":0"),
+                distributed.Nanny(f"tcp://127.0.0.1:{port}", nthreads=1),
+            ):
+                deadline = time.monotonic() + 30
+                while not e.is_ready:
+                    assert time.monotonic() < deadline
+                    await asyncio.sleep(0.05)
+                assert await call(e, "echo", "found") == "found"
+
+    run(story())
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.skipif(os.name == "nt", reason="kill -9 of POSIX")
+def test_job_whose_machine_is_killed_fails_alone(tmp_path: Path) -> None:
+    """As the job whose worker process is killed on one machine."""
+    with (
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, dashboard_address=":0", protocol="tcp://", silence_logs=50
+        ) as made,
+        running(tmp_path, engine="dask", scheduler=made.scheduler_address) as client,
+    ):
+        bodies = [request(surface=tube(400, 150, height=10 + i), pattern={"around": 60}) for i in range(2)]
+        ids = [client.post("/v1/jobs", json=body).json()["id"] for body in bodies]
+        while not all(client.get(f"/v1/jobs/{id}").json()["stage"] for id in ids):
+            time.sleep(0.02)
+        os.kill(made.workers[0].pid, signal.SIGKILL)
+        jobs = sorted((finished(client, id) for id in ids), key=lambda job: job["status"])
+        assert [job["status"] for job in jobs] == ["done", "failed"]
+        assert jobs[1]["problem"]["type"] == "/problems/worker-died"
+        assert client.get(f"/v1/jobs/{jobs[1]['id']}/result").status_code == 503
+        again = client.post("/v1/jobs", json=bodies[ids.index(jobs[1]["id"])]).json()["id"]
+        assert finished(client, again)["status"] == "done"
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_running_job_on_a_cluster_is_stopped(tmp_path: Path) -> None:
+    with (
+        distributed.LocalCluster(
+            n_workers=1, threads_per_worker=1, dashboard_address=":0", protocol="tcp://", silence_logs=50
+        ) as made,
+        running(tmp_path, engine="dask", scheduler=made.scheduler_address) as client,
+    ):
+        body = request(surface=tube(400, 150), pattern={"around": 60})
+        id = client.post("/v1/jobs", json=body).json()["id"]
+        while not client.get(f"/v1/jobs/{id}").json()["stage"]:
+            time.sleep(0.02)
+        start = time.monotonic()
+        assert client.delete(f"/v1/jobs/{id}").status_code == 204
+        assert time.monotonic() - start < 2
+        small = client.post("/v1/jobs", json=request()).json()["id"]
+        assert finished(client, small)["status"] == "done"
 
 
 @pytest.mark.filterwarnings("ignore")

@@ -40,6 +40,13 @@ async def call(e: ProcessEngine, name: str, *arguments: Any, seconds: float = 30
     return await e.run(CALLS + name, *arguments, report=nobody, seconds=seconds, mib=mib)
 
 
+async def made(mark: Path) -> None:
+    deadline = time.monotonic() + 10
+    while not mark.exists():
+        assert time.monotonic() < deadline
+        await asyncio.sleep(0.01)
+
+
 def run(story: Coroutine[Any, Any, T]) -> T:
     return asyncio.run(story)
 
@@ -51,6 +58,16 @@ def test_values_go_there_and_back() -> None:
                 "a": [1, 2.5, b"x" * 2_000_000]
             }
             assert await call(e, "environment", "OPENBLAS_NUM_THREADS") == "1"
+
+    run(story())
+
+
+def test_calls_one_after_the_other_go_to_the_worker_that_remembers_most() -> None:
+    async def story() -> None:
+        async with engine(2) as e:
+            while not e.is_ready:
+                await asyncio.sleep(0.05)
+            assert len({await call(e, "pid") for _ in range(4)}) == 1
 
     run(story())
 
@@ -83,6 +100,21 @@ def test_refusals_keep_their_data_and_the_worker() -> None:
     run(story())
 
 
+def test_what_is_put_off_is_done_after_the_answer_and_before_the_next(tmp_path: Path) -> None:
+    async def story() -> None:
+        async with engine() as e:
+            for mark in (tmp_path / "at once", tmp_path / "in a pause"):
+                assert not await call(e, "put_off", str(mark))
+                if mark.name == "at once":
+                    assert await call(e, "exists", str(mark))
+            await made(tmp_path / "in a pause")
+            worker = await call(e, "pid")
+            await call(e, "put_off_a_fault")
+            assert await call(e, "pid") == worker
+
+    run(story())
+
+
 def test_limits_end_one_call_and_the_next_one_runs() -> None:
     async def story() -> None:
         async with engine() as e:
@@ -110,13 +142,14 @@ def test_death_of_a_worker_harms_its_own_call_only() -> None:
     run(story())
 
 
-def test_cancelling_kills_within_moments(tmp_path: Path) -> None:
+@pytest.mark.parametrize("busy", [("sleep", 60), ("crunch", 6000)])
+def test_cancelling_kills_within_moments(tmp_path: Path, busy: tuple[str, float]) -> None:
     async def story() -> None:
         async with engine() as e:
             pid = await call(e, "pid")
-            task = asyncio.create_task(call(e, "sleep", 60, str(tmp_path / "started")))
-            while not (tmp_path / "started").exists():
-                await asyncio.sleep(0.01)
+            task = asyncio.create_task(call(e, *busy, str(tmp_path / "started")))
+            await made(tmp_path / "started")
+            await asyncio.sleep(0.2)
             start = time.monotonic()
             task.cancel()
             with pytest.raises(asyncio.CancelledError):

@@ -165,6 +165,23 @@ def test_job_whose_worker_dies_fails_alone(behave: Behave) -> None:
 
 
 @pytest.mark.parametrize(
+    ("data", "told"),
+    [
+        ({"cells": 2**70, "of": [10**400]}, {"cells": 2.0**70, "of": [str(10**400)]}),
+        ({"bad": "\ud800"}, None),
+    ],
+)
+def test_job_ends_whatever_its_problem_holds(behave: Behave, data: dict[str, Any], told: Any) -> None:
+    client = behave("refuse_with", data)
+    job = finished(client, post(client, surface=fresh()), seconds=10)
+    assert job["status"] == "failed"
+    if told is None:
+        assert job["problem"]["type"] == "/problems/internal"
+    else:
+        assert {name: job["problem"][name] for name in told} == told
+
+
+@pytest.mark.parametrize(
     ("settings", "slug"),
     [({"job_seconds": 0.3}, "time-limit"), ({"job_mib": 20.0}, "memory-limit")],
 )

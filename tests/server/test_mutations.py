@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from typing import Any
 
@@ -61,17 +63,17 @@ def flatten_mesh(body: Body, r: Chance) -> None:
 
 
 def scale_mesh(body: Body, r: Chance) -> None:
-    factor = 10.0 ** r.integers(-150, 150)
+    factor = 10.0 ** int(r.integers(-150, 150))
     body["surface"]["vertices"] = [[x * factor for x in p] for p in body["surface"]["vertices"]]
 
 
 def shift_mesh(body: Body, r: Chance) -> None:
-    far = 10.0 ** r.integers(0, 12)
+    far = 10.0 ** int(r.integers(0, 12))
     body["surface"]["vertices"] = [[x + far for x in p] for p in body["surface"]["vertices"]]
 
 
 def squash_mesh(body: Body, r: Chance) -> None:
-    factor = 10.0 ** r.integers(-9, 0)
+    factor = 10.0 ** int(r.integers(-9, 0))
     body["surface"]["vertices"] = [[p[0], p[1], p[2] * factor] for p in body["surface"]["vertices"]]
 
 
@@ -151,6 +153,8 @@ def mutated(seed: int) -> Body:
     return body
 
 
+#: How many meshes are sent at a time.
+CLIENTS = 4
 #: Asks for /health until its input is closed, then prints the seconds of each answer. A process of its own:
 #: the many threads of a test would delay the clock, not the server.
 PROBE = """
@@ -190,29 +194,32 @@ def awake(client: httpx.Client, longest: float) -> Iterator[None]:
     assert max(times) < longest
 
 
-def attack(client: httpx.Client, seeds: range) -> dict[int, int]:
+def attack(client: httpx.Client, seeds: Iterable[int]) -> Counter[int]:
     """Statuses and how often they came."""
-    counts: dict[int, int] = {}
-    for seed in seeds:
-        text = json.dumps(mutated(seed))
-        answer = client.post("/v1/solve", content=text)
-        counts[answer.status_code] = counts.get(answer.status_code, 0) + 1
-        assert answer.status_code in (200, 422), (seed, answer.text)
-        if answer.status_code == 422:
-            problem = answer.json()
-            assert problem["detail"]
-            assert problem["type"] not in ("/problems/time-limit", "/problems/memory-limit"), (seed, problem)
-            n = len(json.loads(text)["surface"]["vertices"])
-            assert all(0 <= v < n for v in problem.get("vertices", [])), (seed, problem)
-    return counts
+    with ThreadPoolExecutor(CLIENTS) as threads:
+        return Counter(threads.map(lambda seed: answered(client, seed), seeds))
+
+
+def answered(client: httpx.Client, seed: int) -> int:
+    """The status of an answer that is one."""
+    text = json.dumps(mutated(seed))
+    answer = client.post("/v1/solve", content=text)
+    assert answer.status_code in (200, 422), (seed, answer.text)
+    if answer.status_code == 422:
+        problem = answer.json()
+        assert problem["detail"]
+        assert problem["type"] not in ("/problems/time-limit", "/problems/memory-limit"), (seed, problem)
+        n = len(json.loads(text)["surface"]["vertices"])
+        assert all(0 <= v < n for v in problem.get("vertices", [])), (seed, problem)
+    return answer.status_code
 
 
 @pytest.fixture(scope="module")
 def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[httpx.Client]:
     port = free_port()
     with (
-        served(tmp_path_factory.mktemp("data"), port, workers=1, job_seconds=60.0, max_panels=20_000),
-        httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=90, trust_env=False) as client,
+        served(tmp_path_factory.mktemp("data"), port, workers=2, job_seconds=250.0, max_panels=20_000),
+        httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=300, trust_env=False) as client,
     ):
         yield client
 
@@ -222,6 +229,11 @@ def test_mutated_meshes_get_an_answer(client: httpx.Client) -> None:
         counts = attack(client, range(200))
     assert counts[200] > 20
     assert counts[422] > 20
+
+
+def test_meshes_that_failed_once_get_an_answer(client: httpx.Client) -> None:
+    """A step of the energy that overflows; a problem with a number of more than 64 bits."""
+    attack(client, [565, 931])
 
 
 @pytest.mark.long

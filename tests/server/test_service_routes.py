@@ -35,6 +35,30 @@ def test_health_tells_version_and_load(client: Live) -> None:
     assert answer.headers["server"].startswith("hexwrap/")
 
 
+@pytest.mark.parametrize(
+    "path",
+    [
+        *("/health", "/ready", "/metrics", "/openapi.json", "/", "/docs", "/v1/jobs", "/v1/jobs/none"),
+        *("/v1/jobs/{}", "/v1/jobs/{}/result", "/v1/jobs/{}/result?include=sizes"),
+        "/v1/jobs/{}/files/panels.csv",
+    ],
+)
+def test_head_is_get_without_the_body(client: Live, done: str, path: str) -> None:
+    full, head = (client.request(method, path.format(done)) for method in ("GET", "HEAD"))
+    assert (head.status_code, head.content) == (full.status_code, b"")
+    assert full.content
+    differing = {"date"} | ({"content-length"} if path in ("/health", "/metrics", "/ready") else set())
+    for name in set(full.headers) - differing:
+        assert head.headers[name] == full.headers[name], name
+
+
+def test_head_of_events_does_not_wait(client: Live, done: str) -> None:
+    answer = client.head(f"/v1/jobs/{done}/events")
+    assert (answer.status_code, answer.content) == (200, b"")
+    assert answer.headers["content-type"].startswith("text/event-stream")
+    assert client.head("/v1/solve").status_code == 405
+
+
 def test_job_is_accepted_with_its_address(client: Live) -> None:
     answer = client.post("/v1/jobs", json=request(pattern={"around": 10}))
     assert answer.status_code == 202

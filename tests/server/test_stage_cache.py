@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import time
 import zlib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +17,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from hexwrap_server import codec
-from hexwrap_server.cache import SHARES, CachingRunner, StageCache, prune, size_of, write_whole
+from hexwrap_server import codec, later
+from hexwrap_server.cache import SHARES, CachingRunner, StageCache, size_of
 from hexwrap_server.codec import CodecError, decode, digest, encode
+from hexwrap_server.disk import StorageError, prune, write_whole
 from hexwrap_solver.arrays import Ragged
 from hexwrap_solver.conformal.types import BoundaryCondition, Deck
 from hexwrap_solver.pattern.types import PatternSettings
@@ -96,7 +99,7 @@ def stages(run: CachingRunner, settings: tuple[int, int]) -> int:
 
     run("map", settings[0], lambda progress: compute("map"))
     run("pattern", settings[1], lambda progress: compute("pattern"))
-    run.cache.settle()
+    later.catch_up()
     return len(computed)
 
 
@@ -106,6 +109,31 @@ def test_stage_is_known_by_its_settings_and_all_before(tmp_path: Path) -> None:
     assert stages(runner(tmp_path), (1, 2)) == 1
     assert stages(runner(tmp_path), (2, 1)) == 2
     assert stages(runner(None), (1, 1)) == 2
+
+
+def test_costly_stages_are_written_at_once(tmp_path: Path) -> None:
+    cache = StageCache(tmp_path, 0)
+    cache.put("cheap", 1, seconds=0.01)
+    cache.put("costly", 2, seconds=60)
+    assert [path.name for path in tmp_path.iterdir()] == ["costly.stage"]
+    later.catch_up()
+    assert (cache.get("cheap"), cache.get("costly")) == ((1, "disk"), (2, "disk"))
+
+
+def test_full_disk_costs_no_stage(tmp_path: Path) -> None:
+    cache = StageCache(tmp_path / "missing", 1000)
+    cache.put("a", 1, seconds=60)
+    assert cache.get("a") == (1, "memory")
+
+
+def test_files_are_written_whole_or_not_at_all(tmp_path: Path) -> None:
+    def content() -> Iterator[bytes]:
+        yield b"half"
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with pytest.raises(StorageError, match="No space left on device"):
+        write_whole(tmp_path / "file", content())
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_damaged_stage_is_computed_again(tmp_path: Path) -> None:
@@ -144,13 +172,18 @@ def test_progress_never_goes_back() -> None:
 
 def test_pruning_keeps_the_last_used(tmp_path: Path) -> None:
     for i in range(5):
-        write_whole(tmp_path / f"{i}.stage", bytes(1000))
+        write_whole(tmp_path / f"{i}.stage", [bytes(1000)])
         os.utime(tmp_path / f"{i}.stage", (time.time() - 10_000 + i,) * 2)
     os.utime(tmp_path / "0.stage")
+    for name, age in (("2.stage.ab.part", 10_000), ("3.stage.cd.part", 0)):
+        write_whole(tmp_path / name, [b""])
+        os.utime(tmp_path / name, (time.time() - age,) * 2)
     prune(tmp_path, 3000, keep=lambda name: name == "1.stage")
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["0.stage", "1.stage", "3.stage", "4.stage"]
+    left = ["0.stage", "1.stage", "3.stage", "3.stage.cd.part", "4.stage"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == left
     prune(tmp_path, 0)
-    assert [p.name for p in tmp_path.iterdir()] == ["0.stage"]  # young: somebody may be about to name it
+    # young: somebody may be about to name them
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["0.stage", "3.stage.cd.part"]
 
 
 def test_sizes_count_arrays() -> None:

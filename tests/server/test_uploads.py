@@ -94,7 +94,7 @@ def test_files_with_too_many_vertices_are_refused(client: Live) -> None:
 
 def test_old_and_superfluous_results_are_forgotten(tmp_path: Path) -> None:
     store = Store(tmp_path)
-    outcome = Outcome(b"r" * 1000, {}, 1000, b"s" * 1000, {}, {})
+    outcome = Outcome(b"r" * 1000, b"s" * 1000, {}, 2000, {}, {})
     for i in range(4):
         identity = f"{i}" * 64
         store.keep_surface("a" * 64, b"surface")

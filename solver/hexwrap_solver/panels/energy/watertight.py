@@ -78,7 +78,7 @@ def minimise_watertight(
             tried = points + problem.step(points, flatness, damping)
             reached = problem.energy(tried, flatness)
             damping = max(damping * (EASE if reached < energy else TIGHTEN), 1e-9)
-            if reached >= energy:
+            if not reached < energy:  # nor where it is no number
                 continue
             slow = energy - reached < DECREASE * energy
             points, energy = tried, reached
@@ -104,7 +104,11 @@ class _Problem:
         self._normal = NormalMatrix(np.repeat(pattern.vertices, 3, axis=0))
 
     def energy(self, points: Floats, flatness: float) -> float:
-        parts = [part.residual for part in self._parts(points, flatness)]
+        """∞ where a step went so far that squares overflow."""
+        try:
+            parts = [part.residual for part in self._parts(points, flatness)]
+        except np.linalg.LinAlgError:
+            return np.inf
         return 0.5 * sum(float(part @ part) for part in [*parts, self._moved(points)])
 
     def bend(self, points: Floats) -> float:

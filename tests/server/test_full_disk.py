@@ -1,0 +1,172 @@
+"""A disk that fills up: jobs end with a problem that says so, and everything goes on when there is room."""
+
+from __future__ import annotations
+
+import errno
+import sqlite3
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from hexwrap_server import jobs
+from hexwrap_server.engine import ProcessEngine
+from hexwrap_server.requests import Order
+from hexwrap_server.store import Store
+from tests.server.bodies import request, tube
+from tests.server.live import Live, finished, running
+
+Fill = Callable[[bool], None]
+
+
+class Full:
+    """A database that takes nothing new while it is full."""
+
+    def __init__(self, real: sqlite3.Connection) -> None:
+        self._real = real
+        self.is_full = False
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._real, name)
+
+    def _refuse(self, statement: str) -> None:
+        if self.is_full and statement.split()[0] in ("INSERT", "UPDATE", "DELETE"):
+            raise sqlite3.OperationalError("database or disk is full")
+
+    def execute(self, statement: str, *values: Any) -> Any:
+        self._refuse(statement)
+        return self._real.execute(statement, *values)
+
+    def executemany(self, statement: str, *values: Any) -> Any:
+        self._refuse(statement)
+        return self._real.executemany(statement, *values)
+
+
+class Elsewhere(ProcessEngine):
+    """Sends back what other workers put into files; takes its time first."""
+
+    seconds = 0.0
+
+    async def run(self, function: str, *arguments: Any, **rest: Any) -> Any:
+        if arguments and isinstance(arguments[0], Order):
+            function = "tests.server.calls:solve_after"
+            arguments = (self.seconds, *arguments)
+        return await super().run(function, *arguments, **rest)
+
+
+@pytest.fixture
+def server(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Live, Full, Elsewhere]]:
+    monkeypatch.setattr(jobs, "CATCH_UP_INTERVAL", 0.1)
+    engine = Elsewhere(1)
+    with running(tmp_path, engine) as client:
+        disk = Full(client.service.store._db)
+        client.service.store._db = disk  # type: ignore[assignment]
+        yield client, disk, engine
+
+
+def until_running(client: Live, id: str) -> None:
+    while client.get(f"/v1/jobs/{id}").json()["stage"] != "surface":
+        time.sleep(0.02)
+
+
+def status_on_disk(client: Live, id: str) -> str:
+    job = client.service.store.job(id)
+    assert job is not None
+    return job.status
+
+
+def test_job_that_ends_on_a_full_disk_fails_and_is_written_later(
+    server: tuple[Live, Full, Elsewhere], tmp_path: Path
+) -> None:
+    client, disk, engine = server
+    engine.seconds = 1.0
+    id = client.post("/v1/jobs", json=request()).json()["id"]
+    until_running(client, id)
+    disk.is_full = True
+    job = finished(client, id)
+    assert (job["status"], job["problem"]["type"]) == ("failed", "/problems/storage")
+    assert "database or disk is full" in job["problem"]["detail"]
+    answer = client.get(f"/v1/jobs/{id}/result")
+    assert (answer.status_code, answer.headers["retry-after"]) == (503, "5")
+    assert client.get("/v1/jobs").json()["jobs"][0]["status"] == "failed"
+    assert client.get("/health").json()["running"] == 0
+    assert status_on_disk(client, id) == "running"
+    disk.is_full = False
+    deadline = time.monotonic() + 10
+    while status_on_disk(client, id) != "failed":
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    engine.seconds = 0.0
+    assert client.post("/v1/solve", json=request()).status_code == 200
+
+
+def test_requests_on_a_full_disk_are_refused_with_503(server: tuple[Live, Full, Elsewhere]) -> None:
+    client, disk, _ = server
+    done = client.post("/v1/jobs", json=request()).json()["id"]
+    finished(client, done)
+    disk.is_full = True
+    for method, path, body in (
+        ("POST", "/v1/jobs", request()),
+        ("POST", "/v1/solve", request(pattern={"around": 8})),
+        ("DELETE", f"/v1/jobs/{done}", None),
+    ):
+        answer = client.request(method, path, json=body)
+        assert (answer.status_code, answer.json()["type"]) == (503, "/problems/storage"), path
+        assert int(answer.headers["retry-after"]) > 0
+    assert client.get(f"/v1/jobs/{done}/result").status_code == 200
+    disk.is_full = False
+    assert client.delete(f"/v1/jobs/{done}").status_code == 204
+
+
+def test_running_job_can_be_stopped_on_a_full_disk(server: tuple[Live, Full, Elsewhere]) -> None:
+    client, disk, engine = server
+    engine.seconds = 60.0
+    id = client.post("/v1/jobs", json=request()).json()["id"]
+    until_running(client, id)
+    disk.is_full = True
+    assert client.delete(f"/v1/jobs/{id}").status_code == 204
+    assert client.get(f"/v1/jobs/{id}").json()["status"] == "cancelled"
+
+
+def test_server_that_dies_before_the_end_is_written_runs_the_job_again(tmp_path: Path) -> None:
+    with running(tmp_path, workers=1) as client:
+        disk = Full(client.service.store._db)
+        client.service.store._db = disk  # type: ignore[assignment]
+        id = client.post("/v1/jobs", json=request(surface=tube(200, 100))).json()["id"]
+        disk.is_full = True
+        assert finished(client, id)["status"] == "failed"
+    with running(tmp_path, workers=1) as client:
+        assert finished(client, id)["status"] == "done"
+
+
+def no_room(*ignored: Any) -> None:
+    raise OSError(errno.ENOSPC, "No space left on device")
+
+
+def test_surfaces_and_outcomes_that_find_no_room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with running(tmp_path, workers=1) as client:
+        (tmp_path / "results").rename(tmp_path / "away")  # worker processes cannot be patched
+        job = finished(client, client.post("/v1/jobs", json=request()).json()["id"])
+        assert (job["status"], job["problem"]["type"]) == ("failed", "/problems/storage")
+        (tmp_path / "away").rename(tmp_path / "results")
+        monkeypatch.setattr("hexwrap_server.disk.os.replace", no_room)
+        answer = client.post("/v1/jobs", json=request(surface=tube(12, 5)))
+        assert (answer.status_code, answer.json()["type"]) == (503, "/problems/storage")
+        assert "No space left on device" in answer.json()["detail"]
+        monkeypatch.undo()
+        assert client.post("/v1/solve", json=request()).status_code == 200
+
+
+def test_database_that_is_really_full_refuses_and_goes_on(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    pages = store._db.execute("PRAGMA page_count").fetchone()[0]
+    store._db.execute(f"PRAGMA max_page_count = {pages}")
+    insert = "INSERT INTO works (identity, surface, wanted, used) VALUES (?, '', ?, 0)"
+    with pytest.raises(jobs.StorageError, match="full"):
+        store._write(insert, "large", bytes(10**6))
+    store._write(insert, "small", b"")
+    store._db.execute("PRAGMA max_page_count = 100000")
+    store._write(insert, "large", bytes(10**6))
+    store.close()
