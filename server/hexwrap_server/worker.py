@@ -40,7 +40,13 @@ ONE_THREAD = dict.fromkeys(
 )
 #: The GNU C library gives freed memory back at once, and gets it again page by page for the next array: a
 #: sixth of the time of a small job. Elsewhere these names mean nothing.
-KEEP_MEMORY = {"MALLOC_MMAP_THRESHOLD_": str(32 * 2**20), "MALLOC_TRIM_THRESHOLD_": str(256 * 2**20)}
+KEEP_MEMORY = {
+    "MALLOC_MMAP_THRESHOLD_": str(32 * 2**20),
+    "MALLOC_TRIM_THRESHOLD_": str(256 * 2**20),
+    # Huge pages may have to be pieced together first, which took longer than the work in them (20 ms for the
+    # factor of a map of 20,000 vertices, now and then).
+    "NUMPY_MADVISE_HUGEPAGE": "0",
+}
 #: Seconds between two looks at a worker's memory and clock.
 WATCH_INTERVAL = 0.1
 #: Seconds between two progress messages of one job.

@@ -18,6 +18,7 @@ from scipy.linalg.lapack import dpotrf
 
 from hexwrap_solver.arrays import Floats, Ints
 from hexwrap_solver.conformal.dissection import Dissection, dissect
+from hexwrap_solver.conformal.workspace import borrow
 
 #: Blocks of at least this many entries are added run by run, where their places come in few runs without
 #: holes: the index arrays of so many single entries would not stay in the processor's cache.
@@ -65,9 +66,9 @@ class Factorisation:
         one, other = place[rows], place[columns]
         low, high = np.minimum(one, other), np.maximum(one, other)
         self._fronts, visits, stacks = _analyse(tree, low, high)
-        self._size, self._diagonal_at, self._off_diagonal_at = self._addresses(low, high)
-        self._factor = np.empty(self._size)  # cleared by factorise
-        self._stacks = [np.empty(size) for size in stacks]
+        size, self._diagonal_at, self._off_diagonal_at = self._addresses(low, high)
+        memory = borrow(size + sum(stacks), self)
+        self._factor, *self._stacks = np.split(memory, np.cumsum([size, *stacks])[:-1])
         self._visits = visits
         self._blocks = [self._block(front) for front in self._fronts]
         self._steps = [
