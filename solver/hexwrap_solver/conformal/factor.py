@@ -115,6 +115,10 @@ class Factorisation:
         factor.fill(0.0)
         factor[self._diagonal_at] = diagonal[self._order]
         factor[self._off_diagonal_at] = off_diagonal
+        with np.errstate(over="ignore", invalid="ignore"):  # in upper halves, which hold whatever was there
+            self._eliminate()
+
+    def _eliminate(self) -> None:
         for i in self._visits:
             front, (own, rest, update) = self._fronts[i], self._blocks[i]
             for child in front.children:

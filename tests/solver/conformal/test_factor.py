@@ -74,3 +74,20 @@ def test_separators_separate() -> None:
         deep = np.where(deep > high, (deep - 1) // 2, deep)
     np.testing.assert_array_equal(deep, high)
     assert np.diff(tree.start).max() <= 1.5 * LEAF
+
+
+def test_what_stood_in_the_memory_before_does_not_matter() -> None:
+    """The memory of factorisations is used again, and is as it was left."""
+    surface = bump(60, 30)
+    energy = Energy(surface, straight(surface))
+    values = energy.hessian(energy.corners(np.zeros(energy.n)))
+    right = np.random.default_rng(0).standard_normal(energy.n_dof)
+    solutions = []
+    for garbage in (0.0, np.inf, -np.inf, np.nan):
+        factorisation = Factorisation(energy.points, energy.rows, energy.columns)
+        for stack in factorisation._stacks:
+            stack[:] = garbage
+        factorisation.factorise(*values)
+        solutions.append(factorisation.solve(right))
+    for solution in solutions[1:]:
+        np.testing.assert_array_equal(solution, solutions[0])
