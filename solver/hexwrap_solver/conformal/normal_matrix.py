@@ -41,7 +41,7 @@ class NormalMatrix:
         return self._factor
 
     def solve(self, right: Floats) -> Floats:
-        """b → x, with the matrix factorised last."""
+        """b (n,) or (n, k) → x, with the matrix factorised last."""
         if self._factor is None:
             raise RuntimeError("factorise first")
         return self._factor.solve(right)

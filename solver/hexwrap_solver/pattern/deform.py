@@ -80,7 +80,7 @@ class Derivatives:
     area: Floats
 
     def of(self, place: Complexes, shift: tuple[Complexes, Complexes]) -> tuple[Complexes, Complexes]:
-        """(m,) ∂W/∂z̄ and ∂W/∂z for W (n,)."""
+        """(m,) ∂W/∂z̄ and ∂W/∂z for W (n,); or (m, k) for (n, k)."""
         return np.asarray(self.angles @ place) + shift[0], np.asarray(self.sizes @ place) + shift[1]
 
     def strains(self, place: Complexes, shift: tuple[Complexes, Complexes]) -> tuple[Floats, Floats]:
@@ -164,7 +164,8 @@ class System:
 
     def solve(self, weight: Floats, angles: Complexes, sizes: Complexes, start: Floats) -> Complexes:
         """(n,) movements within the freedom whose ∂/∂z̄ and ∂/∂z come nearest to the given ones, (m,), the
-        triangles weighted with (m,). Equal weights one after the other are factorised once."""
+        triangles weighted with (m,). Or (n, k) for k of all, (m, k). Equal weights one after the other are
+        factorised once."""
         weights = np.concatenate([weight, weight, SIZE * weight, SIZE * weight])
         if self._last is None or not np.array_equal(weight, self._last):
             squares = self._matrix.copy()
@@ -173,7 +174,8 @@ class System:
             self._normal.factorise(self._matrix, weights, self._pull)
             self._last = weight
         aim = np.concatenate([_parts(angles), _parts(sizes)])
-        unknown = self._normal.solve(self._matrix.T @ (weights * aim) + self._pull * start)
+        weighted = (weights * aim.T).T
+        unknown = self._normal.solve(self._matrix.T @ weighted + self._pull * start)
         moved = self.freedom.basis @ unknown
         n = len(moved) // 2
         return np.asarray(moved[:n] + 1j * moved[n:])

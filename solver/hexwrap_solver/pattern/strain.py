@@ -33,19 +33,17 @@ class Strain:
         than their vertices are."""
         change, freedom = system.change, system.freedom
         area = change.area / change.area.sum()
-        weight = np.sqrt(area)
-        still = np.zeros(freedom.basis.shape[1])
         moves = [(np.where(lines.side == k, 1.0, 0.0), 0j) for k in range(sides.n)]
         if system.cmap.deck.apex is None:
             moves += [(-(lines.normal.conj() * lines.sheet * step).real, step) for step in (1 + 0j, 1j)]
         moves.append((np.where(lines.side >= 0, turned[lines.entry], 0.0), 0j))
-        columns = []
-        for depth, step in moves:
-            fixed = freedom.place_on_lines(depth)
-            shift = change.of_shift(np.asarray(system.cmap.sheet * step))
-            angles, sizes = change.of(fixed, shift)
-            columns.append(change.of(fixed + system.solve(weight, -angles, -sizes, still), shift)[0])
-        response = np.stack(columns, axis=1)
+        fixed = np.stack([freedom.place_on_lines(depth) for depth, _ in moves], axis=1)
+        shifts = [change.of_shift(np.asarray(system.cmap.sheet * step)) for _, step in moves]
+        shift = np.stack([one for one, _ in shifts], axis=1), np.stack([two for _, two in shifts], axis=1)
+        angles, sizes = change.of(fixed, shift)
+        still = np.zeros((freedom.basis.shape[1], len(moves)))
+        moved = system.solve(np.sqrt(area), -angles, -sizes, still)
+        response = change.of(fixed + moved, shift)[0]
         squares = ((response.conj() * area[:, None]).T @ response).real
         return cls(response, np.asarray(area), np.asarray(squares))
 

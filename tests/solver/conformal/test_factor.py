@@ -40,6 +40,9 @@ def test_random_graphs(n: int, seed: int, tied: bool) -> None:
         factorisation.factorise(scale * diagonal, values)
         expected = np.linalg.solve(dense(scale * diagonal, values, rows, columns), right)
         np.testing.assert_allclose(factorisation.solve(right), expected, rtol=1e-9, atol=1e-9)
+        several = np.stack([right, -2 * right, np.roll(right, 1)], axis=1)
+        for one, column in zip(factorisation.solve(several).T, several.T, strict=True):
+            np.testing.assert_allclose(one, factorisation.solve(column), rtol=1e-9, atol=1e-9)
 
 
 @pytest.mark.parametrize("tied", [False, True])
