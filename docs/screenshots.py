@@ -1,4 +1,4 @@
-"""Takes the README's pictures of the viewer: python docs/screenshots.py (needs playwright and a Chromium)."""
+"""Takes the README's pictures of the viewer: python -m docs.screenshots (needs playwright and a Chromium)."""
 
 from __future__ import annotations
 
