@@ -233,7 +233,7 @@ def test_jobs_survive_a_restart(tmp_path: Path) -> None:
 
 def test_work_that_killed_the_server_thrice_is_given_up(tmp_path: Path) -> None:
     with running(tmp_path, slow(60)) as client:
-        id = post(client)
+        id, same = post(client), post(client)
         until_running(client, id)
     store = Store(tmp_path)
     job = store.job(id)
@@ -245,8 +245,10 @@ def test_work_that_killed_the_server_thrice_is_given_up(tmp_path: Path) -> None:
         store.start_work(job.identity)
     store.close()
     with running(tmp_path) as client:
-        told = client.get(f"/v1/jobs/{id}").json()
-        assert (told["status"], told["problem"]["type"]) == ("failed", "/problems/too-many-attempts")
+        for each in (id, same):
+            told = client.get(f"/v1/jobs/{each}").json()
+            assert (told["status"], told["problem"]["type"]) == ("failed", "/problems/too-many-attempts")
+        assert client.post("/v1/solve", json=request()).status_code == 200
 
 
 def test_one_folder_serves_one_server(tmp_path: Path) -> None:
