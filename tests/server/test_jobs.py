@@ -6,6 +6,7 @@ import itertools
 import threading
 import time
 from collections.abc import Callable, Iterator
+from functools import reduce
 from pathlib import Path
 from typing import Any
 
@@ -168,7 +169,8 @@ def test_job_whose_worker_dies_fails_alone(behave: Behave) -> None:
     ("data", "told"),
     [
         ({"cells": 2**70, "of": [10**400]}, {"cells": 2.0**70, "of": [str(10**400)]}),
-        ({"bad": "\ud800"}, None),
+        ({"half": "\ud800"}, {"half": "?"}),
+        ({"deep": reduce(lambda inner, _: [inner], range(300), [])}, None),
     ],
 )
 def test_job_ends_whatever_its_problem_holds(behave: Behave, data: dict[str, Any], told: Any) -> None:

@@ -181,6 +181,11 @@ def test_refusals_are_problems(client: Live, method: str, path: str, status: int
     assert answer.json()["status"] == status
 
 
+def test_half_characters_are_told(client: Live) -> None:
+    answer = client.post("/v1/jobs", content=b'{"surface": {"\\ud800": [NaN]}}')
+    assert (answer.status_code, answer.json()["errors"][0]["pointer"]) == (422, "/surface/?/0")
+
+
 def test_unsolvable_surface_is_a_problem_with_its_faults(client: Live) -> None:
     open_disk = {"vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "faces": [[0, 1, 2]]}
     id = client.post("/v1/jobs", json={"surface": open_disk}).json()["id"]
