@@ -87,8 +87,11 @@ class JobManager:
 
     async def start(self) -> None:
         """Take up what an earlier server left."""
-        for job in self.store.unfinished():
+        jobs = self.store.unfinished()
+        for job in jobs:
             self._resume(job)
+        for identity in {job.identity for job in jobs} - self._items.keys():
+            self._settle(identity)
         self._chores = [asyncio.create_task(self._prune_forever()), asyncio.create_task(self._catch_up())]
         self._pump()
 
@@ -240,7 +243,6 @@ class JobManager:
                 "again; make the mesh or the pattern coarser."
             )
             self._end([_failed(job, gave_up)])
-            self._settle(job.identity)
         else:
             self._attach(job, self._items.get(job.identity), work)
             self._log(job, "taken up again")

@@ -102,16 +102,18 @@ def dumped(document: object) -> bytes:
     options = orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_NON_STR_KEYS
     try:
         return orjson.dumps(document, option=options, default=str)
-    except TypeError:  # an integer of more than 64 bits, such as a number of cells beyond all limits
-        return orjson.dumps(_within_64_bits(document), option=options, default=str)
+    except TypeError:  # an integer of more than 64 bits (cells beyond all limits), or half a character
+        return orjson.dumps(_encodable(document), option=options, default=str)
 
 
-def _within_64_bits(value: object) -> object:
-    """Larger integers as floats."""
+def _encodable(value: object) -> object:
+    """Integers of more than 64 bits as floats, halves of characters as question marks."""
     if isinstance(value, dict):
-        return {name: _within_64_bits(inner) for name, inner in value.items()}
+        return {_encodable(name): _encodable(inner) for name, inner in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_within_64_bits(inner) for inner in value]
+        return [_encodable(inner) for inner in value]
+    if isinstance(value, str):
+        return value.encode(errors="replace").decode()
     if isinstance(value, int) and not -(2**63) <= value < 2**64:
         return float(value) if abs(value) < 2**1000 else str(value)
     return value

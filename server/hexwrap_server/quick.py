@@ -6,6 +6,7 @@ it.
 
 from __future__ import annotations
 
+import codecs
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,8 @@ except ImportError:  # nobody has built it for this Python; every body goes the 
 
 #: Fields that hold rows of equally many floats.
 TABLES = ("vertices", "normals", "points")
+#: Objects of more names go the long way: every name is looked for among all of them.
+MOST_NAMES = 100
 
 
 class UnusualError(ValueError):
@@ -27,7 +30,7 @@ class UnusualError(ValueError):
 
 def read(text: bytes) -> Any:
     """The document; tables in it are arrays (n, k), and faces are Ragged. None where anything is unusual."""
-    if simdjson is None:
+    if simdjson is None or text.startswith(codecs.BOM_UTF8):  # which simdjson would pass over
         return None
     try:
         document, n_lists = _value("", simdjson.Parser().parse(text))
@@ -52,8 +55,12 @@ def _value(name: str, value: Any) -> tuple[Any, int]:
 
 
 def _object(value: Any) -> tuple[dict[str, Any], int]:
+    if len(value) > MOST_NAMES:
+        raise UnusualError
     names = list(value)
     if len(set(names)) < len(names):  # the last one counts, but only the first one can be had
+        raise UnusualError
+    if "\0" in "".join(names):  # what follows it is not looked at
         raise UnusualError
     members = {name: _value(name, value[name]) for name in names}
     return {name: inner for name, (inner, _) in members.items()}, sum(n for _, n in members.values())

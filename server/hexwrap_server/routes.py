@@ -11,7 +11,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Path, Query, Request
 from starlette.responses import Response, StreamingResponse
 
-from hexwrap_server import codec, describe, head
+from hexwrap_server import describe, head
 from hexwrap_server.answers import (
     JSON,
     json_response,
@@ -23,17 +23,17 @@ from hexwrap_server.bodies import read_body
 from hexwrap_server.engine import nobody
 from hexwrap_server.jobs import JobManager, unpacked
 from hexwrap_server.metrics import MEDIA_TYPE as METRICS_TYPE
-from hexwrap_server.parsing import loads, read_request
+from hexwrap_server.parsing import read_request
 from hexwrap_server.parts import PARTS, names
 from hexwrap_server.problems import HttpError, dumped, not_found
 from hexwrap_server.requests import Intake, ParsedRequest
-from hexwrap_server.schemas import parse_points
 from hexwrap_server.service import Service
 from hexwrap_server.settings import MIB
 from hexwrap_server.store import Job
 
-#: Bodies up to this size are read in a thread, larger ones in a process: reading holds the interpreter.
-SMALL_BODY = 4_000_000
+#: Bodies of up to so many bytes and quotation marks are read in a thread, others in a process: reading holds
+#: the interpreter, and a name that is out of place takes as long as many numbers.
+SMALL_BODY, FEW_QUOTES = 4_000_000, 50_000
 #: Longest time that ``?wait=`` holds an answer.
 MAX_WAIT = 60.0
 #: Seconds between two signs of life on an event stream.
@@ -119,9 +119,9 @@ async def events(request: Request, id: JobId) -> Response:
     manager = manager_of(request)
     manager.get(id)
     headers = {"Cache-Control": "no-store", "X-Accel-Buffering": "no"}
-    if request.scope.get(head.MARK):  # nobody listens
-        return Response(headers=headers, media_type="text/event-stream")
-    return StreamingResponse(_events(manager, id), headers=headers, media_type="text/event-stream")
+    nobody_listens = request.scope.get(head.MARK)
+    stream = iter(()) if nobody_listens else _events(manager, id)
+    return StreamingResponse(stream, headers=headers, media_type="text/event-stream")
 
 
 @router.get("/v1/jobs/{id}/result", openapi_extra=describe.RESULT)
@@ -182,13 +182,13 @@ async def post_surface(
 @router.post("/v1/jobs/{id}/lift", openapi_extra=describe.LIFT)
 async def lift(request: Request, id: JobId) -> Response:
     """Points of the unrolled domain → points of the surface."""
-    return await _carry(request, id, "lift", 2)
+    return await _carry(request, id, "lift")
 
 
 @router.post("/v1/jobs/{id}/flatten", openapi_extra=describe.FLATTEN)
 async def flatten(request: Request, id: JobId) -> Response:
     """Points near the surface → points of the unrolled domain."""
-    return await _carry(request, id, "flatten", 3)
+    return await _carry(request, id, "flatten")
 
 
 @router.get("/v1/jobs/{id}/files/{name}", openapi_extra=describe.FILES)
@@ -233,7 +233,7 @@ async def _read(request: Request) -> ParsedRequest:
         known.move_to_end(mark)
         return known[mark]
     limits = (settings.max_vertices, settings.max_panels)
-    if len(body) <= SMALL_BODY:
+    if len(body) <= SMALL_BODY and body.count(b'"') <= FEW_QUOTES:
         parsed = await service.read(read_request, nobody, body, *limits)
     else:
         parsed = await service.errand("hexwrap_server.parsing:read_request", body, *limits)
@@ -242,16 +242,14 @@ async def _read(request: Request) -> ParsedRequest:
     return service.remember_body(mark, parsed)
 
 
-async def _carry(request: Request, id: str, what: str, dimension: int) -> Response:
+async def _carry(request: Request, id: str, what: str) -> Response:
     service = service_of(request)
+    settings = service.settings
     job = service.manager.get(id)
-    body = await read_body(request, service.settings.max_body_mib)
-    points = await asyncio.to_thread(
-        lambda: parse_points(loads(body), dimension, service.settings.max_points)
-    )
+    body = await read_body(request, settings.max_body_mib)
     _finished(job)
     path = str(service.store.solution_path(job.identity))
-    data = await service.errand(f"hexwrap_server.placing:{what}", path, codec.encode(points))
+    data = await service.errand(f"hexwrap_server.placing:{what}", path, body, settings.max_points)
     return await packed_response(request, data)
 
 

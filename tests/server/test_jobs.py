@@ -6,6 +6,7 @@ import itertools
 import threading
 import time
 from collections.abc import Callable, Iterator
+from functools import reduce
 from pathlib import Path
 from typing import Any
 
@@ -168,7 +169,8 @@ def test_job_whose_worker_dies_fails_alone(behave: Behave) -> None:
     ("data", "told"),
     [
         ({"cells": 2**70, "of": [10**400]}, {"cells": 2.0**70, "of": [str(10**400)]}),
-        ({"bad": "\ud800"}, None),
+        ({"half": "\ud800"}, {"half": "?"}),
+        ({"deep": reduce(lambda inner, _: [inner], range(300), [])}, None),
     ],
 )
 def test_job_ends_whatever_its_problem_holds(behave: Behave, data: dict[str, Any], told: Any) -> None:
@@ -233,7 +235,7 @@ def test_jobs_survive_a_restart(tmp_path: Path) -> None:
 
 def test_work_that_killed_the_server_thrice_is_given_up(tmp_path: Path) -> None:
     with running(tmp_path, slow(60)) as client:
-        id = post(client)
+        id, same = post(client), post(client)
         until_running(client, id)
     store = Store(tmp_path)
     job = store.job(id)
@@ -245,8 +247,10 @@ def test_work_that_killed_the_server_thrice_is_given_up(tmp_path: Path) -> None:
         store.start_work(job.identity)
     store.close()
     with running(tmp_path) as client:
-        told = client.get(f"/v1/jobs/{id}").json()
-        assert (told["status"], told["problem"]["type"]) == ("failed", "/problems/too-many-attempts")
+        for each in (id, same):
+            told = client.get(f"/v1/jobs/{each}").json()
+            assert (told["status"], told["problem"]["type"]) == ("failed", "/problems/too-many-attempts")
+        assert client.post("/v1/solve", json=request()).status_code == 200
 
 
 def test_one_folder_serves_one_server(tmp_path: Path) -> None:

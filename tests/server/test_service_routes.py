@@ -7,9 +7,11 @@ from collections.abc import Iterator
 
 import ezdxf.filemanagement
 import numpy as np
+import orjson
 import pytest
 from ezdxf.entities import LWPolyline
 
+from hexwrap_server import quick, routes
 from tests.server.bodies import request, tube
 from tests.server.live import Live, finished, running
 
@@ -53,9 +55,10 @@ def test_head_is_get_without_the_body(client: Live, done: str, path: str) -> Non
 
 
 def test_head_of_events_does_not_wait(client: Live, done: str) -> None:
-    answer = client.head(f"/v1/jobs/{done}/events")
+    full, answer = (client.request(method, f"/v1/jobs/{done}/events") for method in ("GET", "HEAD"))
     assert (answer.status_code, answer.content) == (200, b"")
     assert answer.headers["content-type"].startswith("text/event-stream")
+    assert answer.headers.keys() == full.headers.keys()
     assert client.head("/v1/solve").status_code == 405
 
 
@@ -178,6 +181,11 @@ def test_refusals_are_problems(client: Live, method: str, path: str, status: int
     assert answer.json()["status"] == status
 
 
+def test_half_characters_are_told(client: Live) -> None:
+    answer = client.post("/v1/jobs", content=b'{"surface": {"\\ud800": [NaN]}}')
+    assert (answer.status_code, answer.json()["errors"][0]["pointer"]) == (422, "/surface/?/0")
+
+
 def test_unsolvable_surface_is_a_problem_with_its_faults(client: Live) -> None:
     open_disk = {"vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "faces": [[0, 1, 2]]}
     id = client.post("/v1/jobs", json={"surface": open_disk}).json()["id"]
@@ -215,6 +223,26 @@ def test_sheets_of_flat_drawings_have_the_size_asked_for(client: Live, done: str
 def test_result_file_is_the_result(client: Live, done: str) -> None:
     file = client.get(f"/v1/jobs/{done}/files/result.json")
     assert file.json() == client.get(f"/v1/jobs/{done}/result").json()
+
+
+@pytest.mark.parametrize(
+    ("path", "body"),
+    [
+        ("/v1/jobs/{}/lift", b'{"points": [[1, 2, 3]]}'),
+        ("/v1/jobs/{}/flatten", b'{"points": [[1, 2]]}'),
+        ("/v1/jobs", orjson.dumps({"surface": {}} | {f"name {i}": i for i in range(routes.FEW_QUOTES)})),
+    ],
+    ids=("lift", "flatten", "names"),
+)
+def test_what_may_take_long_to_read_is_read_in_a_process(
+    client: Live, done: str, monkeypatch: pytest.MonkeyPatch, path: str, body: bytes
+) -> None:
+    def not_here(*ignored: object) -> None:
+        raise AssertionError("it holds the interpreter")
+
+    monkeypatch.setattr(quick, "read", not_here)
+    answer = client.post(path.format(done), content=body)
+    assert (answer.status_code, answer.json()["type"]) == (422, "/problems/invalid-request")
 
 
 def test_drawings_are_carried_to_the_surface_and_back(client: Live, done: str) -> None:
