@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from hexwrap_solver.pattern.lattice import Lattice, Motion
 from hexwrap_solver.pattern.placement import Placement, edge_angle
 from hexwrap_solver.pattern.rows import Rows, rows_along
 from hexwrap_solver.pattern.sides import Lines, Sides, lines_of, sides_of
-from hexwrap_solver.pattern.size import size_spread, wanted_edge, width_per_cell
+from hexwrap_solver.pattern.size import edges_around, size_spread, wanted_edge, width_per_cell
 from hexwrap_solver.pattern.strain import Strain
 from hexwrap_solver.pattern.types import PatternSettings
 
@@ -98,10 +98,12 @@ class Straightening:
 
 def place_by_sides(straightening: Straightening, settings: PatternSettings) -> Placement:
     """Scale, centre and lines whose deformation distorts least, then that deformation."""
-    frame, lines = straightening.frame, straightening.lines
+    frame, lines = replace(straightening.frame, around=settings.around), straightening.lines
     system, strain = straightening.system, straightening.strain
     cmap, lattice = frame.cmap, frame.lattice
     angle = edge_angle(lattice, settings)
+    if cmap.deck.apex is None:
+        edges_around(cmap, lattice, settings, angle)
     size = lattice.edge / wanted_edge(cmap, lattice, settings, angle)
     spread = size_spread(settings)
     trials = [

@@ -10,7 +10,7 @@ from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.pattern.deform import System, deform, distortion_of
 from hexwrap_solver.pattern.lattice import Lattice, Motion
 from hexwrap_solver.pattern.placement import Placement, anchor_vertex, edge_angle
-from hexwrap_solver.pattern.size import ASKED, wanted_edge, width_per_cell
+from hexwrap_solver.pattern.size import ASKED, edges_around, wanted_edge, width_per_cell
 from hexwrap_solver.pattern.types import PatternSettings
 
 #: A translation g shorter than this part of the circumference is none.
@@ -87,6 +87,7 @@ def place_on_flat_ring(
     is short against the cells, the layout is deformed a little so that it closes up with the nearest.
     """
     frame = _frame(cmap, lattice, settings)
+    edges_around(cmap, lattice, settings, frame.angle)
     wanted = frame.factor * cmap.deck.translation
     shift = lattice.translation_near(wanted)
     nearest = complex(lattice.position(shift))

@@ -8,15 +8,12 @@ import numpy as np
 
 from hexwrap_solver.arrays import Complexes, Floats, Ints
 from hexwrap_solver.conformal.types import ConformalMap
-from hexwrap_solver.errors import PatternError
 from hexwrap_solver.pattern.lattice import Lattice, Motion
 from hexwrap_solver.pattern.placement import Placement, anchor_vertex, edge_angle, is_straight
 from hexwrap_solver.pattern.rows import Rows, rows_along
-from hexwrap_solver.pattern.size import size_spread, wanted_edge, width_per_cell
+from hexwrap_solver.pattern.size import edges_around, size_spread, width_per_cell
 from hexwrap_solver.pattern.types import PatternSettings
 
-#: No cell is more than this many edges wide.
-EDGES_PER_CELL = 3.0
 #: Of the numbers of cells around that come near what is asked, this many are compared.
 MOST_COUNTS = 200
 
@@ -89,13 +86,7 @@ def _strip(cmap: ConformalMap, anchor: int, loops: list[int]) -> _Strip:
 def _translations(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings, angle: float) -> Ints:
     """(k, 2) translations of the tiling that g may become, the nearest to what is asked first."""
     toward = complex(np.exp(-1j * angle) * lattice.position(lattice.steps[0]) / lattice.edge)
-    edges = cmap.circumference / wanted_edge(cmap, lattice, settings, angle)
-    if edges > EDGES_PER_CELL * settings.max_cells:
-        raise PatternError(
-            f"About {edges / EDGES_PER_CELL:,.0f} cells would be needed around the surface alone, over the "
-            f"limit of {settings.max_cells:,}: ask for a larger edge length or fewer cells around.",
-            data={"limit": settings.max_cells},
-        )
+    edges = edges_around(cmap, lattice, settings, angle)
     wanted = edges * lattice.edge * toward
     if not is_straight(lattice, angle):
         return (

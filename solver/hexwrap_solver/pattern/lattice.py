@@ -121,9 +121,13 @@ class Lattice:
     def ring_near(self, around: int, direction: complex) -> Ints:
         """Of all translations with that number of cells around, the nearest in direction."""
         distance = max(1, round(around / (2 if self.kind == "triangle" else 1)))
-        side = self.rotate(self.basis[0], 1) - self.basis[0]
-        arc = distance * self.basis[0] + np.arange(distance)[:, None] * side
-        ring = np.concatenate([self.rotate(arc, j) for j in range(self.order)])
+        e1, side = complex(self.position(self.basis[0])), self.rotate(self.basis[0], 1) - self.basis[0]
+        sector = int(np.floor(np.angle(direction / e1) / self.quantum))
+        toward = direction / e1 / self.unit**sector
+        # 1 + t·(ζ − 1) has the direction of ``toward``; the ring has points at all multiples of 1/distance.
+        t = -toward.imag / ((self.unit - 1).conjugate() * toward).imag
+        steps = np.clip(int(np.floor(t * distance)) + np.arange(-1, 3), 0, distance)
+        ring = self.rotate(distance * self.basis[0] + steps[:, None] * side, sector)
         return np.asarray(ring[np.argmin(abs(np.angle(self.position(ring) / direction)))])
 
     def cells_around(self, translation: Ints) -> Ints:

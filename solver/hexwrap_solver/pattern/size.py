@@ -6,11 +6,15 @@ import numpy as np
 
 from hexwrap_solver.arrays import Floats
 from hexwrap_solver.conformal.types import ConformalMap
+from hexwrap_solver.errors import PatternError
 from hexwrap_solver.pattern.lattice import Lattice
 from hexwrap_solver.pattern.types import PatternSettings
 
 #: Cells around where neither a number nor a length is asked for.
 DEFAULT_AROUND = 48
+
+#: No cell is more than this many edges wide.
+EDGES_PER_CELL = 3.0
 
 
 def face_areas(cmap: ConformalMap) -> tuple[Floats, Floats]:
@@ -46,6 +50,21 @@ def wanted_edge(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings,
         return settings.edge_length / mean_stretch(cmap)
     around = DEFAULT_AROUND if settings.around is None else settings.around
     return cmap.circumference / (around * width_per_cell(lattice, angle))
+
+
+def edges_around(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings, angle: float) -> float:
+    """How many edges of the wanted length the circumference is long, where g becomes a translation.
+
+    Raises PatternError where a single ring would already have too many cells, before anything counts them.
+    """
+    edges = cmap.circumference / wanted_edge(cmap, lattice, settings, angle)
+    if not edges <= EDGES_PER_CELL * settings.max_cells:
+        raise PatternError(
+            f"About {edges / EDGES_PER_CELL:,.0f} cells would be needed around the surface alone, over the "
+            f"limit of {settings.max_cells:,}: ask for a larger edge length or fewer cells around.",
+            data={"limit": settings.max_cells},
+        )
+    return edges
 
 
 #: How far the size may depart from an edge length asked for, or from the default, to fit the boundary better.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,7 +13,7 @@ from hexwrap_solver.errors import PatternError
 from hexwrap_solver.pattern import lay_pattern
 from hexwrap_solver.pattern.deform import distortion_of
 from hexwrap_solver.pattern.lattice import LATTICES
-from hexwrap_solver.pattern.place import loops_to_align, place_lattice
+from hexwrap_solver.pattern.place import Placing, loops_to_align, place_lattice
 from hexwrap_solver.pattern.rows import rows_along
 from hexwrap_solver.pattern.sides import sides_of
 from hexwrap_solver.pattern.types import PatternSettings
@@ -150,3 +152,20 @@ def test_another_number_around_than_asked_for_is_told() -> None:
             assert told == (pattern.around != around)
             others += told
     assert others
+
+
+@pytest.mark.parametrize("size", [{"around": 10**9}, {"edge_length": 1e-30}])
+def test_far_too_many_cells_around_are_refused_at_once(size):
+    """Nothing is made first that has as many entries as cells stand around."""
+    with pytest.raises(PatternError, match="around the surface alone"):
+        lay_pattern(MAPS["entrance"], PatternSettings(**size))
+
+
+def test_what_sizes_share_serves_every_number_around():
+    first = PatternSettings(around=60)
+    placing = Placing.of(MAPS["entrance"], LATTICES["hex"], first)
+    for around in (60, 96):
+        wanted = replace(first, around=around)
+        once, fresh = placing.at(wanted), place_lattice(MAPS["entrance"], LATTICES["hex"], wanted)
+        assert once.around == fresh.around == around
+        np.testing.assert_array_equal(once.place, fresh.place)

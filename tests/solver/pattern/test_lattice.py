@@ -90,3 +90,18 @@ def test_ring_near_has_the_number_of_cells_asked_for(kind, around):
     lattice = LATTICES[kind]
     for angle in np.linspace(0, 2 * np.pi, 17):
         assert lattice.cells_around(lattice.ring_near(around, complex(np.exp(1j * angle)))) == around
+
+
+@given(
+    kind=KINDS, around=st.integers(1, 300), angle=st.floats(-4.0, 4.0), size=st.sampled_from([1e-9, 1.0, 1e9])
+)
+@settings(max_examples=200, deadline=None)
+def test_ring_near_is_the_nearest_of_the_whole_ring(kind, around, angle, size):
+    lattice = LATTICES[kind]
+    direction = complex(size * np.exp(1j * angle))
+    found = lattice.ring_near(around, direction)
+    steps = np.arange(-around - 1, around + 2)
+    near = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2) @ lattice.basis
+    ring = near[lattice.cells_around(near) == lattice.cells_around(found)]
+    best = abs(np.angle(lattice.position(ring) / direction)).min()
+    assert abs(np.angle(complex(lattice.position(found)) / direction)) <= best + 1e-12
