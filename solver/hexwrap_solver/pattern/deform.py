@@ -166,6 +166,8 @@ class System:
         """(n,) movements within the freedom whose ∂/∂z̄ and ∂/∂z come nearest to the given ones, (m,), the
         triangles weighted with (m,). Or (n, k) for k of all, (m, k). Equal weights one after the other are
         factorised once."""
+        if not len(start):  # every vertex is a corner
+            return np.zeros((len(self.freedom.normal), *angles.shape[1:]), dtype=complex)
         weights = np.concatenate([weight, weight, SIZE * weight, SIZE * weight])
         if self._last is None or not np.array_equal(weight, self._last):
             squares = self._matrix.copy()

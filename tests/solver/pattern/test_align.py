@@ -169,3 +169,13 @@ def test_what_sizes_share_serves_every_number_around():
         once, fresh = placing.at(wanted), place_lattice(MAPS["entrance"], LATTICES["hex"], wanted)
         assert once.around == fresh.around == around
         np.testing.assert_array_equal(once.place, fresh.place)
+
+
+def test_a_mesh_of_corners_alone_has_nothing_to_deform():
+    """A frustum of six vertices: each stands where two lines meet."""
+    base = annuli.revolution(lambda z: 2 - z, np.linspace(0, 1, 2), 3)
+    angles = np.pi * np.repeat([4 / 3, 2 / 3], 3)
+    cmap = conformal_map(base.surface, BoundaryCondition(mode="angles", vertices=np.arange(6), angles=angles))
+    pattern = lay_pattern(cmap, PatternSettings(around=24))
+    check_closed(pattern)
+    assert np.isfinite(pattern.distortion)
