@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -73,6 +74,17 @@ class _Frame:
         place = (self.sides.place - (self.cmap.deck.apex or 0)) * self.unit
         side = self.sides.side
         return np.asarray(self.depth[side] - (self.normal[side].conj() * place).real)
+
+    @cached_property
+    def following(self) -> tuple[Ints, Ints]:
+        """(s,) the side after each, and the sheet on which the frame of the loop shows it: the first one
+        comes again a turn further."""
+        side, sheet = np.arange(1, self.sides.n + 1), np.zeros(self.sides.n, dtype=np.int64)
+        for loop in np.unique(self.sides.loop):
+            members = np.flatnonzero(self.sides.loop == loop)
+            side[members[-1]] = members[0]
+            sheet[members[-1]] = self.sides.sheet[self.sides.side == members[-1]][-1]
+        return side, sheet
 
 
 @dataclass(frozen=True)
@@ -165,7 +177,7 @@ def _trials_at(frame: _Frame, strain: Strain, scale: complex, cost_of_size: floa
         moved = np.append(moved, abs(scale))
         moved = strain.nearest(moved, rows.period, sides.n)
         line = depth + moved[: sides.n]
-        extra = cost_of_size + COST_OF_CORNERS * _misplaced_corners(lattice, sides, normal, line)
+        extra = cost_of_size + COST_OF_CORNERS * _misplaced_corners(frame, motion, line)
         trials.append(_Trial(scale, origin, motion, line, moved, extra))
     return trials
 
@@ -264,24 +276,24 @@ def symmetry_centres(lattice: Lattice, turns: int) -> list[tuple[Motion, complex
     return found
 
 
-def _misplaced_corners(lattice: Lattice, sides: Sides, normal: Complexes, line: Floats) -> float:
+def _misplaced_corners(frame: _Frame, motion: Motion, line: Floats) -> float:
     """Part of the corners between successive sides that stand badly.
 
     Corners stand well on nodes. Where three edges meet there, though, the lattice is mirrored at the
     bisector of 2π/3 and 4π/3, but not of π/3 and 5π/3: those stand well on the centres of cells.
     """
-    following = np.arange(1, sides.n + 1)
-    for loop in np.unique(sides.loop):
-        members = np.flatnonzero(sides.loop == loop)
-        following[members[-1]] = -1  # the last corner is the first one again, a turn further
-    inner = np.flatnonzero(following >= 0)
-    p, q = normal[inner], normal[following[inner]]
+    lattice = frame.lattice
+    following, sheet = frame.following
+    shift = lattice.position(motion.apply(np.zeros((len(sheet), 2), dtype=np.int64), sheet))
+    p, d = frame.normal, line
+    q = p[following] * np.exp(1j * lattice.quantum * motion.rotation(sheet))
+    e = line[following] + (q.conj() * shift).real
     area = (p.conj() * q).imag
-    meets = abs(area) > 1e-6
-    inner, p, q, area = inner[meets], p[meets], q[meets], area[meets]
-    if not len(inner):
+    inner = abs(area) > 1e-6
+    p, q, d, e, area = p[inner], q[inner], d[inner], e[inner], area[inner]
+    if not len(area):
         return 0.0
-    corner = 1j * (line[following[inner]] * p - line[inner] * q) / area
+    corner = 1j * (e * p - d * q) / area
     point = np.rint(lattice.coordinates(corner)).astype(np.int64)
     on_lattice = abs(lattice.position(point) - corner) < 1e-6
     on_node = on_lattice & lattice.is_node(point)

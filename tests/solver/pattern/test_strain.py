@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -92,3 +93,21 @@ def test_the_tip_of_an_entrance_stands_where_the_lattice_mirrors_it():
         corner = np.array(1j * (e * p - d * q) / (np.conj(p) * q).imag)
         costs[bool(LATTICE.is_node(np.rint(LATTICE.coordinates(corner)).astype(np.int64)))] = trial.extra
     assert costs[False] < costs[True]
+
+
+def test_corners_count_whichever_side_the_boundary_begins_with():
+    """Of the sides k, k + 1, … the last is followed by the first, a turn further."""
+    frame, _, _, _, trials = prepared("cone")
+    sides = frame.sides
+    n = int((sides.loop == 0).sum())
+    for trial in trials:
+        motion, turn = trial.motion, complex(np.exp(1j * LATTICE.quantum * trial.motion.turns))
+        sheet = int(frame.following[1][n - 1])
+        shift = complex(LATTICE.position(motion.apply(np.zeros(2, dtype=np.int64), np.array(sheet))))
+        normal, depth = frame.normal.copy(), trial.depth.copy()
+        normal[:n] = np.append(normal[1:n], normal[0] * turn**sheet)
+        depth[:n] = np.append(depth[1:n], depth[0] + (np.conj(normal[n - 1]) * shift).real)
+        begun_later = replace(frame, normal=normal)
+        assert align._misplaced_corners(begun_later, motion, depth) == pytest.approx(
+            align._misplaced_corners(frame, motion, trial.depth)
+        )
