@@ -41,8 +41,10 @@ def quantize(fitted: FittedPanels, settings: PanelSettings) -> Panels:
     if fitted.spare_limit is not None and fitted.spare_center is not None:
         choices.append(replace(fitted, limit=fitted.spare_limit, center=fitted.spare_center))
     limits = [np.minimum(choice.limit[regular], largest) for choice in choices]
-    _require_increment(limits[0], np.flatnonzero(regular), settings.increment)
-    limits = [limit for limit in limits if (floor_to(limit, settings.increment) > 0).all()]
+    usable = [k for k, limit in enumerate(limits) if (floor_to(limit, settings.increment) > 0).all()]
+    if not usable:
+        _require_increment(limits[0], np.flatnonzero(regular), settings.increment)
+    choices, limits = [choices[k] for k in usable], [limits[k] for k in usable]
     lengths = [
         choose_lengths(limit, settings.sizes, settings.size_cost, settings.increment, smallest)
         for limit in limits

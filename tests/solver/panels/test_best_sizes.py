@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import linprog
 from scipy.sparse import csr_array, random_array
 
-from hexwrap_solver.errors import ConvergenceError
+from hexwrap_solver.errors import ConvergenceError, PanelsError
 from hexwrap_solver.panels import fit_panels, measure, quantize
 from hexwrap_solver.panels import linear_programme as lp
 from hexwrap_solver.panels.types import PanelSettings
@@ -81,3 +83,19 @@ def test_few_classes_never_cover_less_than_those_of_the_inscribed_panels(chart, 
         shared = min(map(len, curves))
         assert (curves[0][:shared] <= curves[1][:shared] + 1e-12).all()
         assert measure(cmap, pattern, best).overlaps == 0
+
+
+def test_an_increment_that_only_the_inscribed_panels_reach_is_kept():
+    """All sizes together may cost the smallest panel up to a thousandth, which must not refuse what the
+    inscribed panels allow."""
+    chart = CHARTS["inverted catenoid"]
+    pattern, cmap = hex_pattern(chart, 18, 5, -0.6), grid_map(chart, 48, 30, -0.7, 1.8)
+    wanted = PanelSettings(target="best", joint=0.003)
+    fitted = fit_panels(cmap, pattern, wanted)
+    smallest = fitted.limit.min(), fitted.spare_limit.min()
+    assert smallest[0] < smallest[1]
+    made = quantize(fitted, replace(wanted, sizes=3, increment=float(np.mean(smallest))))
+    assert made.class_length[0] == pytest.approx(np.mean(smallest))
+    assert measure(cmap, pattern, made).overlaps == 0
+    with pytest.raises(PanelsError, match="increment"):
+        quantize(fitted, replace(wanted, increment=1.001 * float(smallest[1])))
