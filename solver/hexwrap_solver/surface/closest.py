@@ -9,8 +9,9 @@ from scipy.spatial import KDTree
 
 from hexwrap_solver.arrays import Floats, Ints
 
-#: Points searched together; bounds the memory of the search, not its result.
-CHUNK = 65536
+#: Points searched together, pairs of points and triangles looked at together, and compared together; they
+#: bound the memory of the search, not its result. A point on the axis of a tube is as near to whole rings.
+CHUNK, MOST_PAIRS, COMPARED = 65536, 1 << 22, 1 << 18
 
 #: At most so many points descend the tree together: as many as there are for each triangle, since the box of
 #: points that lie further apart than triangles meets too many of these.
@@ -86,15 +87,26 @@ class TriangleTree:
         bound = nearest_in_triangles(points, self.corners[first])[1]
         # Rounding of the box distances must not prune the guess itself.
         reach = bound * (1 + 1e-9) + np.finfo(float).tiny
-        point, leaf = self._within(points, reach)
+        found = self._within(points, reach)
+        if found is None:
+            halves = (self._nearest(half) for half in np.array_split(points, 2))
+            face, barycentric, distance = (np.concatenate(parts) for parts in zip(*halves, strict=True))
+            return face, barycentric, distance
+        point, leaf = found
         face = self.order[leaf]
-        barycentric, distance = nearest_in_triangles(points[point], self.corners[face])
+        barycentric, distance = np.zeros((len(face), 3)), np.zeros(len(face))
+        for i in range(0, len(face), COMPARED):
+            part = slice(i, i + COMPARED)
+            barycentric[part], distance[part] = nearest_in_triangles(
+                points[point[part]], self.corners[face[part]]
+            )
         best = np.lexsort((face, distance, point))
         best = best[np.diff(point[best], prepend=-1) > 0]
         return face[best], barycentric[best], distance[best]
 
-    def _within(self, points: Floats, reach: Floats) -> tuple[Ints, Ints]:
-        """All pairs (point, leaf) whose box comes within reach of the point.
+    def _within(self, points: Floats, reach: Floats) -> tuple[Ints, Ints] | None:
+        """All pairs (point, leaf) whose box comes within reach of the point; None where several points have
+        too many.
 
         Points that are neighbours along the curve descend the tree together, in one box.
         """
@@ -112,6 +124,8 @@ class TriangleTree:
                 meets = self.low[level][axis][node] <= high[axis][group]
                 meets &= self.high[level][axis][node] >= low[axis][group]
                 group, node = group[meets], node[meets]
+            if len(group) * together > MOST_PAIRS and len(points) > 1:
+                return None
         size = np.minimum(together, len(points) - start)[group]
         point = np.repeat(start[group] - np.cumsum(size) + size, size) + np.arange(size.sum())
         leaf = np.repeat(node, size)

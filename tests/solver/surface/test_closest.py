@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from hexwrap_solver.surface import closest
 from hexwrap_solver.surface.closest import TriangleTree, nearest_in_triangles
 
 
@@ -49,3 +50,24 @@ def test_points_of_the_mesh_have_distance_zero_whatever_the_scale():
     faces = rng.integers(0, 50, (80, 3))
     found = TriangleTree.build(vertices, faces).nearest(vertices[faces[:, 1]])
     assert found.distance == pytest.approx(0.0, abs=1e-9)
+
+
+def test_the_result_does_not_depend_on_how_many_pairs_are_looked_at_together(monkeypatch):
+    """Points on the axis of a tube are as near to whole rings of its triangles."""
+    angle = 2 * np.pi * np.arange(40) / 40
+    ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    vertices = np.concatenate([np.insert(ring, 2, z, axis=1) for z in np.linspace(0, 2, 21)])
+    a = (np.arange(20)[:, None] * 40 + np.arange(40)).ravel()
+    b = (np.arange(20)[:, None] * 40 + (np.arange(40) + 1) % 40).ravel()
+    faces = np.concatenate([np.stack([a, b, b + 40], axis=1), np.stack([a, b + 40, a + 40], axis=1)])
+    points = np.zeros((300, 3))
+    points[:, 2] = np.linspace(-0.1, 2.1, 300)
+    tree = closest.TriangleTree.build(vertices, faces)
+    whole = tree.nearest(points)
+    np.testing.assert_allclose(whole.distance, brute_force(points, vertices, faces), rtol=1e-12)
+    for pairs in (1, 1000):
+        monkeypatch.setattr(closest, "MOST_PAIRS", pairs)
+        monkeypatch.setattr(closest, "COMPARED", pairs)
+        parts = tree.nearest(points)
+        np.testing.assert_array_equal(parts.face, whole.face)
+        np.testing.assert_array_equal(parts.distance, whole.distance)
