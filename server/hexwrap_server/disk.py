@@ -21,14 +21,14 @@ log = logging.getLogger("hexwrap.disk")
 
 class StorageError(WorkError):
     slug = "storage"
-    title = "The server cannot write its files"
+    title = "The server cannot use its files"
 
     @classmethod
     def of(cls, error: Exception) -> StorageError:
         reason = getattr(error, "strerror", None) or error
         return cls(
-            f"The server could not write to its data folder ({reason}); make room there, or start it with "
-            "another --data, and send the request again."
+            f"The server could not read or write in its data folder ({reason}); make room there, or start it "
+            "with another --data, and send the request again."
         )
 
 

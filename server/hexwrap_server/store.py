@@ -101,7 +101,7 @@ class DamagedError(Exception):
 class Store:
     """All methods are short; those that read or write whole files say so.
 
-    Those that write raise StorageError where the disk does not take it.
+    All raise StorageError where the disk does not take or give it.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -150,13 +150,13 @@ class Store:
     # works
 
     def work(self, identity: str) -> Work | None:
-        row = self._db.execute(
+        rows = self._rows(
             "SELECT identity, surface, wanted, attempts, parts, timings FROM works WHERE identity = ?",
-            (identity,),
-        ).fetchone()
-        if row is None:
+            identity,
+        )
+        if not rows:
             return None
-        identity, surface, wanted, attempts, parts, timings = row
+        identity, surface, wanted, attempts, parts, timings = rows[0]
         try:
             asked = codec.decode(wanted)
         except codec.CodecError as error:
@@ -244,17 +244,17 @@ class Store:
             )
 
     def job(self, id: str) -> Job | None:
-        row = self._db.execute(f"SELECT {_COLUMNS} FROM jobs WHERE id = ?", (id,)).fetchone()
-        return row and _job(row)
+        rows = self._rows(f"SELECT {_COLUMNS} FROM jobs WHERE id = ?", id)
+        return _job(rows[0]) if rows else None
 
     def jobs(self, limit: int) -> list[Job]:
         """Newest first."""
-        rows = self._db.execute(f"SELECT {_COLUMNS} FROM jobs ORDER BY number DESC LIMIT ?", (limit,))
+        rows = self._rows(f"SELECT {_COLUMNS} FROM jobs ORDER BY number DESC LIMIT ?", limit)
         return [_job(row) for row in rows]
 
     def unfinished(self) -> list[Job]:
         """Oldest first."""
-        rows = self._db.execute(
+        rows = self._rows(
             f"SELECT {_COLUMNS} FROM jobs WHERE status IN ('queued', 'running') ORDER BY number"
         )
         return [replace(_job(row), status="queued", stage="", progress=0.0, started=None) for row in rows]
@@ -269,9 +269,9 @@ class Store:
         busy = "SELECT identity FROM jobs WHERE status IN ('queued', 'running')"
         with self._transaction():
             self._db.execute(f"DELETE FROM jobs WHERE {over} AND finished < ?", (oldest,))
-            listed = self._db.execute(
+            listed = self._rows(
                 f"SELECT identity, size, used FROM works WHERE identity NOT IN ({busy}) ORDER BY used DESC"
-            ).fetchall()
+            )
             gone, total = [], 0
             for identity, size, used in listed:
                 total += size
@@ -279,7 +279,7 @@ class Store:
                     gone.append((identity,))
             self._db.executemany(f"DELETE FROM jobs WHERE identity = ? AND {over}", gone)
             self._db.executemany("DELETE FROM works WHERE identity = ?", gone)
-        return dict(self._db.execute("SELECT identity, surface FROM works"))
+        return dict(self._rows("SELECT identity, surface FROM works"))
 
     def prune_files(self, works: dict[str, str], result_bytes: float, stage_bytes: float) -> None:
         """Delete the files that no work needs any more. Touches many files."""
@@ -287,6 +287,12 @@ class Store:
         prune(self.results, 0.0, keep=lambda name: name.partition(".")[0] in works)
         prune(self.surfaces, result_bytes, keep=lambda name: name.partition(".")[0] in surfaces)
         prune(self.stages, stage_bytes)
+
+    def _rows(self, statement: str, *values: Any) -> list[Any]:
+        try:
+            return self._db.execute(statement, values).fetchall()
+        except sqlite3.DatabaseError as error:
+            raise StorageError.of(error) from error
 
     def _write(self, statement: str, *values: Any) -> None:
         with self._transaction():
@@ -298,7 +304,7 @@ class Store:
             self._db.execute("BEGIN IMMEDIATE")
             yield
             self._db.execute("COMMIT")
-        except sqlite3.OperationalError as error:
+        except sqlite3.DatabaseError as error:
             self._roll_back()
             raise StorageError.of(error) from error
         except BaseException:
@@ -307,7 +313,7 @@ class Store:
 
     def _roll_back(self) -> None:
         if self._db.in_transaction:  # on a full disk SQLite may have done so already
-            with contextlib.suppress(sqlite3.OperationalError):
+            with contextlib.suppress(sqlite3.DatabaseError):
                 self._db.execute("ROLLBACK")
 
 

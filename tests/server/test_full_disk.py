@@ -27,11 +27,14 @@ class Full:
     def __init__(self, real: sqlite3.Connection) -> None:
         self._real = real
         self.is_full = False
+        self.is_broken = False
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._real, name)
 
     def _refuse(self, statement: str) -> None:
+        if self.is_broken:
+            raise sqlite3.DatabaseError("database disk image is malformed")
         if self.is_full and statement.split()[0] in ("INSERT", "UPDATE", "DELETE"):
             raise sqlite3.OperationalError("database or disk is full")
 
@@ -128,6 +131,25 @@ def test_running_job_can_be_stopped_on_a_full_disk(server: tuple[Live, Full, Els
     disk.is_full = True
     assert client.delete(f"/v1/jobs/{id}").status_code == 204
     assert client.get(f"/v1/jobs/{id}").json()["status"] == "cancelled"
+
+
+def test_jobs_end_and_requests_are_refused_when_the_database_breaks(
+    server: tuple[Live, Full, Elsewhere],
+) -> None:
+    client, disk, engine = server
+    done = client.post("/v1/jobs", json=request()).json()["id"]
+    finished(client, done)
+    engine.seconds = 1.0
+    id = client.post("/v1/jobs", json=request(pattern={"around": 8})).json()["id"]
+    until_running(client, id)
+    disk.is_broken = True
+    job = finished(client, id, seconds=10)
+    assert (job["status"], job["problem"]["type"]) == ("failed", "/problems/storage")
+    for method, path in (("GET", "/v1/jobs"), ("GET", f"/v1/jobs/{done}/result"), ("POST", "/v1/jobs")):
+        answer = client.request(method, path, json=request())
+        assert (answer.status_code, answer.json()["type"]) == (503, "/problems/storage"), path
+    disk.is_broken = False
+    assert client.get(f"/v1/jobs/{done}/result").status_code == 200
 
 
 def test_server_that_dies_before_the_end_is_written_runs_the_job_again(tmp_path: Path) -> None:
