@@ -16,6 +16,10 @@ from hexwrap_solver.pattern.deform import System
 from hexwrap_solver.pattern.sides import Lines, Sides
 
 
+#: Moves that are solved for together: a compromise of time and memory.
+TOGETHER = 8
+
+
 @dataclass(frozen=True)
 class Strain:
     """Columns: one per side, moved by 1 into the domain; on translations two more, for the deck
@@ -31,19 +35,15 @@ class Strain:
     def of(cls, system: System, sides: Sides, lines: Lines, turned: Floats) -> Strain:
         """system: for the sides' lines. turned: (k,) how much deeper, at scale 1, the sides' mean depth is
         than their vertices are."""
-        change, freedom = system.change, system.freedom
-        area = change.area / change.area.sum()
+        area = system.change.area / system.change.area.sum()
         moves = [(np.where(lines.side == k, 1.0, 0.0), 0j) for k in range(sides.n)]
         if system.cmap.deck.apex is None:
             moves += [(-(lines.normal.conj() * lines.sheet * step).real, step) for step in (1 + 0j, 1j)]
         moves.append((np.where(lines.side >= 0, turned[lines.entry], 0.0), 0j))
-        fixed = np.stack([freedom.place_on_lines(depth) for depth, _ in moves], axis=1)
-        shifts = [change.of_shift(np.asarray(system.cmap.sheet * step)) for _, step in moves]
-        shift = np.stack([one for one, _ in shifts], axis=1), np.stack([two for _, two in shifts], axis=1)
-        angles, sizes = change.of(fixed, shift)
-        still = np.zeros((freedom.basis.shape[1], len(moves)))
-        moved = system.solve(np.sqrt(area), -angles, -sizes, still)
-        response = change.of(fixed + moved, shift)[0]
+        blocks = [
+            _responses(system, np.sqrt(area), moves[i : i + TOGETHER]) for i in range(0, len(moves), TOGETHER)
+        ]
+        response = np.concatenate(blocks, axis=1)
         squares = ((response.conj() * area[:, None]).T @ response).real
         return cls(response, np.asarray(area), np.asarray(squares))
 
@@ -68,3 +68,14 @@ class Strain:
                 break
             moved[k] -= period * np.sign(slope[k])
         return moved
+
+
+def _responses(system: System, weight: Floats, moves: list[tuple[Floats, complex]]) -> Complexes:
+    """(m, moves) ∂/∂z̄ of the least deformations for moves of the lines (n, 2) and of g."""
+    change, freedom = system.change, system.freedom
+    fixed = np.stack([freedom.place_on_lines(depth) for depth, _ in moves], axis=1)
+    shifts = [change.of_shift(np.asarray(system.cmap.sheet * step)) for _, step in moves]
+    shift = np.stack([one for one, _ in shifts], axis=1), np.stack([two for _, two in shifts], axis=1)
+    angles, sizes = change.of(fixed, shift)
+    still = np.zeros((freedom.basis.shape[1], len(moves)))
+    return change.of(fixed + system.solve(weight, -angles, -sizes, still), shift)[0]
