@@ -15,7 +15,6 @@ from hexwrap_solver.arrays import Complexes, Floats
 from hexwrap_solver.pattern.deform import System
 from hexwrap_solver.pattern.sides import Lines, Sides
 
-
 #: Moves that are solved for together: a compromise of time and memory.
 TOGETHER = 8
 
