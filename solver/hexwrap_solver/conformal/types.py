@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -133,5 +134,11 @@ class ConformalMap:
         return "cylinder" if abs(self.deck.angle) < 1e-9 else "cone"
 
     def corners(self) -> Complexes:
-        """(m, 3) where the corners of every face stand in the unrolled domain."""
-        return self.deck.apply(self.uv[self.surface.faces], self.sheet)
+        """(m, 3) where the corners of every face stand in the unrolled domain. Not to be written to."""
+        return self._corners
+
+    @cached_property
+    def _corners(self) -> Complexes:
+        corners = self.deck.apply(self.uv[self.surface.faces], self.sheet)
+        corners.flags.writeable = False
+        return corners

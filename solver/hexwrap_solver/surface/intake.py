@@ -78,6 +78,7 @@ def _build(sent: SentMesh, vertices: Floats, triangles: Ints, polygon: Ints, lab
     )
     _drop_collapsed(draft)
     order, first = _drop_duplicates(draft, n)
+    grouped = draft.faces
     names = SentNames(np.arange(n), draft.polygon)
     check_edges(draft.faces, order, first, names)
     twin = _orient(draft, twins_of(order, first), n, names)
@@ -93,7 +94,9 @@ def _build(sent: SentMesh, vertices: Floats, triangles: Ints, polygon: Ints, lab
     if sent.normals is not None:
         normals, sentence = sent_normals(normals, sent.normals, stand)
         draft.repairs.extend(sentence)
-    return Surface(vertices[index], faces, loops, index, stand, normals, tuple(draft.repairs))
+    surface = Surface(vertices[index], faces, loops, index, stand, normals, tuple(draft.repairs))
+    # Leaving out vertices keeps the order of the others, and so that of the edges.
+    return surface.knowing((order, first)) if draft.faces is grouped else surface
 
 
 def _mark(faces: Ints, n: int) -> Bools:

@@ -81,6 +81,11 @@ class Surface:
         """The half-edges in the order of their edges, see ``topology.edge_groups``."""
         return edge_groups(self.faces, len(self.vertices))
 
+    def knowing(self, groups: tuple[Ints, Ints]) -> Surface:
+        """The surface itself, told its edge groups by one who has them already."""
+        self.__dict__["edge_groups"] = groups
+        return self
+
     @cached_property
     def twin(self) -> Ints:
         """(3m,) the half-edge on the other side of each, −1 at the boundary. Not to be written to."""

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hexwrap_solver.surface import Surface, surface_from_mesh
-from hexwrap_solver.surface.topology import edge_lengths, face_normals
+from hexwrap_solver.surface.topology import edge_groups, edge_lengths, face_normals
 from tests.solver.surface.shapes import mesh, triangles, tube, twisted
 
 
@@ -270,3 +270,17 @@ def test_the_outside_of_the_tube_is_outside() -> None:
     vertices, quads = tube()
     assert area_vector(surface_from_mesh(mesh(vertices, quads))) > 0
     assert area_vector(surface_from_mesh(mesh(vertices, quads[:, ::-1]))) < 0
+
+
+@pytest.mark.parametrize("unused", [False, True])
+def test_edge_groups_that_are_handed_on_are_those_of_the_surface(unused: bool) -> None:
+    vertices, quads = tube(9, 5)
+    faces = triangles(quads)
+    if unused:
+        vertices, faces = np.insert(vertices, 7, 99.0, axis=0), faces + (faces >= 7)
+    for turned in (faces, np.concatenate([faces[:3, ::-1], faces[3:]])):
+        surface = surface_from_mesh(mesh(vertices, turned))
+        for found, expected in zip(
+            surface.edge_groups, edge_groups(surface.faces, len(surface.vertices)), strict=True
+        ):
+            np.testing.assert_array_equal(found, expected)
