@@ -11,7 +11,7 @@ import os
 import time
 from collections import OrderedDict
 from collections.abc import Callable
-from dataclasses import fields, is_dataclass
+from dataclasses import is_dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -79,9 +79,17 @@ class StageCache:
             log.warning("a stage could not be written to the cache: %s", error)
 
     def _keep(self, key: str, value: Any) -> None:
+        self._weigh(key, value)
+        later.put_off(lambda: self._weigh_again(key))  # with what later stages will have derived from it
+
+    def _weigh_again(self, key: str) -> None:
+        if key in self._kept:
+            self._weigh(key, self._kept[key][0])
+
+    def _weigh(self, key: str, value: Any) -> None:
         size = size_of(value)
+        self._used += size - self._kept.get(key, (None, 0))[1]
         self._kept[key] = (value, size)
-        self._used += size
         while self._used > self.memory_bytes and self._kept:
             self._used -= self._kept.popitem(last=False)[1][1]
 
@@ -153,11 +161,11 @@ class CachingRunner:
 
 
 def size_of(value: Any) -> int:
-    """Bytes of the arrays inside a dataclass of arrays."""
+    """Bytes of the arrays inside a dataclass of arrays, and of those that it has derived and keeps."""
     if isinstance(value, np.ndarray):
         return value.nbytes
     if isinstance(value, (list, tuple)):
         return sum(size_of(v) for v in value)
     if is_dataclass(value):
-        return 64 + sum(size_of(getattr(value, f.name)) for f in fields(value))
+        return 64 + sum(size_of(v) for v in list(vars(value).values()))
     return 64

@@ -13,6 +13,7 @@ import logging
 import threading
 import uuid
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from distributed import Client, get_worker
@@ -25,6 +26,8 @@ from hexwrap_solver.errors import HexwrapError
 CHECK_INTERVAL = 0.5
 #: Seconds within which the scheduler has to answer at start.
 CONNECT_SECONDS = 15
+#: Seconds that we wait for the cluster to stop something.
+STOP_SECONDS = 1.0
 _TOPIC = "hexwrap-progress"
 log = logging.getLogger("hexwrap.dask")
 
@@ -63,14 +66,15 @@ class DaskEngine:
     async def stop(self) -> None:
         if self._looking is not None:
             self._looking.cancel()
-        if self._client is not None:
-            for _ in range(20):  # calls that were cancelled are just being killed
-                if not self._listeners:
-                    break
-                await asyncio.sleep(0.1)
-            with contextlib.suppress(OSError):
-                await self._client.run(_close_idle, on_error="ignore")
-            await self._client.close()
+        if self._client is None:
+            return
+        for _ in range(20):  # calls that were cancelled are just being killed
+            if not self._listeners:
+                break
+            await asyncio.sleep(0.1)
+        for end in (partial(self._client.run, _close_idle, on_error="ignore"), self._client.close):
+            with contextlib.suppress(OSError, RuntimeError):
+                await asyncio.wait_for(end(), STOP_SECONDS)
 
     async def run(self, function: str, *arguments: Any, report: Report, seconds: float, mib: float) -> Any:
         if not self._machines:
@@ -120,8 +124,9 @@ class DaskEngine:
     async def _kill(self, future: Any, ticket: str) -> None:
         assert self._client is not None
         with contextlib.suppress(OSError, RuntimeError, asyncio.CancelledError):
-            await future.cancel(force=True)
-            await self._client.run(_stop, ticket, on_error="ignore")
+            async with asyncio.timeout(STOP_SECONDS):
+                await future.cancel(force=True)
+                await self._client.run(_stop, ticket, on_error="ignore")
 
     async def _connect(self) -> None:
         client: Any = Client

@@ -75,7 +75,9 @@ class JobManager:
     @property
     def caching(self) -> CacheSettings:
         folder = str(self.store.stages) if self._engine.shares_disk else ""
-        return CacheSettings(folder, int(self._settings.memory_cache_mib * MIB))
+        # what is remembered counts towards the limit of the next job
+        mib = min(self._settings.memory_cache_mib, self._settings.job_mib / 8)
+        return CacheSettings(folder, int(mib * MIB))
 
     @property
     def n_queued(self) -> int:

@@ -55,7 +55,9 @@ class Settings:
     cache_mib: float = _setting(
         2048.0, "disk space for remembered stages in MiB; the longest unused go first"
     )
-    memory_cache_mib: float = _setting(256.0, "remembered stages in the memory of each worker, in MiB")
+    memory_cache_mib: float = _setting(
+        256.0, "remembered stages in the memory of each worker, in MiB; at most an eighth of --job-mib"
+    )
     log_level: str = _setting("info", "debug, info, warning or error", "LEVEL")
 
     @classmethod

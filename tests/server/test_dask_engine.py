@@ -124,6 +124,33 @@ def test_killed_machine_costs_its_own_job_only(tmp_path: Path) -> None:
     run(story())
 
 
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.skipif(os.name == "nt", reason="kill -STOP of POSIX")
+def test_machine_that_does_not_answer_keeps_nobody(tmp_path: Path) -> None:
+    from hexwrap_server.dask_engine import DaskEngine
+
+    async def story() -> None:
+        async with cluster(1) as made:
+            e, mark = DaskEngine(made.scheduler_address), tmp_path / "one"
+            await e.start()
+            task = asyncio.create_task(call(e, "sleep", 8, str(mark)))
+            await made_by([mark])
+            os.kill(made.workers[0].pid, signal.SIGSTOP)
+            try:
+                start = time.monotonic()
+                task.cancel()
+                await asyncio.wait([task], timeout=10)
+                assert time.monotonic() - start < 2
+                stop = asyncio.create_task(e.stop())
+                await asyncio.wait([stop], timeout=10)
+                assert time.monotonic() - start < 5
+            finally:
+                os.kill(made.workers[0].pid, signal.SIGCONT)
+            await stop
+
+    run(story())
+
+
 @pytest.mark.long
 @pytest.mark.filterwarnings("ignore")
 def test_lost_scheduler_fails_its_job_and_is_found_again(tmp_path: Path) -> None:

@@ -14,6 +14,9 @@ import httpx
 import pytest
 
 from hexwrap_server.engine import ProcessEngine
+from hexwrap_server.jobs import JobManager
+from hexwrap_server.metrics import Metrics
+from hexwrap_server.settings import MIB, Settings
 from hexwrap_server.store import FolderInUseError, Store
 from tests.server.bodies import request, tube
 from tests.server.live import Live, finished, running
@@ -194,6 +197,14 @@ def test_job_over_a_limit_fails(tmp_path: Path, settings: dict[str, Any], slug: 
         assert (job["status"], job["problem"]["type"]) == ("failed", f"/problems/{slug}")
         assert client.get(f"/v1/jobs/{id}/result").status_code == 422
         assert client.get("/health").json()["running"] == 0
+
+
+@pytest.mark.parametrize(("job_mib", "cached"), [(400.0, 50), (8192.0, 256)])
+def test_what_is_remembered_leaves_room_for_the_next_job(tmp_path: Path, job_mib: float, cached: int) -> None:
+    store = Store(tmp_path)
+    manager = JobManager(store, ProcessEngine(1), Settings(job_mib=job_mib), Metrics())
+    assert manager.caching.memory_bytes == cached * MIB
+    store.close()
 
 
 def test_wait_holds_the_answer_and_lets_go(behave: Behave) -> None:

@@ -155,6 +155,18 @@ def test_memory_has_a_limit_and_keeps_the_last_used() -> None:
     assert cache.get("large") is None
 
 
+def test_memory_counts_what_was_derived_from_a_stage() -> None:
+    surface = cylinder().map.surface
+    plain = size_of(surface)
+    cache = StageCache(None, 2 * plain)
+    cache.put("surface", surface)
+    assert cache.get("surface") is not None
+    assert surface.tree is not None
+    assert size_of(surface) > 2 * plain
+    later.catch_up()
+    assert cache.get("surface") is None
+
+
 def test_progress_never_goes_back() -> None:
     heard: list[float] = []
     run = CachingRunner(StageCache(None, 0), lambda stage, fraction, what: heard.append(fraction))
