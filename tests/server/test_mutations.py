@@ -218,7 +218,7 @@ def answered(client: httpx.Client, seed: int) -> int:
 def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[httpx.Client]:
     port = free_port()
     with (
-        served(tmp_path_factory.mktemp("data"), port, workers=2, job_seconds=250.0, max_panels=20_000),
+        served(tmp_path_factory.mktemp("data"), port, workers=2, job_seconds=60.0, max_panels=20_000),
         httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=300, trust_env=False) as client,
     ):
         yield client
