@@ -33,23 +33,25 @@ def cut_open(surface: Surface) -> Cut:
     """The cut along a shortest path of edges."""
     n, twin = len(surface.vertices), surface.twin.copy()
     start, end = half_edges(surface.faces)
-    path = _shortest_path(start, end, twin, surface.loops, n)
+    path = _shortest_path(surface)
     left = _left_of(path, start, end, n)
     twin[twin[left]] = -1
     twin[left] = -1
     return Cut(path, _sheets(start, path, twin, left, n), twin)
 
 
-def _shortest_path(start: Ints, end: Ints, twin: Ints, loops: tuple[Ints, Ints], n: int) -> Ints:
+def _shortest_path(surface: Surface) -> Ints:
     """Fewest edges from any vertex of loop 0 to any of loop 1, through an extra vertex n tied to loop 0."""
-    rim = np.flatnonzero(twin < 0)  # all other edges have a half-edge each way
-    tail = np.concatenate([start, end[rim], np.full(len(loops[0]), n)])
-    head = np.concatenate([end, start[rim], loops[0]])
-    graph = sparse.csr_matrix((np.ones(len(tail), dtype=np.int8), (tail, head)), shape=(n + 1, n + 1))
-    order, previous = breadth_first_order(graph, n)
-    rank = np.full(n + 1, n + 1)
-    rank[order] = np.arange(len(order))
-    path = [int(loops[1][np.argmin(rank[loops[1]])])]
+    n, (begin, goal) = len(surface.vertices), surface.loops
+    low, high = surface.edge_ends  # in the order of their lower ends, as rows of a matrix want them
+    rows = np.concatenate([np.searchsorted(low, np.arange(n + 1)), [len(low) + len(begin)]])
+    graph = sparse.csr_matrix(
+        (np.ones(rows[-1], dtype=np.int8), np.concatenate([high, begin]), rows), shape=(n + 1, n + 1)
+    )
+    order, previous = breadth_first_order(graph, n, directed=False)
+    rank = np.empty(n + 1, dtype=np.int64)
+    rank[order] = np.arange(n + 1)
+    path = [int(goal[np.argmin(rank[goal])])]
     while previous[path[-1]] != n:
         path.append(int(previous[path[-1]]))
     return np.array(path[::-1], dtype=np.int64)

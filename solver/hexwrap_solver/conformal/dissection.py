@@ -17,9 +17,10 @@ from hexwrap_solver.arrays import Bools, Floats, Ints
 #: Parts of about this many vertices are not cut any further: dense algebra is faster there.
 LEAF = 160
 #: Steps that bring each cutting plane to its part's median.
-MEDIAN_STEPS = 2
-#: Planes are found from every fourth unknown: one that is a little off costs nothing.
-SAMPLE = 4
+MEDIAN_STEPS = 3
+#: Planes are found from about so many unknowns per part, and from one in four of all at most: a plane that is
+#: a little off costs nothing.
+SAMPLE, SHARE = 512, 4
 
 
 @dataclass(frozen=True)
@@ -50,11 +51,14 @@ def dissect(points: Floats, rows: Ints, columns: Ints) -> Dissection:
     level = depth - np.frexp(differing[cut].astype(float))[1]
     by_level = np.argsort(level.astype(np.uint8), kind="stable")
     bounds = np.searchsorted(level[by_level], np.arange(depth + 1))
+    mark = np.zeros(len(points), dtype=bool)
     for k in range(depth):
         edge = cut[by_level[bounds[k] : bounds[k + 1]]]
         first, second = rows[edge], columns[edge]
         across = ~(done[first] | done[second])
-        ends = np.unique(np.concatenate([first[across], second[across]]))
+        mark[first[across]] = mark[second[across]] = True
+        ends = np.flatnonzero(mark)
+        mark[ends] = False
         separator = ends[_on_thinner_side(part[ends] >> (depth - k - 1), k)]
         done[separator] = True
         node[separator] = 2**k - 1 + (part[separator] >> (depth - k))
@@ -74,14 +78,18 @@ def _parts(points: Floats, placed: Bools, depth: int) -> Ints:
     part = np.zeros(len(points), dtype=np.int64)
     if not depth:
         return part
+    centred = np.ascontiguousarray(points.T)
+    everywhere = np.flatnonzero(placed)
+    random = np.random.default_rng(0)  # whatever the numbering, and the same every time
+    sample = everywhere[random.integers(0, len(everywhere), len(everywhere) // SHARE)]
     # Second moments far from the origin lose their digits.
-    centred = np.where(placed, (points - points[placed].mean(axis=0)).T, 0.0)
-    sample = np.flatnonzero(placed)[::SAMPLE]
-    sampled, of = centred[:, sample], np.zeros(len(sample), dtype=np.int64)
+    centred -= centred[:, sample].mean(axis=1)[:, None]
+    centred[:, ~placed] = 0.0
+    sampled = centred[:, sample]
     for level in range(depth):
-        axis, threshold = _planes(sampled, of, 2**level)
+        k = min(SAMPLE << level, len(sample))
+        axis, threshold = _planes(sampled[:, :k], part[sample[:k]], 2**level)
         part = 2 * part + _beyond(centred, axis, threshold, part)
-        of = part[sample]
     return part
 
 
@@ -104,7 +112,7 @@ def _planes(points: Floats, part: Ints, parts: int) -> tuple[Floats, Floats]:
             spread[:, i, j] = spread[:, j, i] = product - mean[i] * mean[j]
     variance, axes = np.linalg.eigh(spread)
     axis = np.ascontiguousarray(axes[:, :, 2].T)
-    along = (points * axis[:, part]).sum(axis=0)
+    along = points[0] * axis[0][part] + points[1] * axis[1][part] + points[2] * axis[2][part]
     threshold = (axis * mean).sum(axis=0)
     # From the mean to the median by Newton's method, as if the density at it were the normal one.
     step = np.sqrt(2 * np.pi * np.maximum(variance[:, 2], 0))

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexwrap_solver.arrays import Bools, Floats, Ints
+from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints
 from hexwrap_solver.conformal.types import Targets
-from hexwrap_solver.surface.topology import edge_lengths, half_edges
+from hexwrap_solver.surface.topology import edge_lengths
 from hexwrap_solver.surface.types import Surface
 
 
@@ -40,6 +40,12 @@ class Corners:
     excess: Floats
     radius: Floats
     broken: Bools
+
+    def directions(self) -> Complexes:
+        """(m,) e^{iα} at corner 0, from tan(α/2) = r/s."""
+        half = np.empty(self.angle.shape[1], dtype=complex)
+        half.real, half.imag = self.excess[0], self.radius
+        return np.asarray(half / np.conj(half))
 
     def cotangent(self) -> Floats:
         """cot α = (s² − r²) / (2 r s), from tan(α/2) = r/s; no cancellation beyond that in s itself."""
@@ -84,7 +90,7 @@ class Energy:
         self.n = len(surface.vertices)
         self._vertices = surface.vertices
         self.corner = np.ascontiguousarray(surface.faces.T)
-        self.lengths = opposite_lengths(surface.vertices, surface.faces)
+        self.lengths = np.ascontiguousarray(surface.lengths.T[[1, 2, 0]])
         self.dof, self.n_dof = _unknowns(targets)
         self.target = self.reduce(np.where(targets.tie < 0, targets.angle, 0.0))
         for tie in range(1, len(targets.tie_angle)):
@@ -103,11 +109,12 @@ class Energy:
     def _find_pattern(self, surface: Surface) -> None:
         """Edges between unknowns, each once, and the corners whose cotangents they take."""
         order, first = surface.edge_groups
-        face, corner = order // 3, order % 3
+        face = order // 3
+        corner = order - 3 * face
         self._opposite = (corner + 2) % 3 * len(surface.faces) + face
         self._first = first[:-1]
         unknown = self.dof + 1  # 0: pinned
-        start, end = (unknown[side[order[self._first]]] for side in half_edges(surface.faces))
+        start, end = (unknown[side] for side in surface.edge_ends)
         low, high = np.minimum(start, end), np.maximum(start, end)
         self._apart = np.flatnonzero(low != high)  # an edge inside one tie does not change
         self._low, self._high = low[self._apart], high[self._apart]

@@ -80,25 +80,23 @@ class Factorisation:
     def _addresses(self, low: Ints, high: Ints) -> tuple[int, Ints, Ints]:
         """Length of the factor, and where the matrix entries go in it."""
         fronts = self._fronts
-        owner = np.repeat(np.arange(len(fronts)), [f.last - f.first for f in fronts])
-        first = np.array([f.first for f in fronts])[owner]
-        k = np.array([f.last - f.first for f in fronts])[owner]
-        b = np.array([len(f.boundary) for f in fronts])[owner]
-        offset = np.array([f.offset for f in fronts])[owner]
-        own = np.arange(self.n) - first
-        diagonal_at = offset + own * (k + 1)
+        size = np.array([f.last - f.first for f in fronts])
+        below = np.array([len(f.boundary) for f in fronts])
+        owner = np.repeat(np.arange(len(fronts)), size)
+        k, offset = size[owner], np.array([f.offset for f in fronts])[owner]
+        own = np.arange(self.n) - np.array([f.first for f in fronts])[owner]
+        column = offset + own * k  # where an unknown's column of the own block begins
+        at = column[low] + own[high]
+        out = np.flatnonzero(owner[low] != owner[high])
+        from_, to = low[out], high[out]
         # boundary entry of (front, unknown): one search over all fronts at once
-        keys = np.concatenate([i * self.n + f.boundary for i, f in enumerate(fronts)])
-        base = np.concatenate([[0], np.cumsum([len(f.boundary) for f in fronts])])[owner]
-        inside = owner[low] == owner[high]
-        rank = np.searchsorted(keys, owner[low] * self.n + high) - base[low]
-        at = np.where(
-            inside,
-            offset[low] + own[low] * k[low] + own[high],
-            offset[low] + k[low] ** 2 + own[low] * b[low] + rank,
-        )
+        keys = np.repeat(np.arange(len(fronts)), below) * self.n
+        keys += np.concatenate([f.boundary for f in fronts])
+        base = np.cumsum(below) - below
+        column_below = offset + k**2 + own * below[owner] - base[owner]
+        at[out] = column_below[from_] + np.searchsorted(keys, owner[from_] * self.n + to)
         last = fronts[-1]  # the root has no boundary
-        return last.offset + (last.last - last.first) ** 2, diagonal_at, at
+        return last.offset + (last.last - last.first) ** 2, column + own, at
 
     def _block(self, front: _Front) -> _Blocks:
         k, b = front.last - front.first, len(front.boundary)

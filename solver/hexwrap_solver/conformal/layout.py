@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from scipy import sparse
@@ -10,9 +11,12 @@ from scipy.sparse.csgraph import breadth_first_order
 
 from hexwrap_solver.arrays import Complexes, Floats, Ints
 from hexwrap_solver.conformal.cut import Cut, cut_open
+from hexwrap_solver.conformal.energy import Corners
 from hexwrap_solver.conformal.types import Deck
 from hexwrap_solver.surface.topology import next_half_edge
 from hexwrap_solver.surface.types import Surface
+
+Numbers = TypeVar("Numbers", Floats, Complexes)
 
 #: Cone angles nearer than this to a multiple of 2π count as one: g is a translation (see Deck).
 FULL_TURN = 1e-9
@@ -35,10 +39,10 @@ class Layout:
     closing_error: float
 
 
-def lay_out(surface: Surface, lengths: Floats, angles: Floats, cone_angle: float) -> Layout:
+def lay_out(surface: Surface, lengths: Floats, metric: Corners, cone_angle: float) -> Layout:
     """Develops the triangles over a breadth-first tree of the faces and closes the result with g.
 
-    lengths, angles: (3, m) of the flat metric (row k: corner k, and the edge opposite to it).
+    lengths, metric: (3, m) of the flat metric (row k: corner k, and the edge opposite to it).
     cone_angle: K. g is one turn around the surface in the direction of loop 0 (surface on its left).
 
     Cylinder: g moves along +x, loop 0 lies around y = 0 with the surface above. Cone: the apex is the
@@ -46,79 +50,74 @@ def lay_out(surface: Surface, lengths: Floats, angles: Floats, cone_angle: float
     and g moves it along +x. K = 2πm, m ≠ 0: loop 0 is centred at 0.
     """
     cut = cut_open(surface)
-    return _close(surface, _develop(cut.twin, lengths, angles), cut, cone_angle)
+    return _close(surface, _develop(cut.twin, lengths, metric), cut, cone_angle)
 
 
-def _local_frames(lengths: Floats, angles: Floats, order: Ints) -> Complexes:
-    """(m, 3) every triangle by itself, in the given order: corner 0 at 0, corner 1 on the positive real
-    axis."""
-    local = np.zeros((len(order), 3), dtype=complex)
-    length, angle = lengths[1][order], angles[0][order]
-    local[:, 1] = lengths[2][order]
-    local.real[:, 2], local.imag[:, 2] = length * np.cos(angle), length * np.sin(angle)
-    return local
+def _develop(twin: Ints, lengths: Floats, metric: Corners) -> Complexes:
+    """(3, m) where the corners of every triangle stand, consistent across all edges of a tree of faces.
 
-
-def _develop(twin: Ints, lengths: Floats, angles: Floats) -> Complexes:
-    """(m, 3) all triangles side by side in the plane, consistent across all edges of the tree.
-
-    Motions z → r z + t from each face into its parent are composed by pointer jumping: after k rounds
-    every face knows the way 2^k steps up the tree, so rounds and rounding errors grow with log(depth).
+    First come the directions, one angle per face, then the places: both are sums along the tree.
     """
-    m = len(twin) // 3
-    order, up = _face_tree(twin)
-    # faces in breadth-first order: parents then lie side by side in memory, too
-    local = _local_frames(lengths, angles, order)
-    turn = np.ones(m, dtype=complex)
-    shift = np.zeros(m, dtype=complex)
-    turn[1:], shift[1:] = _motions(twin, local, order, up)
+    m, angles = len(twin) // 3, metric.angle
+    order, up, parent, corner = _face_tree(twin)
+    face = np.arange(m)
+    # A face's edges head for 0, π − α₁ and α₀ − π where its first edge heads for 0.
+    heading = np.stack([np.zeros(m), np.pi - angles[1], angles[0] - np.pi])
+    there = twin[3 * face + corner] - 3 * parent  # the shared edge, seen from the parent: it runs backwards
+    there[order[0]] = 0
+    turn = heading[there, parent] + np.pi - heading[corner, face]
+    first_edge = np.exp(1j * _summed_along(up, order, turn))
+    place = np.zeros((3, m), dtype=complex)
+    place[1] = lengths[2] * first_edge
+    place[2] = lengths[1] * first_edge * metric.directions()
+    ends = place + place[[1, 2, 0]]  # twice the middles of the edges
+    place += _summed_along(up, order, (ends[there, parent] - ends[corner, face]) / 2)
+    return place
+
+
+def _summed_along(up: Ints, order: Ints, steps: Numbers) -> Numbers:
+    """(m,) sums of the steps on the way from the root to each face, by pointer jumping: after k rounds every
+    face knows the sum of 2^k steps, so rounds and rounding errors grow with log(depth).
+
+    up, order: see ``_face_tree``. steps: (m,) per face, from its parent to it; the root's is ignored.
+    """
+    up = up.copy()
+    total = steps[order]
+    total[0] = 0
     first = 1  # the faces before it know their way to the root: parents stand before their children
-    while first < m:
-        rest = slice(first, m)
+    while first < len(up):
+        rest = slice(first, None)
         above = up[rest]
-        shift[rest] = turn[above] * shift[rest] + shift[above]
-        turn[rest] *= turn[above]
+        total[rest] += total[above]
         up[rest] = up[above]
         first = int(np.searchsorted(up, 1))
-    turn /= np.abs(turn)
-    corners = np.empty((m, 3), dtype=complex)
-    corners[order] = turn[:, None] * local + shift[:, None]
-    return corners
+    result = np.empty_like(total)
+    result[order] = total
+    return result
 
 
-def _motions(twin: Ints, local: Complexes, order: Ints, up: Ints) -> tuple[Complexes, Complexes]:
-    """Rotation and translation that lay faces 1, 2, … (in the given order) against their parents' frames."""
-    face, parent = order[1:], order[up[1:]]
-    across = twin.reshape(-1, 3)[face] // 3
-    corner = np.where(across[:, 0] == parent, 0, np.where(across[:, 1] == parent, 1, 2))
-    back = twin[3 * face + corner]  # the shared edge, seen from the parent: it runs backwards there
-    place = local.ravel()
-    base, above = 3 * np.arange(1, len(order)), 3 * (up[1:] - parent)
-    tail, head = place[base + corner], place[base + (corner + 1) % 3]
-    tail_there, head_there = place[above + next_half_edge(back)], place[above + back]
-    turn = (head_there - tail_there) / (head - tail)
-    turn /= np.abs(turn)
-    return turn, (tail_there + head_there - turn * (tail + head)) / 2
-
-
-def _face_tree(twin: Ints) -> tuple[Ints, Ints]:
-    """The faces in breadth-first order, and the place of each one's parent in that order (0 for the root)."""
+def _face_tree(twin: Ints) -> tuple[Ints, Ints, Ints, Ints]:
+    """order: (m,) the faces, breadth first, which puts parents side by side in memory. up: (m,) the place of
+    each one's parent in that order. Per face, parent: (m,) and corner: (m,) where the edge towards it starts.
+    The root is its own parent."""
     m = len(twin) // 3
     neighbour = np.where(twin >= 0, twin, np.arange(3 * m)) // 3  # itself, where there is none
     starts = np.arange(0, 3 * m + 1, 3)
     graph = sparse.csr_matrix((np.ones(3 * m, dtype=np.int8), neighbour, starts), shape=(m, m))
-    order, parent = breadth_first_order(graph, 0)
-    place = np.zeros(m, dtype=np.int64)
+    found, before = breadth_first_order(graph, 0)
+    order, parent = found.astype(np.int64), before.astype(np.int64)
+    parent[0] = 0
+    place = np.empty(m, dtype=np.int64)
     place[order] = np.arange(m)
-    up = np.zeros(m, dtype=np.int64)
-    up[1:] = place[parent[order[1:]]]
-    return order.astype(np.int64), up
+    across = neighbour.reshape(-1, 3).T
+    corner = np.where(across[0] == parent, 0, np.where(across[1] == parent, 1, 2))
+    return order, place[parent[order]], parent, corner
 
 
 def _close(surface: Surface, corners: Complexes, cut: Cut, cone_angle: float) -> Layout:
-    flat, n = surface.faces.ravel(), len(surface.vertices)
+    flat, n = surface.faces.T.ravel(), len(surface.vertices)
     rotation = np.exp(1j * cone_angle)
-    on_left = cut.sheet.ravel() > 0
+    on_left = cut.sheet.T.ravel() > 0
     right = _mean_position(flat[~on_left], corners.ravel()[~on_left], n)
     left = _mean_position(flat[on_left], corners.ravel()[on_left], n)[cut.path]
     # left = e^{iK} right + t along the cut: t in least squares, then the positions share the rest

@@ -18,7 +18,9 @@ def positive(corners: Complexes) -> Bools:
     a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     area = (np.conj(a) * b).imag
     longest = np.maximum(np.maximum(np.abs(a), np.abs(b)), np.abs(b - a))
-    return np.asarray(area > ROUNDINGS * np.abs(corners).max(axis=1) * longest)
+    far = np.abs(corners)
+    farthest = np.maximum(np.maximum(far[:, 0], far[:, 1]), far[:, 2])
+    return np.asarray(area > ROUNDINGS * farthest * longest)
 
 
 def misdrawn(found: ConformalMap) -> Bools:

@@ -146,7 +146,7 @@ def _finish(plain: _Plain) -> ConformalMap:
     layout = lay_out(
         surface,
         energy.scaled_lengths(u),
-        minimum.corners.angle,
+        minimum.corners,
         angle,
     )
     return ConformalMap(

@@ -139,6 +139,8 @@ class ConformalMap:
 
     @cached_property
     def _corners(self) -> Complexes:
-        corners = self.deck.apply(self.uv[self.surface.faces], self.sheet)
+        corners = self.uv[self.surface.faces]
+        moved = self.sheet != 0
+        corners[moved] = self.deck.apply(corners[moved], self.sheet[moved])
         corners.flags.writeable = False
         return corners

@@ -20,9 +20,8 @@ FLAT = 16 * np.finfo(float).eps
 PASSES = 60
 
 
-def flat(vertices: Floats, faces: Ints) -> Bools:
-    """(m,) triangles whose longest edge is as long as the two others together."""
-    lengths = edge_lengths(vertices, faces)
+def flat(lengths: Floats) -> Bools:
+    """(m,) triangles, lengths (m, 3), whose longest edge is as long as the two others together."""
     a, b, c = lengths.T
     longest = np.maximum(np.maximum(a, b), c)
     return np.asarray(a + b + c - 2 * longest <= FLAT * longest)
@@ -36,10 +35,10 @@ def repair_flat(vertices: Floats, faces: Ints) -> tuple[Ints, Bools, Bools]:
     faces = faces.copy()
     keep = np.ones(len(faces), dtype=bool)
     for _ in range(PASSES):
-        bad = flat(vertices, faces) & keep
+        bad = flat(edge_lengths(vertices, faces)) & keep
         if not bad.any() or not _pass(vertices, faces, keep, bad):
             break
-    return faces, keep, flat(vertices, faces) & keep
+    return faces, keep, flat(edge_lengths(vertices, faces)) & keep
 
 
 def _pass(vertices: Floats, faces: Ints, keep: Bools, bad: Bools) -> bool:

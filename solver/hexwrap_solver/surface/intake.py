@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexwrap_solver.arrays import Bools, Floats, Ints
+from hexwrap_solver.arrays import Bools, Ints
 from hexwrap_solver.errors import SurfaceError
 from hexwrap_solver.surface.annulus import (
     SentNames,
@@ -21,10 +21,10 @@ from hexwrap_solver.surface.duplicates import first_of_equals
 from hexwrap_solver.surface.errors import DegeneratePolygonError
 from hexwrap_solver.surface.normals import sent_normals
 from hexwrap_solver.surface.orient import flipped
-from hexwrap_solver.surface.topology import edge_groups, twins, twins_of, vertex_normals
+from hexwrap_solver.surface.topology import vertex_normals
 from hexwrap_solver.surface.triangulate import triangulate
-from hexwrap_solver.surface.types import SentMesh, Surface
-from hexwrap_solver.surface.weld import TOLERANCE, weldings
+from hexwrap_solver.surface.types import SentMesh, Surface, Triangles
+from hexwrap_solver.surface.weld import TOLERANCE, relabelled, weldings
 
 
 def surface_from_mesh(sent: SentMesh) -> Surface:
@@ -39,9 +39,10 @@ def surface_from_mesh(sent: SentMesh) -> Surface:
     size = float(np.linalg.norm([np.ptp(x) for x in vertices[used].T]))
     check_extent(size)
     refusal: SurfaceError | None = None
-    for label in weldings(vertices, triangles, TOLERANCE * size):
+    mesh = Triangles(vertices, triangles)
+    for label in weldings(mesh, TOLERANCE * size):
         try:
-            return _build(sent, vertices, triangles, polygon, label)
+            return _build(sent, mesh, polygon, label)
         except SurfaceError as error:  # less welding may help; where it does not, the fullest one's is told
             refusal = refusal or error
     raise refusal or AssertionError("there is always one way to weld")
@@ -49,9 +50,9 @@ def surface_from_mesh(sent: SentMesh) -> Surface:
 
 @dataclass
 class _Draft:
-    """The mesh on its way. faces: (m, 3) into all sent vertices; polygon: (m,) the sent face of each."""
+    """The mesh on its way, of all sent vertices; polygon: (m,) the sent face of each triangle."""
 
-    faces: Ints
+    mesh: Triangles
     polygon: Ints
     repairs: list[str]
 
@@ -61,42 +62,53 @@ class _Draft:
             noun, was = (one, "was") if count == 1 else (many, "were")
             self.repairs.append(f"{count} {noun} {what.format(was=was)}.")
 
+    @property
+    def faces(self) -> Ints:
+        return self.mesh.faces
+
+    @faces.setter
+    def faces(self, faces: Ints) -> None:
+        self.mesh = Triangles(self.mesh.vertices, faces)
+
     def drop(self, keep: Bools, what: str) -> None:
-        self.tell(int((~keep).sum()), "triangle", "triangles", what)
-        self.faces, self.polygon = self.faces[keep], self.polygon[keep]
+        if not keep.all():
+            self.tell(int((~keep).sum()), "triangle", "triangles", what)
+            self.faces, self.polygon = self.faces[keep], self.polygon[keep]
 
 
-def _build(sent: SentMesh, vertices: Floats, triangles: Ints, polygon: Ints, label: Ints) -> Surface:
+def _build(sent: SentMesh, mesh: Triangles, polygon: Ints, label: Ints) -> Surface:
     """The annulus that comes of one way of welding: label (n,) the lowest vertex each one is welded to."""
-    n = len(vertices)
-    draft = _Draft(label[triangles], polygon, [])
-    used = _mark(triangles, n)
+    vertices, n = mesh.vertices, len(mesh.vertices)
+    draft = _Draft(relabelled(mesh, label), polygon, [])
+    used = _mark(mesh.faces, n)
     draft.tell(int(n - used.sum()), "vertex", "vertices", "that no face uses {was} left out")
     welded = int((used & (label != np.arange(n))).sum())
     draft.tell(
         welded, "vertex", "vertices", f"{{was}} welded to one within {TOLERANCE:g} of the model's size"
     )
     _drop_collapsed(draft)
-    order, first = _drop_duplicates(draft, n)
-    grouped = draft.faces
+    draft.drop(
+        first_of_equals(draft.faces, *draft.mesh.edge_groups),
+        "with the same corners as another one {was} left out",
+    )
     names = SentNames(np.arange(n), draft.polygon)
-    check_edges(draft.faces, order, first, names)
-    twin = _orient(draft, twins_of(order, first), n, names)
-    twin = _flatten(draft, vertices, twin, n)
+    check_edges(draft.faces, *draft.mesh.edge_groups, names)
+    _orient(draft, names)
+    _flatten(draft)
 
     index = np.flatnonzero(_mark(draft.faces, n))
     new = np.full(n, -1, dtype=np.int64)
     new[index] = np.arange(len(index))
     faces = new[draft.faces]
-    loops = annulus_loops(faces, twin, len(index), SentNames(index, draft.polygon))
+    loops = annulus_loops(faces, draft.mesh.twin, len(index), SentNames(index, draft.polygon))
     stand = np.where(used, new[label], -1)
     normals = vertex_normals(vertices[index], faces)
     if sent.normals is not None:
         normals, sentence = sent_normals(normals, sent.normals, stand)
         draft.repairs.extend(sentence)
-    surface = Surface(vertices[index], faces, loops, index, stand, normals, tuple(draft.repairs))
     # Leaving out vertices keeps the order of the others, and so that of the edges.
-    return surface.knowing((order, first)) if draft.faces is grouped else surface
+    repairs = tuple(draft.repairs)
+    return Surface(vertices[index], faces, loops, index, stand, normals, repairs).knowing(draft.mesh)
 
 
 def _mark(faces: Ints, n: int) -> Bools:
@@ -114,37 +126,27 @@ def _drop_collapsed(draft: _Draft) -> None:
     draft.drop(keep, "without three different corners {was} left out")
 
 
-def _drop_duplicates(draft: _Draft, n: int) -> tuple[Ints, Ints]:
-    """The edge groups of what remains."""
-    order, first = edge_groups(draft.faces, n)
-    keep = first_of_equals(draft.faces, order, first)
-    if keep.all():
-        return order, first
-    draft.drop(keep, "with the same corners as another one {was} left out")
-    return edge_groups(draft.faces, n)
-
-
-def _orient(draft: _Draft, twin: Ints, n: int, names: SentNames) -> Ints:
-    """Turns faces over so that all agree with most of the sent ones; the twins after that."""
+def _orient(draft: _Draft, names: SentNames) -> None:
+    """Turns faces over so that all agree with most of the sent ones."""
+    twin = draft.mesh.twin
     check_connected(twin, names)
     weight = 1.0 / np.bincount(draft.polygon)[draft.polygon]
     turn, clash = flipped(draft.faces, twin, weight)
     if len(clash):
         raise not_orientable(draft.faces, clash, names)
     if not turn.any():
-        return twin
+        return
     turned = len(np.unique(draft.polygon[turn]))
     draft.tell(turned, "face", "faces", "{was} turned over to agree with the others")
     draft.faces = np.where(turn[:, None], draft.faces[:, ::-1], draft.faces)
-    return twins(draft.faces, n)
 
 
-def _flatten(draft: _Draft, vertices: Floats, twin: Ints, n: int) -> Ints:
-    """Repairs triangles without area; the twins after that. Raises DegeneratePolygonError."""
-    bad = flat(vertices, draft.faces)
+def _flatten(draft: _Draft) -> None:
+    """Repairs triangles without area. Raises DegeneratePolygonError."""
+    bad = flat(draft.mesh.lengths)
     if not bad.any():
-        return twin
-    draft.faces, keep, left = repair_flat(vertices, draft.faces)
+        return
+    draft.faces, keep, left = repair_flat(draft.mesh.vertices, draft.faces)
     if left.any():
         polygons = np.unique(draft.polygon[left])
         raise DegeneratePolygonError(
@@ -154,4 +156,3 @@ def _flatten(draft: _Draft, vertices: Floats, twin: Ints, n: int) -> Ints:
         )
     draft.tell(int(bad.sum()), "triangle", "triangles", "without area {was} merged into the neighbours")
     draft.faces, draft.polygon = draft.faces[keep], draft.polygon[keep]
-    return twins(draft.faces, n)

@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
+
 from hexwrap_solver.arrays import Floats, Ints, Ragged
 from hexwrap_solver.surface.closest import TriangleTree
-from hexwrap_solver.surface.topology import edge_groups, twins_of
+from hexwrap_solver.surface.topology import edge_groups, edge_lengths, half_edges, twins_of
 
 
 @dataclass(frozen=True)
@@ -52,7 +54,42 @@ class NurbsSurface:
 
 
 @dataclass(frozen=True)
-class Surface:
+class Triangles:
+    """vertices: (n, 3). faces: (m, 3). What follows from them is computed once, and not to be written to."""
+
+    vertices: Floats
+    faces: Ints
+
+    @cached_property
+    def edge_groups(self) -> tuple[Ints, Ints]:
+        """The half-edges in the order of their edges, see ``topology.edge_groups``."""
+        return edge_groups(self.faces, len(self.vertices))
+
+    @cached_property
+    def edge_ends(self) -> tuple[Ints, Ints]:
+        """(e,) the lower and (e,) the higher vertex of every edge, in the order of ``edge_groups``."""
+        order, first = self.edge_groups
+        one = order[first[:-1]]
+        start, end = (side[one] for side in half_edges(self.faces))
+        return np.minimum(start, end), np.maximum(start, end)
+
+    @cached_property
+    def twin(self) -> Ints:
+        """(3m,) the half-edge on the other side of each, −1 where the edge has not exactly two faces."""
+        twin = twins_of(*self.edge_groups)
+        twin.flags.writeable = False
+        return twin
+
+    @cached_property
+    def lengths(self) -> Floats:
+        """(m, 3) lengths of the half-edges."""
+        lengths = edge_lengths(self.vertices, self.faces)
+        lengths.flags.writeable = False
+        return lengths
+
+
+@dataclass(frozen=True)
+class Surface(Triangles):
     """A triangle mesh that is an annulus: connected, oriented, manifold, two boundary loops, χ = 0.
 
     vertices: (n, 3). faces: (m, 3), counter-clockwise seen from outside.
@@ -66,8 +103,6 @@ class Surface:
     vertices (in the closed direction, parameters are in the base period); None for sent meshes.
     """
 
-    vertices: Floats
-    faces: Ints
     loops: tuple[Ints, Ints]
     input_vertex: Ints
     vertex_of_input: Ints
@@ -76,22 +111,11 @@ class Surface:
     nurbs: NurbsSurface | None = None
     parameters: Floats | None = None
 
-    @cached_property
-    def edge_groups(self) -> tuple[Ints, Ints]:
-        """The half-edges in the order of their edges, see ``topology.edge_groups``."""
-        return edge_groups(self.faces, len(self.vertices))
-
-    def knowing(self, groups: tuple[Ints, Ints]) -> Surface:
-        """The surface itself, told its edge groups by one who has them already."""
-        self.__dict__["edge_groups"] = groups
+    def knowing(self, mesh: Triangles) -> Surface:
+        """The surface itself, told what is known of the same triangles by other names of their vertices."""
+        known = ("edge_groups", "twin", "lengths")
+        self.__dict__.update({name: mesh.__dict__[name] for name in known if name in mesh.__dict__})
         return self
-
-    @cached_property
-    def twin(self) -> Ints:
-        """(3m,) the half-edge on the other side of each, −1 at the boundary. Not to be written to."""
-        twin = twins_of(*self.edge_groups)
-        twin.flags.writeable = False
-        return twin
 
     @cached_property
     def tree(self) -> TriangleTree:

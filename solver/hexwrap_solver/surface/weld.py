@@ -12,7 +12,8 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from hexwrap_solver.arrays import Floats, Ints
-from hexwrap_solver.surface.topology import edge_groups, edge_lengths, half_edges
+from hexwrap_solver.surface.topology import half_edges
+from hexwrap_solver.surface.types import Triangles
 
 #: Relative to the bounding diagonal.
 TOLERANCE = 1e-6
@@ -22,19 +23,19 @@ NEIGHBOURS = 8
 ULPS = 4
 
 
-def weldings(vertices: Floats, faces: Ints, tolerance: float) -> list[Ints]:
+def weldings(mesh: Triangles, tolerance: float) -> list[Ints]:
     """Ways to weld, from the most to the least, no two the same.
 
     Each is (n,) the lowest vertex with which a vertex becomes one: within the tolerance; only where
     coordinates are equal; only along edges without length.
     """
-    collapsed = _collapse(vertices, faces)
-    rim = _open_vertices(collapsed[faces], len(vertices))
-    equal = _equal(vertices, rim)
+    collapsed = _collapse(mesh)
+    rim = _open_vertices(relabelled(mesh, collapsed))
+    equal = _equal(mesh.vertices, rim)
     exact = _merge(collapsed, *equal)
     if len(equal[0]):
-        rim = _open_vertices(exact[faces], len(vertices))
-    near = _undo_collapses(_merge(exact, *_close(vertices, rim, tolerance)), exact, faces)
+        rim = _open_vertices(relabelled(mesh, exact))
+    near = _undo_collapses(_merge(exact, *_close(mesh.vertices, rim, tolerance)), exact, mesh.faces)
     ways = [near]
     for way in (exact, collapsed):
         if not np.array_equal(way, ways[-1]):
@@ -42,11 +43,18 @@ def weldings(vertices: Floats, faces: Ints, tolerance: float) -> list[Ints]:
     return ways
 
 
-def _collapse(vertices: Floats, faces: Ints) -> Ints:
-    resolution = ULPS * np.finfo(float).eps * float(np.abs(vertices).max())
-    none = (edge_lengths(vertices, faces) <= resolution).ravel()
-    start, end = half_edges(faces)
-    return _merge(np.arange(len(vertices), dtype=np.int64), start[none], end[none])
+def relabelled(mesh: Triangles, label: Ints) -> Triangles:
+    """The mesh itself where each vertex (n,) keeps its label."""
+    if np.array_equal(label, np.arange(len(label))):
+        return mesh
+    return Triangles(mesh.vertices, label[mesh.faces])
+
+
+def _collapse(mesh: Triangles) -> Ints:
+    resolution = ULPS * np.finfo(float).eps * float(np.abs(mesh.vertices).max())
+    none = (mesh.lengths <= resolution).ravel()
+    start, end = half_edges(mesh.faces)
+    return _merge(np.arange(len(mesh.vertices), dtype=np.int64), start[none], end[none])
 
 
 def _merge(label: Ints, a: Ints, b: Ints) -> Ints:
@@ -61,12 +69,12 @@ def _merge(label: Ints, a: Ints, b: Ints) -> Ints:
     return lowest[group][label]
 
 
-def _open_vertices(faces: Ints, n: int) -> Ints:
+def _open_vertices(mesh: Triangles) -> Ints:
     """Vertices on edges that have one face only, ascending."""
-    start, end = half_edges(faces)
-    order, first = edge_groups(faces, n)
+    start, end = half_edges(mesh.faces)
+    order, first = mesh.edge_groups
     rim = order[first[:-1][np.diff(first) == 1]]
-    mark = np.zeros(n, dtype=bool)
+    mark = np.zeros(len(mesh.vertices), dtype=bool)
     mark[start[rim]] = mark[end[rim]] = True
     return np.flatnonzero(mark)
 
