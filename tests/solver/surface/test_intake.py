@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hexwrap_solver.surface import Surface, surface_from_mesh
-from hexwrap_solver.surface.topology import edge_groups, edge_lengths, face_normals
+from hexwrap_solver.surface.topology import edge_lengths, face_normals
+from hexwrap_solver.surface.types import SentMesh, Triangles
 from tests.solver.surface.shapes import mesh, triangles, tube, twisted
 
 
@@ -272,15 +273,39 @@ def test_the_outside_of_the_tube_is_outside() -> None:
     assert area_vector(surface_from_mesh(mesh(vertices, quads[:, ::-1]))) < 0
 
 
-@pytest.mark.parametrize("unused", [False, True])
-def test_edge_groups_that_are_handed_on_are_those_of_the_surface(unused: bool) -> None:
+def _sent(kind: str) -> SentMesh:
+    """A tube that the intake has to mend in one way."""
     vertices, quads = tube(9, 5)
     faces = triangles(quads)
-    if unused:
-        vertices, faces = np.insert(vertices, 7, 99.0, axis=0), faces + (faces >= 7)
-    for turned in (faces, np.concatenate([faces[:3, ::-1], faces[3:]])):
-        surface = surface_from_mesh(mesh(vertices, turned))
-        for found, expected in zip(
-            surface.edge_groups, edge_groups(surface.faces, len(surface.vertices)), strict=True
-        ):
-            np.testing.assert_array_equal(found, expected)
+    if kind == "unused":
+        return mesh(np.insert(vertices, 7, 99.0, axis=0), faces + (faces >= 7))
+    if kind == "turned":
+        return mesh(vertices, np.concatenate([faces[:3, ::-1], faces[3:]]))
+    if kind == "doubled":
+        return mesh(vertices, np.concatenate([faces[:4], faces]))
+    if kind == "soup":
+        noise = np.random.default_rng(0).normal(scale=1e-9, size=(faces.size, 3))
+        return mesh(vertices[faces].reshape(-1, 3) + noise, np.arange(faces.size).reshape(-1, 3))
+    if kind == "capped":  # a triangle without area in the middle of an edge
+        middle = vertices[faces[20, :2]].mean(axis=0)
+        a, b, c = faces[20]
+        n = len(vertices)
+        return mesh(
+            np.concatenate([vertices, [middle]]), [*np.delete(faces, 20, 0), [a, b, n], [a, n, c], [n, b, c]]
+        )
+    return mesh(vertices, faces)
+
+
+@pytest.mark.parametrize("kind", ["clean", "unused", "turned", "doubled", "soup", "capped"])
+def test_what_the_intake_hands_on_is_what_follows_from_the_surface(kind: str) -> None:
+    surface = surface_from_mesh(_sent(kind))
+    assert (len(surface.repairs) > 0) == (kind != "clean")
+    afresh = Triangles(surface.vertices, surface.faces)
+    for found, expected in zip(surface.edge_groups, afresh.edge_groups, strict=True):
+        np.testing.assert_array_equal(found, expected)
+    np.testing.assert_array_equal(surface.twin, afresh.twin)
+    np.testing.assert_array_equal(surface.lengths, afresh.lengths)
+    low, high = surface.edge_ends
+    assert {tuple(sorted(e)) for e in surface.faces[:, [0, 1]].tolist()} <= set(
+        zip(low.tolist(), high.tolist(), strict=True)
+    )
