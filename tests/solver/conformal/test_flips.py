@@ -16,7 +16,7 @@ from hexwrap_solver.conformal.robust import solve as robust
 from hexwrap_solver.conformal.robust.delaunay import _flip as flip
 from hexwrap_solver.conformal.robust.delaunay import cosine_sums, make_delaunay
 from hexwrap_solver.conformal.robust.descent import FlipEnergy, descend
-from hexwrap_solver.conformal.robust.metric import angle_sums, measure
+from hexwrap_solver.conformal.robust.metric import angle_sums, measure, measure_delaunay
 from hexwrap_solver.conformal.robust.mirror import MirrorMesh, mirror_mesh
 from hexwrap_solver.conformal.span import MAX_SPAN
 from hexwrap_solver.conformal.types import BoundaryCondition
@@ -59,8 +59,8 @@ def test_after_flips_every_edge_is_delaunay_and_triangle_inequalities_hold() -> 
     cosines, terms = cosine_sums(mesh, np.arange(len(mesh.crossing)), mesh.scaled(u))
     assert (cosines / terms).min() > -1e-13
     sides = mesh.scaled(u)[mesh.triangles() >> 1]
-    lengths = np.sort(np.exp(sides - sides.max(axis=1, keepdims=True)), axis=1)
-    assert (lengths[:, 2] <= lengths[:, 0] + lengths[:, 1]).all()
+    lengths = np.sort(np.exp(sides - sides.max(axis=0)), axis=0)
+    assert (lengths[2] <= lengths[0] + lengths[1]).all()
 
 
 def test_flips_there_and_back_restore_every_length() -> None:
@@ -105,6 +105,20 @@ def test_the_surface_has_one_delaunay_triangulation_however_its_faces_are_number
         make_delaunay(mesh, np.zeros(mesh.n), euclidean=True)
         found.append(np.sort(mesh.log_length))
     assert np.ptp(found, axis=0).max() < 1e-12
+
+
+@pytest.mark.parametrize("size", [0.01, 0.3, 2.0])
+def test_cotangents_find_every_edge_that_must_be_flipped(size: float) -> None:
+    """The metric is that of the mesh on which all edges were looked at: the Delaunay metric is unique."""
+    surface = TORTURE["retriangulated"](np.random.default_rng(1))
+    quick, slow = _mirrored(surface), _mirrored(surface)
+    for seed in range(3):
+        u = _random_u(quick.n, size, seed)
+        metric, _ = measure_delaunay(quick, u)
+        make_delaunay(slow, u)
+        assert make_delaunay(quick, u) == 0
+        np.testing.assert_allclose(np.sort(metric.length), np.sort(slow.scaled(u)), atol=1e-11)
+        np.testing.assert_allclose(angle_sums(quick, metric), angle_sums(slow, measure(slow, u)), atol=1e-10)
 
 
 def test_gauss_bonnet_holds_in_every_delaunay_metric() -> None:

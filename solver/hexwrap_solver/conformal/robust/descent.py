@@ -23,8 +23,7 @@ from hexwrap_solver.conformal.newton import (
     STAGNATION,
     chords_left,
 )
-from hexwrap_solver.conformal.robust.delaunay import make_delaunay
-from hexwrap_solver.conformal.robust.metric import Metric, angle_sums, edge_weights, measure
+from hexwrap_solver.conformal.robust.metric import Metric, angle_sums, edge_weights, measure_delaunay
 from hexwrap_solver.conformal.robust.mirror import MirrorMesh
 from hexwrap_solver.errors import ConvergenceError
 
@@ -70,8 +69,8 @@ class FlipEnergy:
     def at(self, x: Floats) -> tuple[Metric, Floats]:
         """The Delaunay metric at the unknowns x, and the gradient."""
         u = self.plain.scale_of(x)
-        self.flips += make_delaunay(self.mesh, u)
-        metric = measure(self.mesh, u)
+        metric, flips = measure_delaunay(self.mesh, u)
+        self.flips += flips
         return metric, self.plain.target - self.plain.reduce(angle_sums(self.mesh, metric))
 
     def newton_direction(self, metric: Metric, gradient: Floats) -> Floats:
@@ -146,6 +145,7 @@ def descend(energy: FlipEnergy, start: Floats, span: float, progress: Progress) 
                 metric, gradient = energy.at(x)  # the step that was tried has flipped edges
             step = _line_search(energy, x, energy.newton_direction(metric, gradient), gradient)
         if step is None:
+            metric, gradient = energy.at(x)
             break
         iterations += 1
         gain = _largest(step.gradient) / residual
@@ -159,7 +159,6 @@ def descend(energy: FlipEnergy, start: Floats, span: float, progress: Progress) 
         if np.ptp(x) > RUNAWAY * span:
             break  # no use to follow it further
         chord = step.full and chords_left(_largest(gradient), gain, tolerance) <= CHORDS
-    metric, gradient = energy.at(x)
     return Descent(energy.plain.scale_of(x), metric, _largest(gradient), iterations, energy.flips)
 
 
