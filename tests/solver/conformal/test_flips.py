@@ -165,6 +165,26 @@ def test_steps_that_were_tried_in_vain_leave_no_trace(monkeypatch: pytest.Monkey
     assert iterations() == expected
 
 
+def test_a_disturbance_in_one_place_is_mended_there() -> None:
+    """Local steps change nothing far away, and leave what a step of all unknowns then does at once."""
+    surface = bump(60, 30)
+    energy = FlipEnergy(Energy(surface, boundary.straight(surface)), _mirrored(surface))
+    solution = descend(energy, np.zeros(energy.plain.n), MAX_SPAN, no_progress)
+    x = energy.plain.unknowns_of(solution.u)
+    away = np.linalg.norm(energy.plain.points - energy.plain.points[len(x) // 2], axis=1)
+    near = away < np.sort(away)[5]
+    x[near] += [2.0, -1.0, 1.0, 2.0, -2.0]
+    metric, gradient = energy.at(x)
+    relaxed = descent._relaxed(energy, x, metric, gradient)
+    assert np.abs(gradient).max() > 1
+    assert np.abs(relaxed.gradient).max() < descent.LOCAL
+    changed = np.flatnonzero(relaxed.x != x)
+    assert 5 < len(changed) < descent.FEW * len(x)
+    assert away[changed].max() < 0.5 * away.max()
+    again = descend(energy, energy.plain.scale_of(relaxed.x), MAX_SPAN, no_progress)
+    np.testing.assert_allclose(again.u, solution.u, atol=1e-11)
+
+
 @pytest.mark.parametrize("name", [name for name in sorted(MESHES) if MESHES[name].stat().st_size < 2e5])
 @pytest.mark.parametrize("spread", ["even", "optimal", None])
 def test_public_meshes_have_a_map(name: str, spread: Literal["even", "optimal"] | None) -> None:
