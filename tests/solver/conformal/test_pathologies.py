@@ -146,6 +146,17 @@ def test_splits_that_only_call_for_further_splits_are_not_made() -> None:
     assert faults(found) == []
 
 
+@pytest.mark.long
+def test_splits_that_call_for_many_more_are_made_where_nothing_else_helps() -> None:
+    """A hundred needles in a few fans, with three corners."""
+    random = np.random.default_rng(14)
+    few, many = (random.uniform(0, 2 * np.pi, int(random.integers(*span))) for span in ((5, 9), (20, 200)))
+    surface = band(np.sort(few), np.sort(many), random)
+    condition = MODES["entrance"](surface, np.random.default_rng(1014))
+    found = conformal_map(surface, condition)
+    assert faults(found, asked_angles(found, surface, condition)) == []
+
+
 def test_angles_that_are_not_exact_are_refused() -> None:
     """On a band 250 times as long as wide, corners of 30° and 330° want scale factors beyond all doubles."""
     surface = grid(4, 7, revolution(lambda s: 1 + 0 * s, lambda s: 0.0027 * s))

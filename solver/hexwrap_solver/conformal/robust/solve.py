@@ -29,6 +29,7 @@ from hexwrap_solver.conformal.robust.refine import (
 from hexwrap_solver.conformal.robust.straight import straighten
 from hexwrap_solver.conformal.span import MAX_SPAN, check_reach, check_span, failure, largest_span
 from hexwrap_solver.conformal.types import ConformalMap, Deck, Targets
+from hexwrap_solver.errors import ConvergenceError
 from hexwrap_solver.surface.types import Surface
 
 #: Rounds of refinement; meshes seen so far need up to a handful.
@@ -39,8 +40,8 @@ MAX_ROUNDS = 40
 PATIENCE, FEW, SHELLS = 6, 30, 2
 #: Refinement that makes more than so many times the vertices, and so many more, does not come to an end.
 MOST, MOST_MORE = 2, 4000
-#: ``spread`` makes at most so many times the vertices, or is left out: where it goes on and on it leaves the
-#: mesh worse than it was.
+#: ``spread`` makes at most so many times the vertices, or is left out: where it goes on and on it often makes
+#: the mesh worse. Only where no map is found without, it is tried.
 SPREAD_MOST = 1.5
 #: How exact prescribed boundary angles are, radians.
 PROMISED = 1e-9
@@ -60,6 +61,20 @@ def solve_with_flips(
     Raises ConvergenceError where double precision does not suffice.
     """
     problem = _problem(surface, targets, start)
+    omitted: list[int] = []
+    try:
+        return _refined(surface, problem, progress, SPREAD_MOST, omitted)
+    except ConvergenceError:
+        if not omitted:
+            raise
+        return _refined(surface, problem, progress, np.inf, [])
+
+
+def _refined(
+    surface: Surface, problem: Problem, progress: Progress, most: float, omitted: list[int]
+) -> ConformalMap:
+    """The map of a problem on ``surface``, refined as often as need be. Rounds whose ``spread`` would make
+    more than ``most`` times the vertices go without, and into ``omitted``."""
     iterations, fewest, span = 0, len(surface.faces), np.inf
     for attempt in range(MAX_ROUNDS):
         problem = _uncollapse(problem)
@@ -76,7 +91,11 @@ def solve_with_flips(
         if len(problem.surface.vertices) == before:
             problem = split_edges(problem, *split_places(problem.surface, problem.targets, wrong, attempt))
         if len(wrong) >= fewest:
-            problem = _spread_out(problem, before)
+            wide = spread(problem, before)
+            if len(wide.surface.vertices) <= most * len(problem.surface.vertices):
+                problem = wide
+            else:
+                omitted.append(attempt)
         fewest = min(fewest, len(wrong))
         span = min(span, float(np.ptp(found.log_scale)))
         if len(problem.surface.vertices) > MOST * len(surface.vertices) + MOST_MORE:
@@ -91,12 +110,6 @@ def solve_with_flips(
         "finer there, or ask for angles nearer to 180°",
         _sent(surface, problem.parent[wrong]),
     )
-
-
-def _spread_out(problem: Problem, first_new: int) -> Problem:
-    wide = spread(problem, first_new)
-    few = len(wide.surface.vertices) <= SPREAD_MOST * len(problem.surface.vertices)
-    return wide if few else problem
 
 
 @dataclass(frozen=True)
