@@ -40,7 +40,7 @@ CHORDS = 4
 CHORD_GAIN = 0.2
 #: Where more than so many triangles are broken after so many steps, or any after a full step that leaves at
 #: most SETTLED of the residual, the minimum has broken triangles as well: the search ends there.
-BROKEN, PATIENCE, SETTLED = 8, 5, 0.05
+BROKEN, PATIENCE, SETTLED = 8, 2, 0.05
 
 
 @dataclass(frozen=True)

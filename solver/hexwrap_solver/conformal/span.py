@@ -15,6 +15,9 @@ MAX_SPAN = 36.0
 #: Cones have a centre, their apex at the origin, and every place keeps all its digits relative to it, down to
 #: the smallest doubles. |u| up to this leaves room for products of two lengths: e^600 is 4e260.
 MAX_REACH = 300.0
+#: From this difference of u on, a map that does not come out right is refused for it: e^11.5 is 1e5, and most
+#: surfaces that are not long and thin have less.
+WIDE = 11.5
 #: Cone angles nearer than this to a multiple of 2π have an apex, but one that is not known to all digits.
 CLEAR = 1e-3
 
@@ -30,18 +33,29 @@ def check_span(u: Floats, cone_angle: float) -> None:
     most = largest_span(cone_angle)
     if span > most:
         held = "the 16 digits of a coordinate" if most == MAX_SPAN else "the range of double precision"
-        _refuse(span, cone_angle, f"more than {held} can tell apart")
+        raise ConvergenceError(_sentence(span, cone_angle, f"more than {held} can tell apart"))
 
 
 def check_reach(u: Floats, cone_angle: float) -> None:
     """Raises ConvergenceError where lengths or areas in the domain would leave the range of doubles."""
     if float(np.abs(u).max()) > MAX_REACH:
-        _refuse(float(np.ptp(u)), cone_angle, "beyond the range of double precision")
+        span = float(np.ptp(u))
+        raise ConvergenceError(_sentence(span, cone_angle, "beyond the range of double precision"))
 
 
-def _refuse(span: float, cone_angle: float, why: str) -> None:
-    raise ConvergenceError(
+def failure(span: float, cone_angle: float, what: str, advice: str, vertices: list[int]) -> ConvergenceError:
+    """Why a map has not come out right: because of its span of u where that is wide, or else ``what``, with
+    ``advice``."""
+    sentence = f"{what}: {advice}."
+    if span > WIDE:
+        sentence = _sentence(span, cone_angle, f"too far apart for double precision on this mesh. {what}")
+    return ConvergenceError(sentence, vertices=vertices)
+
+
+def _sentence(span: float, cone_angle: float, why: str) -> str:
+    angles = "boundary angles nearer to 180°" if abs(cone_angle) < CLEAR else "a smaller cone angle"
+    return (
         f"Under this boundary condition (cone angle {np.degrees(cone_angle):.4g}°) the map would shrink "
         f"some parts of the surface about 10^{span / np.log(10):.0f} times as much as others, {why}; ask for "
-        "a smaller cone angle, or cut the surface where it is long and thin."
+        f"{angles}, or cut the surface where it is long and thin."
     )

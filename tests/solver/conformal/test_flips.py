@@ -16,7 +16,7 @@ from hexwrap_solver.conformal.robust import solve as robust
 from hexwrap_solver.conformal.robust.delaunay import _flip as flip
 from hexwrap_solver.conformal.robust.delaunay import cosine_sums, make_delaunay
 from hexwrap_solver.conformal.robust.descent import FlipEnergy, descend
-from hexwrap_solver.conformal.robust.metric import angle_sums, measure
+from hexwrap_solver.conformal.robust.metric import angle_sums, measure, measure_delaunay
 from hexwrap_solver.conformal.robust.mirror import MirrorMesh, mirror_mesh
 from hexwrap_solver.conformal.span import MAX_SPAN
 from hexwrap_solver.conformal.types import BoundaryCondition
@@ -59,8 +59,8 @@ def test_after_flips_every_edge_is_delaunay_and_triangle_inequalities_hold() -> 
     cosines, terms = cosine_sums(mesh, np.arange(len(mesh.crossing)), mesh.scaled(u))
     assert (cosines / terms).min() > -1e-13
     sides = mesh.scaled(u)[mesh.triangles() >> 1]
-    lengths = np.sort(np.exp(sides - sides.max(axis=1, keepdims=True)), axis=1)
-    assert (lengths[:, 2] <= lengths[:, 0] + lengths[:, 1]).all()
+    lengths = np.sort(np.exp(sides - sides.max(axis=0)), axis=0)
+    assert (lengths[2] <= lengths[0] + lengths[1]).all()
 
 
 def test_flips_there_and_back_restore_every_length() -> None:
@@ -107,6 +107,20 @@ def test_the_surface_has_one_delaunay_triangulation_however_its_faces_are_number
     assert np.ptp(found, axis=0).max() < 1e-12
 
 
+@pytest.mark.parametrize("size", [0.01, 0.3, 2.0])
+def test_cotangents_find_every_edge_that_must_be_flipped(size: float) -> None:
+    """The metric is that of the mesh on which all edges were looked at: the Delaunay metric is unique."""
+    surface = TORTURE["retriangulated"](np.random.default_rng(1))
+    quick, slow = _mirrored(surface), _mirrored(surface)
+    for seed in range(3):
+        u = _random_u(quick.n, size, seed)
+        metric, _ = measure_delaunay(quick, u)
+        make_delaunay(slow, u)
+        assert make_delaunay(quick, u) == 0
+        np.testing.assert_allclose(np.sort(metric.length), np.sort(slow.scaled(u)), atol=1e-11)
+        np.testing.assert_allclose(angle_sums(quick, metric), angle_sums(slow, measure(slow, u)), atol=1e-10)
+
+
 def test_gauss_bonnet_holds_in_every_delaunay_metric() -> None:
     surface = bump(24, 10)
     mesh = _mirrored(surface)
@@ -149,6 +163,26 @@ def test_steps_that_were_tried_in_vain_leave_no_trace(monkeypatch: pytest.Monkey
     monkeypatch.setattr(descent, "CHORDS", np.inf)
     monkeypatch.setattr(descent, "_chord", astray)
     assert iterations() == expected
+
+
+def test_a_disturbance_in_one_place_is_mended_there() -> None:
+    """Local steps change nothing far away, and leave what a step of all unknowns then does at once."""
+    surface = bump(60, 30)
+    energy = FlipEnergy(Energy(surface, boundary.straight(surface)), _mirrored(surface))
+    solution = descend(energy, np.zeros(energy.plain.n), MAX_SPAN, no_progress)
+    x = energy.plain.unknowns_of(solution.u)
+    away = np.linalg.norm(energy.plain.points - energy.plain.points[len(x) // 2], axis=1)
+    near = away < np.sort(away)[5]
+    x[near] += [2.0, -1.0, 1.0, 2.0, -2.0]
+    metric, gradient = energy.at(x)
+    relaxed = descent._relaxed(energy, x, metric, gradient)
+    assert np.abs(gradient).max() > 1
+    assert np.abs(relaxed.gradient).max() < descent.LOCAL
+    changed = np.flatnonzero(relaxed.x != x)
+    assert 5 < len(changed) < descent.FEW * len(x)
+    assert away[changed].max() < 0.5 * away.max()
+    again = descend(energy, energy.plain.scale_of(relaxed.x), MAX_SPAN, no_progress)
+    np.testing.assert_allclose(again.u, solution.u, atol=1e-11)
 
 
 @pytest.mark.parametrize("name", [name for name in sorted(MESHES) if MESHES[name].stat().st_size < 2e5])

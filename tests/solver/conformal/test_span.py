@@ -13,12 +13,15 @@ from hexwrap_solver.panels import measure
 from hexwrap_solver.pattern import lay_pattern
 from hexwrap_solver.pattern.types import PatternSettings
 from hexwrap_solver.surface.types import Surface
-from tests.solver.conformal.annuli import grid
+from tests.solver.conformal.annuli import grid, revolution
 from tests.solver.conformal.checks import faults
+from tests.solver.conformal.torture import MODES
 
 AROUND = 6
 #: Rows are so many times as high as quads are wide.
 HIGH = 20.0
+#: Vertices around, rows, height (over a circumference of 2π), boundary angles.
+BANDS = [(11, 21, 0.025, "entrance"), (11, 21, 0.025, "densified"), (7, 21, 0.0073, "densified")]
 
 
 def tube(rows: int) -> Surface:
@@ -74,3 +77,14 @@ def test_beyond_the_doubles_and_without_an_apex_the_limits_are_named() -> None:
     surface = tube(40)
     with pytest.raises(ConvergenceError, match="16 digits"):
         conformal_map(surface, cone(surface, 2 * np.pi))
+
+
+@pytest.mark.parametrize(("around", "rows", "height", "kind"), BANDS)
+def test_bands_far_too_wide_for_their_corners_are_refused_for_the_span(
+    around: int, rows: int, height: float, kind: str
+) -> None:
+    """A corner shrinks what lies beyond it without end. That is told, whether Newton's method stalls,
+    refinement does not end, or the drawing is not exact."""
+    surface = grid(around, rows, revolution(lambda s: 1 + 0 * s, lambda s: height * s))
+    with pytest.raises(ConvergenceError, match=r"10\^\d+ times as much as others.*ask for boundary angles"):
+        conformal_map(surface, MODES[kind](surface, np.random.default_rng(1039)))

@@ -39,8 +39,10 @@ def cosine_sums(mesh: MirrorMesh, edges: Ints, length: Floats) -> tuple[Floats, 
     crossing = mesh.crossing[edges]
     plus, minus = np.zeros(len(edges)), np.zeros(len(edges))
     plain = edges[~crossing]
-    one, other = _opposite_cosine(mesh, 2 * plain, length), _opposite_cosine(mesh, 2 * plain + 1, length)
-    plus[~crossing], minus[~crossing] = one[0] + other[0], one[1] + other[1]
+    sides = _opposite_cosine(mesh, np.concatenate([2 * plain, 2 * plain + 1]), length)
+    plus[~crossing], minus[~crossing] = (x.reshape(2, -1).sum(axis=0) for x in sides)
+    if len(plain) == len(edges):
+        return plus - minus, plus + minus
     right = mesh.next[2 * edges[crossing]]
     left = mesh.prev[right]
     middle = length[edges[crossing]]
@@ -58,6 +60,8 @@ def _opposite_cosine(mesh: MirrorMesh, h: Ints, length: Floats) -> tuple[Floats,
     inner = h[~outer]
     e, a, b = length[inner >> 1], length[mesh.next[inner] >> 1], length[mesh.prev[inner] >> 1]
     plus[~outer], minus[~outer] = np.cosh(a - b), 0.5 * np.exp(2 * e - a - b)
+    if len(inner) == len(h):
+        return plus, minus
     cells = h[outer]
     m, n = mesh.cross_length(cells, length), mesh.cross_length(mesh.next[cells], length)
     diagonal = 0.5 * np.logaddexp(2 * length[cells >> 1], m + n)
@@ -75,15 +79,17 @@ def _cell_cosine(side: Floats, middle: Floats, far: Floats) -> tuple[Floats, Flo
     return np.exp(side - diagonal) + 0.5 * np.exp(middle + far - both), 0.5 * np.exp(2 * middle - both)
 
 
-def make_delaunay(mesh: MirrorMesh, u: Floats, *, euclidean: bool = False) -> int:
+def make_delaunay(
+    mesh: MirrorMesh, u: Floats, *, euclidean: bool = False, doubtful: Ints | None = None
+) -> int:
     """Flips until every edge is Delaunay in the metric with logarithmic factors u. Returns the number of
     flips.
 
-    euclidean: keep the piecewise flat metric of u = 0 (then u must vanish). Raises ConvergenceError if
-    rounding keeps it from ending.
+    euclidean: keep the piecewise flat metric of u = 0 (then u must vanish). doubtful: the edges that may not
+    be Delaunay at first, where known. Raises ConvergenceError if rounding keeps it from ending.
     """
     length = mesh.scaled(u)
-    edges = np.arange(len(length))
+    edges = np.arange(len(length)) if doubtful is None else doubtful
     total = 0
     tolerance = TOLERANCE * max(1.0, float(np.abs(length).max()) / LARGE)
     for _ in range(MAX_ROUNDS):
@@ -139,9 +145,11 @@ def _flip(mesh: MirrorMesh, edges: Ints, length: Floats, euclidean: bool) -> Non
     """Flips independent edges; ``length`` (e,) gets the new scaled log-lengths."""
     crossing = mesh.crossing[edges]
     cell = mesh.outer[2 * edges] | mesh.outer[2 * edges + 1]
-    _flip_up(mesh, edges[crossing], length, euclidean)
-    _flip_down(mesh, edges[~crossing & cell], length, euclidean)
-    _flip_across(mesh, edges[~crossing & ~cell], length, euclidean)
+    across = ~(crossing | cell)
+    for kind, which in ((_flip_up, crossing), (_flip_down, cell & ~crossing), (_flip_across, across)):
+        if which.any():
+            kind(mesh, edges[which], length, euclidean)
+    mesh.flipped()
 
 
 def _link(mesh: MirrorMesh, *ring: Ints) -> None:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hexwrap_solver.arrays import Floats, Ints, Progress
+from hexwrap_solver.arrays import Bools, Floats, Ints, Progress
 from hexwrap_solver.conformal.energy import Energy
 from hexwrap_solver.conformal.factor import Factorisation
 from hexwrap_solver.conformal.newton import (
@@ -23,8 +23,7 @@ from hexwrap_solver.conformal.newton import (
     STAGNATION,
     chords_left,
 )
-from hexwrap_solver.conformal.robust.delaunay import make_delaunay
-from hexwrap_solver.conformal.robust.metric import Metric, angle_sums, edge_weights, measure
+from hexwrap_solver.conformal.robust.metric import Metric, angle_sums, edge_weights, measure_delaunay
 from hexwrap_solver.conformal.robust.mirror import MirrorMesh
 from hexwrap_solver.errors import ConvergenceError
 
@@ -38,6 +37,9 @@ MAX_TRIALS = 40
 #: Added to the diagonal, relative to it and to 1, one after the other until the Hessian is definite: in exact
 #: arithmetic it always is.
 LIFTS = (0.0, 1e-9, 1e-6)
+#: Where the residual is above LOCAL at first, at no more than the share FEW of the unknowns with RINGS of
+#: their neighbours, these are brought near the solution first, by at most LOCAL_STEPS steps.
+LOCAL, RINGS, FEW, LOCAL_STEPS = 0.03, 3, 0.25, 8
 #: Newton may overshoot, but not by so much, where the answer is of use.
 RUNAWAY = 2.0
 #: Above this the answer is not accepted. Needles of 1e-4 degrees have rounding of 1e-9 in their angles.
@@ -65,19 +67,19 @@ class FlipEnergy:
         self.plain = plain
         self.mesh = mesh
         self.flips = 0
-        self._system: _System | None = None
+        self._system: _Laplacian | None = None
 
     def at(self, x: Floats) -> tuple[Metric, Floats]:
         """The Delaunay metric at the unknowns x, and the gradient."""
         u = self.plain.scale_of(x)
-        self.flips += make_delaunay(self.mesh, u)
-        metric = measure(self.mesh, u)
+        metric, flips = measure_delaunay(self.mesh, u)
+        self.flips += flips
         return metric, self.plain.target - self.plain.reduce(angle_sums(self.mesh, metric))
 
     def newton_direction(self, metric: Metric, gradient: Floats) -> Floats:
         """−H⁻¹∇E. The symbolic analysis lasts until the next flip."""
         if self._system is None or self._system.flips != self.flips:
-            self._system = _System(self)
+            self._system = _Laplacian(self)
         return self._system.solve(metric, -gradient)
 
     def chord_direction(self, gradient: Floats) -> Floats:
@@ -92,24 +94,30 @@ class FlipEnergy:
         return _largest(u[self.mesh.origin[::2]] - u[self.mesh.origin[1::2]])
 
 
-class _System:
-    """The Hessian on one triangulation: a graph Laplacian of the unknowns."""
+class _Laplacian:
+    """The Hessian on one triangulation: a graph Laplacian of the unknowns, or of some of them."""
 
-    def __init__(self, energy: FlipEnergy) -> None:
+    def __init__(self, energy: FlipEnergy, among: Ints | None = None) -> None:
+        """among: (k,) the unknowns that may change; all by default."""
         self.flips = energy.flips
-        self.mesh = energy.mesh
-        dof, n = energy.plain.dof, energy.plain.n_dof
-        edges = np.flatnonzero(~self.mesh.crossing)
-        tail, head = dof[self.mesh.origin[2 * edges]], dof[self.mesh.origin[2 * edges + 1]]
-        low, high = np.minimum(tail, head), np.maximum(tail, head)
-        apart = low != high  # an edge from a vertex to itself, or inside one tie, does not change
-        self.edges, self.low, self.high = edges[apart], low[apart], high[apart]
+        mesh, dof, n = energy.mesh, energy.plain.dof, energy.plain.n_dof
+        points = energy.plain.points
+        if among is not None:
+            local = np.full(n + 1, -1)
+            local[among] = np.arange(len(among))
+            dof, n, points = local[dof], len(among), points[among]
+        ends = dof[mesh.origin]
+        low, high = np.minimum(ends[::2], ends[1::2]), np.maximum(ends[::2], ends[1::2])
+        # an edge from a vertex to itself, or inside one tie, does not change
+        self.edges = np.flatnonzero((low != high) & ~mesh.crossing)
+        self.low, self.high = low[self.edges], high[self.edges]
         self.inside = self.low >= 0  # both ends free
         pairs, self.pair = np.unique(self.low[self.inside] * n + self.high[self.inside], return_inverse=True)
         self.n, self.n_pairs = n, len(pairs)
-        self.factorisation = Factorisation(energy.plain.points, pairs % n, pairs // n)
+        self.factorisation = Factorisation(points, pairs % n, pairs // n)
 
     def solve(self, metric: Metric, right: Floats) -> Floats:
+        """The solution for right (n,)."""
         weight = edge_weights(metric, self.edges)
         both = np.concatenate([self.low, self.high]) + 1
         diagonal = _sums(both, np.tile(weight, 2), self.n + 1)[1:]
@@ -126,6 +134,38 @@ class _System:
         )
 
 
+def _relaxed(energy: FlipEnergy, x: Floats, metric: Metric, gradient: Floats) -> _Step:
+    """Newton's method among the unknowns where the residual is large, and their neighbours, if these are few.
+
+    Behind new vertices and broken triangles there is much to do in few places; steps of all unknowns would
+    be cut short for their sake (nonlinear elimination; Cai, Keyes 2002).
+    """
+    at = _Step(x, metric, gradient, False)
+    for _ in range(LOCAL_STEPS):
+        among = _around(energy, np.abs(at.gradient) > LOCAL)
+        if not 0 < len(among) <= FEW * len(x):
+            break
+        direction = np.zeros(len(x))
+        direction[among] = _Laplacian(energy, among).solve(at.metric, -at.gradient[among])
+        step = _line_search(energy, at.x, direction, at.gradient)
+        if step is None:
+            return _Step(at.x, *energy.at(at.x), False)
+        at = step
+    return at
+
+
+def _around(energy: FlipEnergy, here: Bools) -> Ints:
+    """The marked unknowns (n,), and those up to RINGS edges away from them."""
+    ends = energy.plain.dof[energy.mesh.origin]
+    marked = np.append(here, False)
+    one, other = ends[::2], ends[1::2]
+    for _ in range(RINGS):
+        joined = marked[one] | marked[other]
+        marked[one[joined]] = marked[other[joined]] = True
+        marked[-1] = False
+    return np.flatnonzero(marked)
+
+
 def descend(energy: FlipEnergy, start: Floats, span: float, progress: Progress) -> Descent:
     """Minimises from ``start`` (n,) until rounding stops it; see ``residual`` for how far it got.
 
@@ -134,6 +174,7 @@ def descend(energy: FlipEnergy, start: Floats, span: float, progress: Progress) 
     x = energy.plain.unknowns_of(start)
     metric, gradient = energy.at(x)
     tolerance = max(ROUNDING, float(np.finfo(float).eps) * _largest(energy.plain.target))
+    x, metric, gradient, _ = _relaxed(energy, x, metric, gradient)
     iterations, stalls, chord = 0, 0, False
     while iterations < MAX_STEPS and _largest(gradient) > tolerance:
         residual = _largest(gradient)
@@ -146,6 +187,7 @@ def descend(energy: FlipEnergy, start: Floats, span: float, progress: Progress) 
                 metric, gradient = energy.at(x)  # the step that was tried has flipped edges
             step = _line_search(energy, x, energy.newton_direction(metric, gradient), gradient)
         if step is None:
+            metric, gradient = energy.at(x)
             break
         iterations += 1
         gain = _largest(step.gradient) / residual
@@ -159,7 +201,6 @@ def descend(energy: FlipEnergy, start: Floats, span: float, progress: Progress) 
         if np.ptp(x) > RUNAWAY * span:
             break  # no use to follow it further
         chord = step.full and chords_left(_largest(gradient), gain, tolerance) <= CHORDS
-    metric, gradient = energy.at(x)
     return Descent(energy.plain.scale_of(x), metric, _largest(gradient), iterations, energy.flips)
 
 

@@ -35,20 +35,24 @@ def develop(mesh: MirrorMesh, metric: Metric, cone_angle: float) -> Development:
     from there, and tiny triangles keep their digits.
     """
     live = np.flatnonzero(~np.repeat(mesh.crossing, 2))
+    live = live[_order(mesh.origin[live], mesh.n)]
     root = int(mesh.origin[live[np.argmin(metric.length[live >> 1])]])
     step = _directions(mesh, metric, cone_angle, live) * np.exp(metric.length[live >> 1])
     tail, head = mesh.origin[live], mesh.origin[live ^ 1]
     turn = mesh.turn[live]
 
-    vertex, above, via = _tree(tail, head, mesh.n, root)
-    up = np.full(mesh.n, root)
-    up[vertex] = above
+    above = _parents(head, np.searchsorted(tail, np.arange(mesh.n + 1)), root)
+    on_tree = np.flatnonzero(above[head] == tail)
+    via = np.full(mesh.n, -1)
+    via[head[on_tree]] = on_tree  # of several edges between two vertices any one will do
+    below = np.flatnonzero(above >= 0)
+    via, up = via[below], np.where(above >= 0, above, root)
     lift = np.zeros(mesh.n, dtype=np.int64)
-    lift[vertex] = turn[via]
+    lift[below] = turn[via]
     lift = _accumulate(lift, up, root)
     step = step * np.exp(1j * cone_angle * lift[tail])
     uv = np.zeros(mesh.n, dtype=complex)
-    uv[vertex] = step[via]
+    uv[below] = step[via]
     uv = _accumulate(uv, up, root)
 
     power = lift[tail] + turn - lift[head]
@@ -88,42 +92,58 @@ def _translation(
 def _directions(mesh: MirrorMesh, metric: Metric, cone_angle: float, live: Ints) -> Complexes:
     """(k,) unit vector along each live half-edge, seen from the copy of its origin that turns count from.
 
-    Half-edges of one triangle, of neighbouring cells of one edge of the boundary, and the two sides of an
-    edge know each other's direction; beyond a boundary vertex lies the back of the double, so no step is made
-    there.
+    Found over a tree of triangles and cells: those on both sides of an edge, and neighbouring cells of one
+    edge of the boundary, know each other's direction; beyond a boundary vertex lies the back of the double,
+    so no step is made there.
     """
-    size = len(mesh.origin)
-    follows = live[(~mesh.outer[live]) | (mesh.cross[mesh.next[live]] >= 0)]
-    following = mesh.next[follows]
-    bend = np.pi - metric.end[follows] - np.where(mesh.outer[follows], metric.start[following], 0.0)
-    tail = np.concatenate([follows, following, live])
-    head = np.concatenate([following, follows, live ^ 1])
-    angle = np.concatenate([bend, -bend, np.full(len(live), np.pi)])
-    turn = mesh.turn
-    angle -= cone_angle * np.concatenate([turn[follows], -turn[follows], turn[live]])
+    triangles, cells = mesh.triangles(), mesh.chain()
+    first, second, third = triangles
+    t, k = len(first), len(cells)
+    piece = np.zeros(len(mesh.origin), dtype=np.int64)
+    piece[triangles] = np.arange(t)
+    piece[cells] = t + np.arange(k)
 
-    half_edge, above, via = _tree(tail, head, size, int(live[0]))
-    up = np.full(size, live[0])
-    up[half_edge] = above
-    direction = np.zeros(size)
-    direction[half_edge] = angle[via]
-    return np.exp(1j * _accumulate(direction, up, int(live[0])))[live]
+    turned = cone_angle * mesh.turn
+    bend = np.pi - metric.end - turned  # from a half-edge to the next one
+    within = np.zeros(len(mesh.origin))  # direction, seen from its piece's first half-edge
+    within[second] = bend[first]
+    within[third] = -bend[third]
+    over = within + np.pi - turned
+    over -= within.reshape(-1, 2)[:, ::-1].ravel()  # from a half-edge's piece to that of its other side
+    following = mesh.next[cells]
+    bend = bend[cells] - metric.start[following]
+    joined = mesh.cross[following] >= 0
+    own = t + np.arange(k)
+    after, before = piece[following], own.copy()
+    before[after[joined] - t] = own[joined]
+    after = np.where(joined, after, own)
+    back = np.zeros(k)
+    back[after[joined] - t] = -bend[joined]
+
+    beside = np.concatenate([piece[triangles.T ^ 1], np.stack([piece[cells ^ 1], after, before], axis=1)])
+    angle = np.concatenate([over[triangles.T], np.stack([over[cells], bend, back], axis=1)])
+    parent = _parents(beside.ravel(), np.arange(0, 3 * (t + k) + 1, 3), 0)
+    below = np.flatnonzero(parent >= 0)
+    up = np.where(parent >= 0, parent, 0)
+    via = (beside[up[below]] == below[:, None]).argmax(axis=1)
+    direction = np.zeros(t + k)
+    direction[below] = angle[up[below], via]
+    direction = _accumulate(direction, up, 0)
+    return np.asarray(np.exp(1j * (direction[piece[live]] + within[live])))
 
 
-def _tree(tail: Ints, head: Ints, n: int, root: int) -> tuple[Ints, Ints, Ints]:
-    """Breadth-first tree of a graph given by arcs: (vertex, parent, arc from parent to vertex)."""
-    order = np.argsort(tail * n + head, kind="stable")
-    key = (tail * n + head)[order]
-    order = order[
-        np.concatenate([[True], key[1:] != key[:-1]])
-    ]  # of several arcs between two any one will do
-    offsets = np.searchsorted(tail[order], np.arange(n + 1))
-    graph = csr_array((np.ones(len(order), dtype=np.int8), head[order], offsets), shape=(n, n))
-    found, parent = breadth_first_order(graph, root)
-    vertex = found[1:].astype(np.int64)
-    above = parent[vertex].astype(np.int64)
-    place = np.searchsorted((tail * n + head)[order], above * n + vertex)
-    return vertex, above, order[place]
+def _order(key: Ints, n: int) -> Ints:
+    """Stable argsort of integers 0 … n − 1; NumPy sorts short integers by counting."""
+    return np.argsort(key.astype(np.uint16) if n <= 2**16 else key, kind="stable")
+
+
+def _parents(head: Ints, offsets: Ints, root: int) -> Ints:
+    """(n,) parents in a breadth-first tree of a graph, −1 for the root. Arcs from each node stand together,
+    from ``offsets`` (n + 1,) on; several between two nodes and from a node to itself do no harm."""
+    n = len(offsets) - 1
+    graph = csr_array((np.ones(len(head), dtype=np.int8), head, offsets), shape=(n, n))
+    _, parent = breadth_first_order(graph, root)
+    return np.where(parent >= 0, parent, -1).astype(np.int64)
 
 
 def _accumulate(values: np.ndarray, up: Ints, root: int) -> np.ndarray:

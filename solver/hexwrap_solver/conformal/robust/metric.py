@@ -8,7 +8,11 @@ import numpy as np
 
 from hexwrap_solver.arrays import Floats, Ints
 from hexwrap_solver.conformal.energy import corner_angles
+from hexwrap_solver.conformal.robust.delaunay import make_delaunay
 from hexwrap_solver.conformal.robust.mirror import MirrorMesh
+
+#: Edges whose cotangents add up to more than this, relative to their size and to 1, are Delaunay for sure.
+CERTAIN = 1e-6
 
 
 @dataclass(frozen=True)
@@ -26,12 +30,26 @@ class Metric:
     length: Floats
 
 
+def measure_delaunay(mesh: MirrorMesh, u: Floats) -> tuple[Metric, int]:
+    """The Delaunay metric with logarithmic factors u, and the number of flips that it took.
+
+    Near a solution there are hardly any, and the cotangents that are needed anyway tell so.
+    """
+    metric = measure(mesh, u)
+    one, other = metric.cotangent[::2], metric.cotangent[1::2]
+    certain = (one + other > CERTAIN * (1 + np.abs(one) + np.abs(other))) & (one != 0) & (other != 0)
+    certain &= ~(mesh.outer[::2] | mesh.outer[1::2] | mesh.crossing)
+    flips = make_delaunay(mesh, u, doubtful=np.flatnonzero(~certain))
+    return (measure(mesh, u), flips) if flips else (metric, 0)
+
+
 def measure(mesh: MirrorMesh, u: Floats) -> Metric:
-    """The metric with logarithmic factors u, for which the mesh must be Delaunay."""
+    """The metric with logarithmic factors u. Right where the mesh is Delaunay in it; triangles that break the
+    triangle inequality have cotangents 0."""
     length = mesh.scaled(u)
     start, end, cotangent = (np.zeros(len(mesh.origin)) for _ in range(3))
 
-    sides = mesh.triangles().T
+    sides = mesh.triangles()
     side = length[sides >> 1]
     corners = corner_angles(np.exp(side - side.max(axis=0)))  # row k is opposite to side k
     start[sides] = corners.angle[[1, 2, 0]]

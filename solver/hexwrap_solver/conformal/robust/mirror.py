@@ -51,22 +51,35 @@ class MirrorMesh:
     crossing: Bools
     turn: Ints
     log_length: Floats
+    _faces: tuple[Ints, Ints] | None = None
 
     def scaled(self, u: Floats) -> Floats:
         """(e,) log-lengths in the metric with logarithmic factors u."""
         return self.log_length + (u[self.origin[::2]] + u[self.origin[1::2]]) / 2
 
     def triangles(self) -> Ints:
-        """(t, 3) the half-edges of every front triangle."""
-        first = np.flatnonzero(~self.outer & ~np.repeat(self.crossing, 2))
-        second = self.next[first]
-        third = self.next[second]
-        once = (first < second) & (first < third)
-        return np.stack([first, second, third], axis=1)[once]
+        """(3, t) the half-edges of every front triangle."""
+        return self._found()[0]
 
     def chain(self) -> Ints:
         """(k,) all outer half-edges."""
-        return np.flatnonzero(self.outer)
+        return self._found()[1]
+
+    def flipped(self) -> None:
+        """To be told after every flip."""
+        self._faces = None
+
+    def _found(self) -> tuple[Ints, Ints]:
+        """Triangles and chain, which last until the next flip."""
+        if self._faces is None:
+            first = np.flatnonzero(~self.outer & ~np.repeat(self.crossing, 2))
+            second = self.next[first]
+            first, second = first[first < second], second[first < second]
+            third = self.next[second]
+            once = first < third
+            triangles = np.stack([first[once], second[once], third[once]])
+            self._faces = triangles, np.flatnonzero(self.outer)
+        return self._faces
 
     def cross_length(self, half_edges: Ints, log_length: Floats) -> Floats:
         """Log-length of the crossing edge at the origin of outer half-edges, −inf on the boundary."""

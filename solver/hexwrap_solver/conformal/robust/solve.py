@@ -12,7 +12,7 @@ from hexwrap_solver.conformal.boundary import cone_angle_of
 from hexwrap_solver.conformal.cut import cut_open
 from hexwrap_solver.conformal.energy import Energy, opposite_lengths
 from hexwrap_solver.conformal.layout import normalise
-from hexwrap_solver.conformal.orientation import misdrawn
+from hexwrap_solver.conformal.orientation import drawn_error, misdrawn
 from hexwrap_solver.conformal.robust.delaunay import make_delaunay
 from hexwrap_solver.conformal.robust.descent import ACCEPTED, Descent, FlipEnergy, descend
 from hexwrap_solver.conformal.robust.develop import develop
@@ -27,7 +27,7 @@ from hexwrap_solver.conformal.robust.refine import (
     spread,
 )
 from hexwrap_solver.conformal.robust.straight import straighten
-from hexwrap_solver.conformal.span import MAX_SPAN, check_reach, check_span, largest_span
+from hexwrap_solver.conformal.span import MAX_SPAN, check_reach, check_span, failure, largest_span
 from hexwrap_solver.conformal.types import ConformalMap, Deck, Targets
 from hexwrap_solver.errors import ConvergenceError
 from hexwrap_solver.surface.types import Surface
@@ -40,6 +40,9 @@ MAX_ROUNDS = 40
 PATIENCE, FEW, SHELLS = 6, 30, 2
 #: Refinement that makes more than so many times the vertices, and so many more, does not come to an end.
 MOST, MOST_MORE = 2, 4000
+#: ``spread`` makes at most so many times the vertices, or is left out: where it goes on and on it often makes
+#: the mesh worse. Only where no map is found without, it is tried.
+SPREAD_MOST = 1.5
 #: How exact prescribed boundary angles are, radians.
 PROMISED = 1e-9
 REFINED = "The mesh was refined:"
@@ -58,13 +61,28 @@ def solve_with_flips(
     Raises ConvergenceError where double precision does not suffice.
     """
     problem = _problem(surface, targets, start)
-    iterations, fewest = 0, len(surface.faces)
+    omitted: list[int] = []
+    try:
+        return _refined(surface, problem, progress, SPREAD_MOST, omitted)
+    except ConvergenceError:
+        if not omitted:
+            raise
+        return _refined(surface, problem, progress, np.inf, [])
+
+
+def _refined(
+    surface: Surface, problem: Problem, progress: Progress, most: float, omitted: list[int]
+) -> ConformalMap:
+    """The map of a problem on ``surface``, refined as often as need be. Rounds whose ``spread`` would make
+    more than ``most`` times the vertices go without, and into ``omitted``."""
+    iterations, fewest, span = 0, len(surface.faces), np.inf
     for attempt in range(MAX_ROUNDS):
         problem = _uncollapse(problem)
-        found = _draw(problem, _flatten(problem, progress))
+        found = _draw(problem, _flatten(problem, progress, span))
         iterations += found.iterations
         wrong = np.flatnonzero(misdrawn(found))
         if not len(wrong):
+            _check_drawn(found, problem.targets)
             return _told(found, surface, iterations)
         problem = replace(problem, u=found.log_scale)
         before = len(problem.surface.vertices)
@@ -73,16 +91,24 @@ def solve_with_flips(
         if len(problem.surface.vertices) == before:
             problem = split_edges(problem, *split_places(problem.surface, problem.targets, wrong, attempt))
         if len(wrong) >= fewest:
-            problem = spread(problem, before)
+            wide = spread(problem, before)
+            if len(wide.surface.vertices) <= most * len(problem.surface.vertices):
+                problem = wide
+            else:
+                omitted.append(attempt)
         fewest = min(fewest, len(wrong))
+        span = min(span, float(np.ptp(found.log_scale)))
         if len(problem.surface.vertices) > MOST * len(surface.vertices) + MOST_MORE:
             break
     inserted = len(problem.surface.vertices) - len(surface.vertices)
-    raise ConvergenceError(
+    raise failure(
+        span,
+        found.deck.angle,
         f"After {attempt + 1} rounds of refinement with {inserted} new vertices {len(wrong)} triangles still "
-        "turn over in the domain: around the named vertices the mesh does not suit the boundary angles; "
-        "remesh it more evenly and finer there, or ask for angles nearer to 180°.",
-        vertices=_sent(surface, problem.parent[wrong]),
+        "turn over in the domain",
+        "around the named vertices the mesh does not suit the boundary angles; remesh it more evenly and "
+        "finer there, or ask for angles nearer to 180°",
+        _sent(surface, problem.parent[wrong]),
     )
 
 
@@ -142,8 +168,12 @@ class _Flat:
     flips: int
 
 
-def _flatten(problem: Problem, progress: Progress) -> _Flat:
-    """The metric with the problem's angle sums. Raises ConvergenceError."""
+def _flatten(problem: Problem, progress: Progress, known_span: float = np.inf) -> _Flat:
+    """The metric with the problem's angle sums. Raises ConvergenceError.
+
+    known_span: the least span of u that came out of the rounds of refinement so far; later ones may have run
+    away.
+    """
     surface, targets = problem.surface, problem.targets
     free = bool((targets.tie == 0).any() and len(targets.tie_angle) == 1)  # the cone angle comes out
     turn = _turns(surface)
@@ -158,10 +188,13 @@ def _flatten(problem: Problem, progress: Progress) -> _Flat:
     angle = cone_angle_of(targets, known, surface)
     check_span(descent.u, angle)
     if not (descent.residual <= ACCEPTED and _met(targets, sums, surface)):
-        raise ConvergenceError(
+        raise failure(
+            min(known_span, float(np.ptp(descent.u))),
+            angle,
             f"Newton's method with flips ended after {descent.iterations} steps with angle sums still "
-            f"{descent.residual:.1e} rad off: double precision cannot hold the map of this surface; "
-            "remesh it more evenly."
+            f"{descent.residual:.1e} rad off",
+            "double precision cannot hold the map of this surface; remesh it more evenly",
+            [],
         )
     return _Flat(mesh, turn, unit, angle, descent, sums, flips + descent.flips)
 
@@ -208,6 +241,22 @@ def _centred(descent: Descent, targets: Targets) -> tuple[Floats, Metric]:
         return descent.u, descent.metric
     middle = float(descent.u.min() + descent.u.max()) / 2
     return descent.u - middle, replace(descent.metric, length=descent.metric.length - middle)
+
+
+def _check_drawn(found: ConformalMap, targets: Targets) -> None:
+    """Raises ConvergenceError where boundary angles, as drawn, are not as exact as promised: small residuals
+    add up along the way through a domain of very large and very small parts."""
+    loops = np.concatenate(found.surface.loops)
+    off = np.where(targets.tie[loops] < 0, np.concatenate(found.boundary_angles) - targets.angle[loops], 0.0)
+    error = drawn_error(found)
+    if error + np.abs(off).max() > PROMISED:
+        raise failure(
+            float(np.ptp(found.log_scale)),
+            found.deck.angle,
+            f"Boundary angles of the map as drawn would be {error:.1e} rad off",
+            "double precision cannot hold the map of this surface; remesh it more evenly",
+            [],
+        )
 
 
 def _told(found: ConformalMap, surface: Surface, iterations: int) -> ConformalMap:
