@@ -33,9 +33,9 @@ SHIFTS = (0.0, 1e-12, 1e-9, 1e-6)
 OVERSHOOT = 0.1
 MAX_TRIALS = 30
 #: After a full step, the factorised Hessian is used again where that many such chord steps (each leaving as
-#: much of the residual as the last step did) would reach rounding: a solve costs a fourth to a sixth of a
-#: factorisation, and Newton's method would need one or two.
-CHORDS = 4
+#: much of the residual as the last step did) would reach rounding: a step costs a fourth of one with a
+#: factorisation, after which two or three chord steps would follow all the same.
+CHORDS = 6
 #: What a chord step may leave of the residual to be kept.
 CHORD_GAIN = 0.2
 #: Where more than so many triangles are broken after so many steps, or any after a full step that leaves at

@@ -21,7 +21,7 @@ AROUND = 6
 #: Rows are so many times as high as quads are wide.
 HIGH = 20.0
 #: Vertices around, rows, height (over a circumference of 2π), boundary angles.
-BANDS = [(11, 21, 0.025, "entrance"), (11, 21, 0.025, "densified"), (7, 21, 0.0073, "densified")]
+BANDS = [(11, 21, 0.006, "entrance"), (11, 21, 0.025, "densified"), (7, 21, 0.0073, "densified")]
 
 
 def tube(rows: int) -> Surface:

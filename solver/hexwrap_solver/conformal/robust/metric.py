@@ -45,27 +45,32 @@ def measure_delaunay(mesh: MirrorMesh, u: Floats) -> tuple[Metric, int]:
 
 def measure(mesh: MirrorMesh, u: Floats) -> Metric:
     """The metric with logarithmic factors u. Right where the mesh is Delaunay in it; triangles that break the
-    triangle inequality have cotangents 0."""
-    length = mesh.scaled(u)
+    triangle inequality have cotangents 0.
+
+    Angles come from ratios of lengths, and these from differences of u: sums of large u would lose digits.
+    """
     start, end, cotangent = (np.zeros(len(mesh.origin)) for _ in range(3))
 
     sides = mesh.triangles()
-    side = length[sides >> 1]
+    opposite = u[mesh.origin[sides[[2, 0, 1]]]]
+    side = mesh.log_length[sides >> 1] - (opposite - opposite[0]) / 2
     corners = corner_angles(np.exp(side - side.max(axis=0)))  # row k is opposite to side k
     start[sides] = corners.angle[[1, 2, 0]]
     end[sides] = corners.angle[[2, 0, 1]]
     cotangent[sides] = corners.cotangent()
 
     cells = mesh.chain()
-    side = length[cells >> 1]
-    m = 0.5 * np.exp(mesh.cross_length(cells, length) - side)
-    n = 0.5 * np.exp(mesh.cross_length(mesh.next[cells], length) - side)
+    following = mesh.next[cells]
+    side = mesh.log_length[cells >> 1]
+    slope = (u[mesh.origin[cells]] - u[mesh.origin[following]]) / 2
+    m = 0.5 * np.exp(mesh.cross_length(cells, mesh.log_length) - side + slope)
+    n = 0.5 * np.exp(mesh.cross_length(following, mesh.log_length) - side - slope)
     along = np.sqrt(np.maximum((1 - (n - m)) * (1 + (n - m)), 0.0))  # its share of the mirror line / side
     start[cells] = np.arctan2(along, m - n)
     end[cells] = np.arctan2(along, n - m)
     with np.errstate(divide="ignore"):
         cotangent[cells] = np.where(along > 0, (m + n) / along, 0.0)
-    return Metric(start, end, cotangent, length)
+    return Metric(start, end, cotangent, mesh.scaled(u))
 
 
 def angle_sums(mesh: MirrorMesh, metric: Metric) -> Floats:
