@@ -8,7 +8,7 @@ import numpy as np
 
 from hexwrap_solver.arrays import Bools, Floats, Ints, Progress, Ragged, no_progress
 from hexwrap_solver.conformal.types import ConformalMap
-from hexwrap_solver.errors import PanelsError
+from hexwrap_solver.errors import ConvergenceError, PanelsError
 from hexwrap_solver.panels import limits
 from hexwrap_solver.panels.best import jointly_largest
 from hexwrap_solver.panels.energy import minimise_watertight
@@ -61,6 +61,13 @@ WATERTIGHT_NOTES = (
 )
 
 
+#: Where panels have all but no room, rounding can leave the programme for their sizes without an answer.
+JOINTLY_NOTE = (
+    "The linear programme for the best panel sizes did not converge; the panels have the sizes inscribed in"
+    " their cells, as with target inscribed.",
+)
+
+
 def fit_panels(
     cmap: ConformalMap, pattern: Pattern, settings: PanelSettings, progress: Progress = no_progress
 ) -> FittedPanels:
@@ -87,7 +94,8 @@ def _fit_split(
     normal[regular] = poses.normal
     planes = separating_planes(pattern, edges, normal, settings.joint)
     progress(0.4, "limiting sizes")
-    length, center = _limits(poses, points, planes, regular, pattern, edges, settings, progress)
+    length, center, said = _limits(poses, points, planes, regular, pattern, edges, settings, progress)
+    notes += said
     roomy = length > 0
     kept = np.zeros(pattern.n_cells, dtype=bool)
     kept[regular] = roomy
@@ -168,20 +176,23 @@ def _limits(
     edges: HalfEdges,
     settings: PanelSettings,
     progress: Progress,
-) -> tuple[Floats, Floats]:
-    """Greatest length of each regular panel, and its centre."""
+) -> tuple[Floats, Floats, tuple[str, ...]]:
+    """Greatest length of each regular panel, its centre, and notes."""
     p = points.shape[1]
     at = pattern.faces.offsets[:-1][regular][:, None] + np.arange(p)
     direction, offset = planes.direction[at], planes.offset[at]
     if settings.target == "mean":
         edge = np.linalg.norm(np.roll(points, -1, axis=1) - points, axis=2)
-        return edge.mean(axis=1), poses.center
+        return edge.mean(axis=1), poses.center, ()
     if settings.target == "shortest":
-        return limits.shortest_edge(poses, points, direction, offset)
+        return *limits.shortest_edge(poses, points, direction, offset), ()
     if settings.target == "best":
         partner = _partners(at.ravel(), edges)
-        return jointly_largest(poses, direction, offset, partner, settings.joint, progress)
-    return limits.inscribed(poses, direction, offset)
+        try:
+            return *jointly_largest(poses, direction, offset, partner, settings.joint, progress), ()
+        except ConvergenceError:
+            return *limits.inscribed(poses, direction, offset), JOINTLY_NOTE
+    return *limits.inscribed(poses, direction, offset), ()
 
 
 def _spare(

@@ -30,20 +30,23 @@ def gaps(pattern: Pattern, edges: HalfEdges, panels: Panels) -> Gaps:
     """Facing edges are those that came from the same edge of the pattern."""
     panel_of = np.full(pattern.n_cells, -1, dtype=np.int64)
     panel_of[panels.face] = np.arange(panels.n_panels)
-    left = panel_of[edges.cell]
-    right = np.where(edges.twin >= 0, panel_of[edges.across], -1)
-    here = np.flatnonzero((left >= 0) & (right >= 0))
+    once = edges.pairs()  # both sides see the same
+    left, right = panel_of[edges.cell[once]], panel_of[edges.across[once]]
+    both = (left >= 0) & (right >= 0)
+    here, left, right = once[both], left[both], right[both]
     there = edges.twin[here]
-    left, right = left[here], right[here]
     a, b = _edges_of(pattern, panels, edges.cell[here], here, left)
     c, d = _edges_of(pattern, panels, edges.cell[there], there, right)
     n1, n2 = panels.normal[left], panels.normal[right]
     mean = n1 + n2
     mean /= np.linalg.norm(mean, axis=1)[:, None]
-    result = [np.full(len(edges.cell), np.nan) for _ in range(3)]
-    result[0][here] = _width(a, b, c, d, mean)
-    result[1][here] = np.abs(np.einsum("hd,hd->h", (c + d - a - b) / 2, mean))
-    result[2][here] = np.arctan2(np.linalg.norm(np.cross(n1, n2), axis=1), np.einsum("hd,hd->h", n1, n2))
+    figures = (
+        _width(a, b, c, d, mean),
+        np.abs(np.einsum("hd,hd->h", (c + d - a - b) / 2, mean)),
+        np.arctan2(np.linalg.norm(np.cross(n1, n2), axis=1), np.einsum("hd,hd->h", n1, n2)),
+    )
+    result = np.full((3, len(edges.cell)), np.nan)
+    result[:, here] = result[:, there] = figures
     return Gaps(*result)
 
 

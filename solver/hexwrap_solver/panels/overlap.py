@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from hexwrap_solver.arrays import Floats, Ints, Ragged
+from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged
 
 #: Two panels overlap when they share more area than this, times the squared edge length.
 AREA_TOLERANCE = 1e-9
@@ -28,10 +28,13 @@ def overlap_areas(polygons: Ragged, normal: Floats, edge_length: Floats, first: 
     origin = np.asarray(polygons.values[polygons.offsets[first]], dtype=np.float64)
     a, b = (_project(polygons, which, origin, x_axis, y_axis) for which in (first, second))
     slack = DEPTH_TOLERANCE * np.minimum(edge_length[first], edge_length[second])
-    open_pairs = np.flatnonzero(~(_separated(a, b, slack) | _separated(b, a, slack)))
+    # Nearly always the edges that face each other separate; only where they do not all others are tried.
+    open_pairs = np.flatnonzero(~(_facing_edge_separates(a, b, slack) | _facing_edge_separates(b, a, slack)))
+    a, b, slack = a[..., open_pairs], b[..., open_pairs], slack[open_pairs]
+    still = ~(_any_edge_separates(a, b, slack) | _any_edge_separates(b, a, slack))
     area = np.zeros(len(first))
-    shapes = [shapely.make_valid(shapely.polygons(_closed(side[open_pairs]))) for side in (a, b)]
-    area[open_pairs] = shapely.area(shapely.intersection(*shapes))
+    shapes = [shapely.make_valid(shapely.polygons(_closed(side[..., still].T))) for side in (a, b)]
+    area[open_pairs[still]] = shapely.area(shapely.intersection(*shapes))
     return area
 
 
@@ -51,24 +54,47 @@ def _perpendicular(n: Floats) -> Floats:
 
 
 def _project(polygons: Ragged, which: Ints, origin: Floats, x: Floats, y: Floats) -> Floats:
-    """(k, most corners, 2); shorter polygons repeat their last corner."""
+    """(2, most corners, k), so that NumPy runs along the pairs; shorter polygons repeat their last corner."""
     most = int(polygons.lengths[which].max(initial=3))
-    corner = np.minimum(np.arange(most), polygons.lengths[which][:, None] - 1)
-    spoke = polygons.values[polygons.offsets[which][:, None] + corner] - origin[:, None]
-    return np.stack([np.einsum("kcd,kd->kc", spoke, x), np.einsum("kcd,kd->kc", spoke, y)], axis=2)
+    corner = np.minimum(np.arange(most)[:, None], polygons.lengths[which] - 1)
+    place = np.ascontiguousarray(polygons.values.T)[:, polygons.offsets[which] + corner]
+    spoke = place - origin.T[:, None]
+    return np.stack([(spoke * axis.T[:, None]).sum(axis=0) for axis in (x, y)])
 
 
-def _separated(a: Floats, b: Floats, slack: Floats) -> np.ndarray:
-    """Whether the line of some edge of a has all of a on one side and all of b on the other."""
+def _edge_normals(a: Floats) -> tuple[Floats, Bools]:
+    """(2, corners, k) unit normals of the edges, and which edges have a length."""
     edge = np.roll(a, -1, axis=1) - a
-    length = np.linalg.norm(edge, axis=2)
-    axis = np.stack([edge[..., 1], -edge[..., 0]], axis=2) / np.where(length > 0, length, 1.0)[..., None]
-    own = np.einsum("ked,kcd->kec", axis, a)
-    other = np.einsum("ked,kcd->kec", axis, b)
-    ahead = other.min(axis=2) >= own.max(axis=2) - slack[:, None]
-    behind = other.max(axis=2) <= own.min(axis=2) + slack[:, None]
-    return np.asarray(np.any((ahead | behind) & (length > 0), axis=1))
+    length = np.hypot(*edge)
+    return np.stack([edge[1], -edge[0]]) / np.where(length > 0, length, 1.0), length > 0
+
+
+def _facing_edge_separates(a: Floats, b: Floats, slack: Floats) -> Bools:
+    """(k,) whether the line of that edge of a does which looks most towards b."""
+    normal, there = _edge_normals(a)
+    towards = b.mean(axis=1) - a.mean(axis=1)
+    facing = np.where(there, normal[0] * towards[0] + normal[1] * towards[1], -np.inf).argmax(axis=0)
+    at = facing, np.arange(len(facing))
+    return np.asarray(_separates(normal[:, *at], a, b, slack) & there[at])
+
+
+def _any_edge_separates(a: Floats, b: Floats, slack: Floats) -> Bools:
+    """(k,) whether the line of some edge of a has all of a on one side and all of b on the other."""
+    normal, there = _edge_normals(a)
+    found = np.zeros(a.shape[2], dtype=bool)
+    for k in range(a.shape[1]):
+        found |= _separates(normal[:, k], a, b, slack) & there[k]
+    return found
+
+
+def _separates(axis: Floats, a: Floats, b: Floats, slack: Floats) -> Bools:
+    """(k,) whether the shadows of a and b on the axes (2, k) are apart."""
+    own, other = (axis[0] * side[0] + axis[1] * side[1] for side in (a, b))
+    ahead = other.min(axis=0) >= own.max(axis=0) - slack
+    behind = other.max(axis=0) <= own.min(axis=0) + slack
+    return np.asarray(ahead | behind)
 
 
 def _closed(points: Floats) -> Floats:
+    """(k, corners, 2), the first corner again at the end."""
     return np.concatenate([points, points[:, :1]], axis=1)

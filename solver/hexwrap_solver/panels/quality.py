@@ -69,7 +69,8 @@ def _count_overlaps(pattern: Pattern, edges: HalfEdges, panels: Panels) -> int:
     panel_of[panels.face] = np.arange(panels.n_panels)
     once = edges.pairs()
     pairs = np.stack([panel_of[edges.cell[once]], panel_of[edges.across[once]]], axis=1)
-    pairs = np.unique(np.sort(pairs[(pairs >= 0).all(axis=1)], axis=1), axis=0)
+    low, high = np.sort(pairs[(pairs >= 0).all(axis=1)], axis=1).T
+    pairs = np.stack(np.divmod(np.unique(low * panels.n_panels + high), max(panels.n_panels, 1)), axis=1)
     return len(overlapping_pairs(panels.polygons, panels.normal, mean_edges(panels.polygons), pairs))
 
 

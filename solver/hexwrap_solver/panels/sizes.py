@@ -6,6 +6,7 @@ lost is then an exact dynamic programme over the number of classes.
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from dataclasses import dataclass
 from typing import Literal
 
@@ -100,52 +101,65 @@ def _trace(choice: list[Ints], k: int, m: int) -> Ints:
 def partition_by_worst(length: Floats, floored: Floats, classes: int) -> Partition:
     """Least greatest loss limit − length over all panels, exactly; both (n,) ascending, floored ≤ length.
 
-    A loss t suffices when the classes drawn greedily from below (each as long as t allows) are few enough;
-    the least sufficient t is found by bisection down to neighbouring floating-point numbers.
+    A loss t suffices when the classes drawn greedily from below (each as long as t allows) are few enough.
+    The least sufficient t is some panel's loss; bisection jumps from one such loss to the next.
     """
+    length_list, floored_list = length.tolist(), floored.tolist()
     starts: list[Ints] = []
     loss: list[float] = []
-    previous: Ints | None = None
+    found, high, least = [0], length_list[-1] - floored_list[0], float((length - floored).max())
     for k in range(1, classes + 1):
-        if previous is not None and len(previous) < k - 1:
+        if len(found) < k - 1 and high <= least:  # with equal losses, one class more may gain nothing yet
             break
-        found = _least_worst(length, floored, k)
-        starts.append(found)
-        end = np.append(found[1:], len(length)) - 1
-        loss.append(float(np.max(length[end] - floored[found])))
-        previous = found
+        found, high = _least_worst(length_list, floored_list, k, found, high)
+        starts.append(np.array(found, dtype=np.int64))
+        loss.append(high)
     return Partition(starts, np.array(loss))
 
 
-def _least_worst(length: Floats, floored: Floats, classes: int) -> Ints:
-    """Starts of the classes with the least greatest loss."""
-    found = _greedy(length, floored, 0.0, classes)
-    if found is not None:
-        return found
-    low, high = 0.0, float(length[-1] - floored[0])
-    found = np.zeros(1, dtype=np.int64)
-    while low < (middle := (low + high) / 2) < high:
-        better = _greedy(length, floored, middle, classes)
-        if better is None:
-            low = middle
+def _least_worst(
+    length: list[float], floored: list[float], classes: int, found: list[int], high: float
+) -> tuple[list[int], float]:
+    """Starts of the classes with the least greatest loss, and that loss; found, high: any that will do."""
+    low = 0.0
+    while low < high:
+        starts, reached, more = _greedy(length, floored, low if low == 0 else (low + high) / 2, classes)
+        if starts is None:
+            low = more
         else:
-            high, found = middle, better
-    return found
+            found, high = starts, reached
+    return found, high
 
 
-def _greedy(length: Floats, floored: Floats, loss: float, classes: int) -> Ints | None:
-    """Starts of the fewest classes whose loss stays within the given one, None if more than ``classes``."""
+def _greedy(
+    length: list[float], floored: list[float], loss: float, classes: int
+) -> tuple[list[int] | None, float, float]:
+    """Starts of the fewest classes whose loss stays within the given one, None if more than ``classes``; the
+    greatest loss among them; and the least greater loss that would lengthen a class.
+
+    Plain numbers: a few dozen searches of a list take less time than one array operation each.
+    """
     starts: list[int] = []
-    at = 0
-    while at < len(length):
+    reached, more = 0.0, np.inf
+    n, at = len(length), 0
+    while at < n:
         if len(starts) == classes:
-            return None
+            return None, reached, more
         starts.append(at)
-        after = int(np.searchsorted(length, floored[at] + loss, side="right"))
-        if after <= at:
-            return None
+        base = floored[at]
+        after = bisect_right(length, base + loss, at)
+        # The sum is rounded, the difference decides.
+        while after < n and length[after] - base <= loss:
+            after += 1
+        while after > at and length[after - 1] - base > loss:
+            after -= 1
+        if after < n:
+            more = min(more, length[after] - base)
+        if after == at:
+            return None, reached, more
+        reached = max(reached, length[after - 1] - base)
         at = after
-    return np.array(starts, dtype=np.int64)
+    return starts, reached, more
 
 
 def partition(

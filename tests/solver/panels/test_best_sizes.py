@@ -99,3 +99,14 @@ def test_an_increment_that_only_the_inscribed_panels_reach_is_kept():
     assert measure(cmap, pattern, made).overlaps == 0
     with pytest.raises(PanelsError, match="increment"):
         quantize(fitted, replace(wanted, increment=1.001 * float(smallest[1])))
+
+
+def test_a_programme_without_an_answer_leaves_the_inscribed_sizes(monkeypatch):
+    """As rounding does to it where panels have all but no room; the job need not fail for that."""
+    monkeypatch.setattr(lp, "MOST_STEPS", 1)
+    pattern, cmap = hex_pattern(torus, 24, 8), grid_map(torus, 60, 40, -0.1, 1.8)
+    fitted = fit_panels(cmap, pattern, PanelSettings(target="best"))
+    inscribed = fit_panels(cmap, pattern, PanelSettings(target="inscribed"))
+    assert any("did not converge" in note for note in fitted.notes)
+    assert (fitted.limit == inscribed.limit).all()
+    assert (fitted.center == inscribed.center).all()

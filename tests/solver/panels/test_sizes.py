@@ -57,6 +57,12 @@ def test_worst_partition_is_optimal(length, classes, increment):
         )
 
 
+def test_classes_go_on_after_one_that_gains_nothing():
+    """Three equal gaps: the greatest loss falls with the second class and the fourth, not with the third."""
+    length = np.array([1.0, 2.0, 3.0, 4.0])
+    assert partition_by_worst(length, length, 4).loss.tolist() == [3.0, 1.0, 1.0, 0.0]
+
+
 @settings(max_examples=30)
 @given(st.integers(0, 10**6), st.integers(2, 20), st.sampled_from(["area", "worst"]))
 def test_never_worse_than_an_arithmetic_grid(seed, classes, cost):

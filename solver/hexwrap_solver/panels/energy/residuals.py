@@ -65,22 +65,33 @@ def surface_residuals(points: Floats, length: Floats, tree: TriangleTree) -> tup
     return nearest.distance / length, direction / length[:, None]
 
 
-def plane_distances(points: Floats, length: Floats) -> tuple[Floats, Floats]:
-    """Distances of the corners from their best plane / ℓ, (q, p), and derivatives (q, p, p, 3).
+def plane_distances(points: Floats, length: Floats) -> Floats:
+    """(q, p) distances of the corners from their best plane / ℓ.
 
-    Unlike the volumes they are no smaller for short edges, and so do not reward collapsed ones. The plane
-    moves along with the corners (variable projection; Golub and Pereyra 1973): what a motion of the plane
-    can make up for is projected out.
+    Unlike the volumes they are no smaller for short edges, and so do not reward collapsed ones.
+    """
+    spokes, axes = _best_planes(points)
+    return np.asarray((spokes @ axes[:, :, :1])[..., 0] / length[:, None])
+
+
+def plane_slopes(points: Floats, length: Floats) -> Floats:
+    """(q, p, p, 3) derivatives of ``plane_distances`` by the corners.
+
+    The plane moves along with the corners (variable projection; Golub and Pereyra 1973): what a motion of
+    the plane can make up for is projected out.
     """
     p = points.shape[1]
-    spokes = points - points.mean(axis=1, keepdims=True)
-    _, axes = np.linalg.eigh(spokes.transpose(0, 2, 1) @ spokes)
-    normal = axes[:, :, 0]
+    spokes, axes = _best_planes(points)
     in_plane = spokes @ axes[:, :, 1:]
     in_plane /= np.linalg.norm(in_plane, axis=1, keepdims=True)
     projector = np.eye(p) - 1 / p - in_plane @ in_plane.transpose(0, 2, 1)
-    value = np.einsum("qkd,qd->qk", spokes, normal) / length[:, None]
-    return value, projector[..., None] * (normal / length[:, None])[:, None, None]
+    return np.asarray(projector[..., None] * (axes[:, :, 0] / length[:, None])[:, None, None])
+
+
+def _best_planes(points: Floats) -> tuple[Floats, Floats]:
+    """(q, p, 3) corners about their mean; (q, 3, 3) principal axes in columns, the normal first."""
+    spokes = points - points.mean(axis=1, keepdims=True)
+    return spokes, np.linalg.eigh(spokes.transpose(0, 2, 1) @ spokes)[1]
 
 
 def planarity(points: Points, length: Floats) -> Points:

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csr_array
 
 from hexwrap_solver.arrays import Floats, Ints, Progress, Ragged, no_progress
-from hexwrap_solver.conformal.normal_matrix import NormalMatrix
-from hexwrap_solver.panels.energy.residuals import jacobian, plane_distances, residuals, surface_residuals
+from hexwrap_solver.panels.energy.cell_matrix import CellMatrix
+from hexwrap_solver.panels.energy.residuals import (
+    jacobian,
+    plane_distances,
+    plane_slopes,
+    residuals,
+    surface_residuals,
+)
 from hexwrap_solver.panels.types import Weights
 from hexwrap_solver.pattern.types import Pattern
 from hexwrap_solver.surface.closest import TriangleTree
 
-#: Gauss–Newton steps for each weight of the plane distances.
+#: Most Gauss–Newton steps for each weight of the plane distances.
 STEPS_PER_STAGE = 12
 
 #: Weight of the plane distances in the first stage; from stage to stage tenfold more, so that flatness wins.
@@ -24,14 +28,30 @@ FIRST_FLATNESS, STAGES = 1e3, 5
 #: Plane distances / ℓ below this count as flat.
 FLAT = 1e-9
 
-#: A stage ends when a step lowers its energy by less than this fraction.
-DECREASE = 1e-4
+#: A stage ends when a step lowers its energy by less than this fraction. What one leaves undone, the next
+#: does along with its own work; nobody comes after the last, nor after the only one where nothing is to
+#: become flat.
+DECREASE, LAST_DECREASE, ONLY_DECREASE = 2e-2, 4e-3, 1e-4
+
+#: Nor does the last stage end before the greatest distance from a plane / ℓ is below this.
+FLAT_ENOUGH = 1e-4
+
+#: Corners leave the surface by about this / ℓ before the first step. A regular pattern on a saddle-shaped
+#: surface can become flat in mirrored ways and balances between them, so that the first dozens of steps would
+#: only wait for rounding to tip it over.
+NUDGE = 0.03
 
 #: Weight of the squared movement / ℓ²: energies that only know shapes would move the mesh by whole edges.
 ANCHOR = 10.0
 
-#: Damping relative to 1/ℓ², and how it changes after a good and after a bad step.
-DAMPING, EASE, TIGHTEN = 1e-3, 0.2, 8.0
+#: Damping relative to 1/ℓ², how it changes after a good and after a bad step, and its least value.
+DAMPING, EASE, TIGHTEN, LEAST_DAMPING = 1e-3, 0.2, 8.0, 1e-9
+
+#: A step is halved at most down to this fraction.
+SHORTEST = 1e-3
+
+#: Most corrections at the end that see the planes only.
+MOST_CORRECTIONS = 5
 
 
 @dataclass(frozen=True)
@@ -44,12 +64,19 @@ class _Group:
 
 
 @dataclass(frozen=True)
-class _Part:
-    """residual: (rows,). slope: (rows, p, 3) by the vertices (rows, p)."""
+class _State:
+    """points: (n, 3). residual: of each part, (q, m), see ``_Problem``; pull: (n, 3) the anchor's.
+    asked, planes: energy of what was asked for, and of the plane distances."""
 
-    residual: Floats
-    slope: Floats
-    vertex: Ints
+    points: Floats
+    residual: tuple[Floats, ...]
+    pull: Floats
+    asked: float
+    planes: float
+
+    @property
+    def energy(self) -> float:
+        return self.asked + self.planes
 
 
 def minimise_watertight(
@@ -66,32 +93,98 @@ def minimise_watertight(
     from stage to stage, until faces are flat.
     """
     problem = _Problem(pattern, length, weights, surface)
-    points = pattern.vertices.copy()
-    curve = [problem.energy(points, 0.0)]
+    flat = weights.planarity > 0
+    state = problem.at(pattern.vertices, 0.0)
+    curve = [state.asked]
     damping = DAMPING
-    for stage in range(STAGES if weights.planarity > 0 else 1):
+    if flat and problem.bend(state.points) >= FLAT:
+        state = problem.at(state.points + NUDGE * problem.unit * _nudges(pattern), 0.0)
+    for stage in range(STAGES if flat else 1):
         flatness = weights.planarity * FIRST_FLATNESS * 10.0**stage
-        energy = problem.energy(points, flatness)
+        state = problem.at(state.points, flatness)
+        last = flat and stage == STAGES - 1
+        enough = ONLY_DECREASE if not flat else LAST_DECREASE if last else DECREASE
         for step in range(STEPS_PER_STAGE):
             done = (stage + step / STEPS_PER_STAGE) / STAGES
-            progress(done, f"flatness weight {flatness:.0e}, energy {energy:.3e}")
-            tried = points + problem.step(points, flatness, damping)
-            reached = problem.energy(tried, flatness)
-            damping = max(damping * (EASE if reached < energy else TIGHTEN), 1e-9)
-            if not reached < energy:  # nor where it is no number
+            progress(done, f"flatness weight {flatness:.0e}, energy {state.energy:.3e}")
+            problem.linearise(state, flatness, damping)
+            found, fraction = _search(problem, state, flatness)
+            damping = max(damping * (EASE if fraction == 1 else TIGHTEN), LEAST_DAMPING)
+            if fraction == 0:
                 continue
-            slow = energy - reached < DECREASE * energy
-            points, energy = tried, reached
-            curve.append(problem.energy(points, 0.0))
-            if slow:
+            slow = state.energy - found.energy < enough * state.energy
+            state = found
+            curve.append(state.asked)
+            if slow and not (last and problem.bend(state.points) > FLAT_ENOUGH):
                 break
-        if problem.bend(points) < FLAT:
+        if problem.bend(state.points) < FLAT:
             break
-    return points, np.array(curve)
+    if flat:
+        state = _flattened(problem, state, flatness)
+        curve.append(state.asked)
+    return state.points, np.array(curve)
+
+
+def _search(problem: _Problem, state: _State, flatness: float) -> tuple[_State, float]:
+    """A state of less energy, and the fraction of the step that led there: 0 where none was found.
+
+    Faces turn as they move, so that a long step leaves their planes. A second step from where the first one
+    ends, with the same derivatives and so without another factorisation, leads back to them (second-order
+    correction; Fletcher 1982). If that is not enough, both are shortened along t·step + t²·correction.
+    """
+    step = problem.step(state)
+    best = problem.at(state.points + step, flatness)
+    correction = np.zeros_like(step)
+    if np.isfinite(best.energy):
+        correction = problem.step(best)
+        corrected = problem.at(best.points + correction, flatness)
+        best = corrected if corrected.energy < best.energy else best
+    fraction = 1.0
+    while not best.energy < state.energy:  # nor where it is no number
+        fraction /= 2
+        if fraction < SHORTEST:
+            return state, 0.0
+        best = problem.at(state.points + fraction * step + fraction**2 * correction, flatness)
+    return best, fraction
+
+
+def _flattened(problem: _Problem, state: _State, flatness: float) -> _State:
+    """The nearest flat mesh: however heavy, a weight leaves distances that the other energies still pull at.
+
+    "Nearest" in the sense of the matrix factorised last, so that the other energies change least.
+    """
+    bend = problem.bend(state.points)
+    for _ in range(MOST_CORRECTIONS):
+        tried = problem.at(state.points + problem.step(state, planes_only=True), flatness)
+        if not tried.planes < state.planes / 2:
+            break
+        reached = problem.bend(tried.points)
+        if reached > bend:
+            break
+        state, bend = tried, reached
+    return state
+
+
+def _nudges(pattern: Pattern) -> Floats:
+    """(n, 3) along the normals, of order 1, the same for vertices that are alike in their ring: a surface of
+    revolution keeps its symmetry."""
+    faces = pattern.faces
+    corner = np.arange(len(faces.values)) - faces.offsets[faces.row]
+    kind = pattern.ring[faces.row] * (int(faces.lengths.max()) + 1) + corner
+    least = np.full(len(pattern.vertices), kind.max(), dtype=np.int64)
+    np.minimum.at(least, faces.values.astype(np.int64), kind)
+    _, kind = np.unique(least, return_inverse=True)
+    size = np.random.default_rng(0).normal(size=int(kind.max()) + 1)
+    return np.asarray(size[kind][:, None] * pattern.normals)
 
 
 class _Problem:
-    """Residuals of all cells over the shared vertices."""
+    """Residuals of all cells over the shared vertices.
+
+    Its parts are the groups of cells with the same number p of corners, whose last p residuals are the
+    distances from their planes; and, where the surface counts, the vertices' distances from it. unit: mean
+    target length.
+    """
 
     def __init__(
         self, pattern: Pattern, length: Floats, weights: Weights, surface: TriangleTree | None
@@ -100,47 +193,82 @@ class _Problem:
         self._weights = weights
         self._surface = surface
         self._start = pattern.vertices
-        self._unit = float(length.mean())
-        self._normal = NormalMatrix(np.repeat(pattern.vertices, 3, axis=0))
+        self.unit = float(length.mean())
+        self._anchor = np.sqrt(ANCHOR) / self.unit
+        self._corners = [group.corner for group in self._groups]
+        if surface is not None:
+            self._corners.append(np.arange(len(pattern.vertices))[:, None])
+        self._matrix = CellMatrix(pattern.vertices, self._corners)
+        self._slopes: list[Floats] = []
 
-    def energy(self, points: Floats, flatness: float) -> float:
-        """∞ where a step went so far that squares overflow."""
+    def at(self, points: Floats, flatness: float) -> _State:
+        """The energy is ∞ where a step went so far that squares overflow."""
+        with np.errstate(all="ignore"):
+            return self._at(points, flatness)
+
+    def _at(self, points: Floats, flatness: float) -> _State:
+        pull = self._anchor * (points - self._start)
+        root = np.sqrt(flatness)
+        residual, asked, planes = [], _square(pull), 0.0
         try:
-            parts = [part.residual for part in self._parts(points, flatness)]
+            for g in self._groups:
+                corner = points[g.corner]
+                shape = residuals(corner, g.length, self._weights, angles=g.regular)
+                plane = root * plane_distances(corner, g.length)
+                residual.append(np.concatenate([shape, plane], axis=1))
+                asked, planes = asked + _square(shape), planes + _square(plane)
         except np.linalg.LinAlgError:
-            return np.inf
-        return 0.5 * sum(float(part @ part) for part in [*parts, self._moved(points)])
+            return _State(points, (), pull, np.inf, 0.0)
+        if self._surface is not None:
+            away = self._to_surface(points, self._surface)[0]
+            residual.append(away)
+            asked += _square(away)
+        return _State(points, tuple(residual), pull, asked, planes)
 
     def bend(self, points: Floats) -> float:
         """Greatest distance of a corner from its face's plane / ℓ."""
-        return float(max(np.abs(plane_distances(points[g.corner], g.length)[0]).max() for g in self._groups))
+        return float(max(np.abs(plane_distances(points[g.corner], g.length)).max() for g in self._groups))
 
-    def step(self, points: Floats, flatness: float, damping: float) -> Floats:
-        parts = list(self._parts(points, flatness))
-        slope = _assemble(parts, len(points))
-        hold = np.sqrt(ANCHOR) / self._unit
-        self._normal.factorise(slope, np.ones(slope.shape[0]), hold**2 + damping / self._unit**2)
-        gradient = slope.T @ np.concatenate([part.residual for part in parts]) + hold * self._moved(points)
-        return -self._normal.solve(gradient).reshape(-1, 3)
-
-    def _moved(self, points: Floats) -> Floats:
-        """Movement, flat and scaled so that half its square is the anchor's energy."""
-        return np.asarray(np.sqrt(ANCHOR) / self._unit * (points - self._start)).ravel()
-
-    def _parts(self, points: Floats, flatness: float) -> Iterator[_Part]:
+    def linearise(self, state: _State, flatness: float, damping: float) -> None:
+        """Takes the derivatives at a state; damping is relative to 1/ℓ²."""
+        self._slopes = []
         for g in self._groups:
-            corners, p = points[g.corner], g.corner.shape[1]
-            value = residuals(corners, g.length, self._weights, angles=g.regular)
-            slope = jacobian(corners, g.length, self._weights, angles=g.regular)
-            vertex = np.repeat(g.corner, value.shape[1], axis=0)
-            yield _Part(value.ravel(), slope.reshape(-1, p, 3), vertex)
-            root = np.sqrt(flatness)
-            value, slope = plane_distances(corners, g.length)
-            yield _Part(root * value.ravel(), root * slope.reshape(-1, p, 3), np.repeat(g.corner, p, axis=0))
+            corner = state.points[g.corner]
+            shape = jacobian(corner, g.length, self._weights, angles=g.regular)
+            plane = np.sqrt(flatness) * plane_slopes(corner, g.length)
+            slope = np.concatenate([shape, plane], axis=1)
+            self._slopes.append(slope.reshape(*slope.shape[:2], -1))
         if self._surface is not None:
-            root = np.sqrt(self._weights.surface)
-            value, slope = surface_residuals(points, np.full(len(points), self._unit), self._surface)
-            yield _Part(root * value, root * slope[:, None], np.arange(len(points))[:, None])
+            self._slopes.append(self._to_surface(state.points, self._surface)[1])
+        self._matrix.factorise(self._slopes, self._anchor**2 + damping / self.unit**2)
+
+    def step(self, state: _State, *, planes_only: bool = False) -> Floats:
+        """(n, 3) Gauss–Newton step from a state with the derivatives taken last."""
+        gradient = np.zeros(state.points.size) if planes_only else self._anchor * state.pull.ravel()
+        for g, slope, residual in zip(self._groups, self._slopes, state.residual, strict=False):
+            some = slice(-g.corner.shape[1] if planes_only else 0, None)
+            gradient += self._spread(g.corner, slope[:, some], residual[:, some])
+        if self._surface is not None and not planes_only:
+            gradient += (self._slopes[-1] * state.residual[-1][..., None]).ravel()
+        return -self._matrix.solve(gradient).reshape(-1, 3)
+
+    def _spread(self, corner: Ints, slope: Floats, residual: Floats) -> Floats:
+        """(3n,) Jᵀ r, summed over cells."""
+        share = (residual[:, None] @ slope).ravel()
+        at = 3 * corner[..., None] + np.arange(3)
+        return np.asarray(
+            np.bincount(at.ravel(), weights=share, minlength=self._start.size), dtype=np.float64
+        )
+
+    def _to_surface(self, points: Floats, surface: TriangleTree) -> tuple[Floats, Floats]:
+        """(n, 1) residuals and (n, 1, 3) derivatives."""
+        value, slope = surface_residuals(points, np.full(len(points), self.unit), surface)
+        root = np.sqrt(self._weights.surface)
+        return root * value[:, None], root * slope[:, None]
+
+
+def _square(residual: Floats) -> float:
+    return 0.5 * float(np.vdot(residual, residual))
 
 
 def _groups(pattern: Pattern, length: Floats) -> list[_Group]:
@@ -155,12 +283,3 @@ def _groups(pattern: Pattern, length: Floats) -> list[_Group]:
                 corner = faces.values[faces.offsets[chosen][:, None] + np.arange(count)]
                 groups.append(_Group(corner.astype(np.int64), length[chosen], even))
     return groups
-
-
-def _assemble(parts: list[_Part], vertices: int) -> csr_array:
-    """The parts' rows one after the other, (rows, 3 · vertices)."""
-    data = np.concatenate([part.slope.ravel() for part in parts])
-    column = np.concatenate([(3 * part.vertex[..., None] + np.arange(3)).ravel() for part in parts])
-    entries = np.concatenate([np.full(len(part.residual), 3 * part.vertex.shape[1]) for part in parts])
-    start = np.concatenate([[0], np.cumsum(entries)])
-    return csr_array((data, column, start), shape=(len(entries), 3 * vertices))

@@ -1,0 +1,74 @@
+"""The watertight mesh: its matrix, its derivatives and its symmetry."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hexwrap_solver.panels import fit_panels
+from hexwrap_solver.panels.energy.cell_matrix import CellMatrix
+from hexwrap_solver.panels.energy.residuals import plane_distances, plane_slopes
+from hexwrap_solver.panels.energy.watertight import minimise_watertight
+from hexwrap_solver.panels.polygons import edge_lengths, mean_edges
+from hexwrap_solver.panels.regular import corners
+from hexwrap_solver.panels.types import PanelSettings, Weights
+from tests.solver.panels.cells import catenoid, grid_map, hex_pattern, inverted, quad_pattern, torus
+
+
+def test_cells_sum_up_to_the_normal_matrix():
+    """Hexagons, and single vertices of their own, as with the pull to the surface."""
+    chance = np.random.default_rng(0)
+    pattern = hex_pattern(torus, 8, 3)
+    n = len(pattern.vertices)
+    tables = [pattern.faces.values.reshape(-1, 6), np.arange(n)[:, None]]
+    slopes = [chance.normal(size=(len(table), 7, 3 * table.shape[1])) for table in tables]
+    matrix = CellMatrix(pattern.vertices, tables)
+    matrix.factorise(slopes, 0.5)
+    dense = 0.5 * np.eye(3 * n)
+    for table, slope in zip(tables, slopes, strict=True):
+        unknown = (3 * table[..., None] + np.arange(3)).reshape(len(table), -1)
+        for at, j in zip(unknown, slope, strict=True):
+            dense[np.ix_(at, at)] += j.T @ j
+    right = chance.normal(size=3 * n)
+    assert np.allclose(matrix.solve(right), np.linalg.solve(dense, right), rtol=1e-9)
+
+
+@pytest.mark.parametrize("p", [3, 4, 5, 6])
+def test_plane_distances_of_flat_polygons_have_exact_derivatives(p):
+    """Of bent ones the part that a motion of the plane makes up for is left out."""
+    turn = np.linalg.qr(np.random.default_rng(p).normal(size=(3, 3)))[0]
+    irregular = corners(p) * np.linspace(1.0, 1.3, p)[:, None]
+    flat = (np.concatenate([irregular, np.zeros((p, 1))], axis=1) @ turn)[None]
+    length, step = np.array([1.5]), 1e-6
+    slope = plane_slopes(flat, length)
+    for k in range(p):
+        for d in range(3):
+            offset = np.zeros_like(flat)
+            offset[:, k, d] = step
+            ahead, behind = (plane_distances(flat + s * offset, length) for s in (1, -1))
+            # The normal's side is arbitrary.
+            numeric = (ahead - behind) / (2 * step)
+            other = (ahead + behind) / (2 * step)
+            exact = slope[:, :, k, d]
+            assert min(np.abs(x - exact).max() for x in (numeric, -numeric, other, -other)) < 1e-5
+
+
+def test_a_surface_of_revolution_keeps_its_symmetry():
+    """However hexagons on a saddle become flat, they do so alike all around (they tip over from a balance,
+    which magnifies rounding)."""
+    pattern, cmap = hex_pattern(catenoid, 20, 5, -0.6), grid_map(catenoid, 60, 40, -0.7, 1.8)
+    fitted = fit_panels(cmap, pattern, PanelSettings(mode="watertight"))
+    length = (edge_lengths(fitted.shapes) / mean_edges(fitted.shapes)[fitted.shapes.row]).reshape(5, 20, 6)
+    assert np.ptp(length, axis=1).max() < 1e-3
+    assert np.ptp(length, axis=2).min() > 1e-2
+
+
+@pytest.mark.parametrize("make", [hex_pattern, quad_pattern])
+def test_flatness_is_not_bought_with_more_than_it_costs(make):
+    """Without planarity the asked energies alone can only fall, from step to step."""
+    chart = inverted(torus, (0.5, 0.1, 4.0))
+    pattern = make(chart, 20, 6, 0.1)
+    length = np.full(pattern.n_cells, pattern.edge_length)
+    _, curve = minimise_watertight(pattern, length, Weights(planarity=0.0), None)
+    assert len(curve) > 1
+    assert (np.diff(curve) < 0).all()
