@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -55,13 +55,6 @@ def part(solution: Solution, name: str, timings: dict[str, float]) -> Any:
             return solution.support and support(solution.support)
         case _:
             return timings
-
-
-#: By stage: the parts that are known once it is done.
-EARLY: dict[str, dict[str, Callable[[Any], Any]]] = {
-    "map": {"mesh": lambda made: mesh(made.surface), "map": lambda made: conformal(made)},
-    "pattern": {"pattern": lambda made: pattern(made)},
-}
 
 
 def dump(value: Any) -> bytes:
@@ -123,9 +116,13 @@ def pattern(laid: Pattern) -> dict[str, Any]:
 
 
 def panels(solution: Solution) -> dict[str, Any]:
-    made, laid, measured = solution.panels, solution.pattern, solution.quality
-    assert made is not None
-    assert laid is not None
+    assert solution.panels is not None
+    assert solution.pattern is not None
+    return shapes(solution.panels, solution.pattern) | measures(solution)
+
+
+def shapes(made: Panels, laid: Pattern) -> dict[str, Any]:
+    """What is known of the panels before they are measured."""
     labels = laid.labels()
     return {
         "mode": made.mode,
@@ -139,6 +136,15 @@ def panels(solution: Solution) -> dict[str, Any]:
         "normal": flat(made.normal),
         "whole": flat(made.whole),
         "outside": flat(made.outside),
+    }
+
+
+def measures(solution: Solution) -> dict[str, Any]:
+    """What is measured on each panel."""
+    made, laid, measured = solution.panels, solution.pattern, solution.quality
+    assert made is not None
+    assert laid is not None
+    return {
         "planarity": flat(measured.planarity),
         "edge_deviation": flat(measured.edge_deviation),
         "angle_deviation": flat(measured.angle_deviation),
