@@ -18,7 +18,7 @@ from starlette.exceptions import HTTPException
 from starlette.middleware.gzip import GZipMiddleware
 from starlette.responses import Response
 
-from hexwrap_server import __version__
+from hexwrap_server import __version__, garbage
 from hexwrap_server.answers import WORTH_PACKING, problem_response
 from hexwrap_server.docs import add_docs
 from hexwrap_server.engine import Engine
@@ -100,6 +100,7 @@ def serve(settings: Settings) -> None:
             timeout_graceful_shutdown=GRACE,
             h11_max_incomplete_event_size=64 * 1024,
         )
+        garbage.look_no_more()
         _Server(config, app.state.service).run(sockets=[listener])
     except KeyboardInterrupt:
         return

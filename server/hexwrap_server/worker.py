@@ -24,7 +24,7 @@ from typing import IO, Any
 
 import psutil
 
-from hexwrap_server import later
+from hexwrap_server import garbage, later
 from hexwrap_solver.errors import HexwrapError
 
 #: Two workers with two BLAS threads each are many times slower than with one each.
@@ -232,6 +232,7 @@ def main() -> None:
     threading.Thread(target=_listen, args=(inlet, calls), daemon=True).start()
     for module in filter(None, sys.argv[1:]):
         import_module(module)
+    garbage.look_no_more()
     sys.setswitchinterval(SWITCH_INTERVAL)
     _write_frame(outlet, ("ready",))
     while True:

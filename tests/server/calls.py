@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import time
 from pathlib import Path
@@ -24,6 +25,11 @@ def pid(report: Report) -> int:
 
 def environment(report: Report, name: str) -> str | None:
     return os.environ.get(name)
+
+
+def frozen(report: Report) -> int:
+    """Objects that are left out when garbage is looked for."""
+    return gc.get_freeze_count()
 
 
 def talk(report: Report) -> str:
