@@ -367,6 +367,10 @@ class JobManager:
         while True:
             await asyncio.sleep(CATCH_UP_INTERVAL)
             self._ledger.catch_up()
+            try:
+                await asyncio.to_thread(self.store.check_point)
+            except (StorageError, OSError) as error:
+                log.error("the list of jobs cannot be tidied: %s", error)
 
     def _log(self, job: Job, what: str) -> None:
         seconds = round(job.finished - job.started, 3) if job.finished and job.started else None
