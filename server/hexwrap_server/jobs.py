@@ -139,7 +139,7 @@ class JobManager:
                 f"{len(self._queue)} jobs are waiting, the limit of this server; try again in a few seconds.",
                 {"Retry-After": "5"},
             )
-        if item is not None and item in self._running:
+        if item is not None and any(other.status == "running" for other in item.jobs.values()):
             job = replace(job, status="running", started=job.created)
         self.store.add(job, Work(identity, parsed.surface_id, parsed.wanted))
         self._attach(job, item, Work(identity, parsed.surface_id, parsed.wanted))
@@ -259,18 +259,24 @@ class JobManager:
 
     async def _run(self, item: _Item) -> None:
         identity = item.work.identity
+        begun = False
         try:
+            await self._engine.wait_for_place(
+                self._settings.job_seconds, lambda what: self._change(item, stage=what)
+            )
             self.store.start_work(identity)
+            begun = True
             now = time.time()
-            self._change(item, written=True, status="running", started=now)
+            self._change(item, written=True, status="running", stage="", started=now)
             outcome = await self._compute(item)
             packed = await asyncio.to_thread(self.store.keep_outcome, identity, outcome)
             self.store.finish_work(identity, outcome)
             self._heat(identity, packed)
             self._end([_done(job, outcome) for job in item.jobs.values()])
         except asyncio.CancelledError:
-            with contextlib.suppress(StorageError):
-                self.store.take_back(identity)
+            if begun:
+                with contextlib.suppress(StorageError):
+                    self.store.take_back(identity)
             raise
         except HexwrapError as error:
             self._fail(item, error)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import itertools
 import threading
 import time
@@ -18,6 +19,7 @@ from hexwrap_server.jobs import JobManager
 from hexwrap_server.metrics import Metrics
 from hexwrap_server.settings import MIB, Settings
 from hexwrap_server.store import FolderInUseError, Store
+from hexwrap_server.worker import WorkerDiedError
 from tests.server.bodies import request, tube
 from tests.server.live import Live, finished, running
 
@@ -205,6 +207,41 @@ def test_what_is_remembered_leaves_room_for_the_next_job(tmp_path: Path, job_mib
     manager = JobManager(store, ProcessEngine(1), Settings(job_mib=job_mib), Metrics())
     assert manager.caching.memory_bytes == cached * MIB
     store.close()
+
+
+class Lonely(ProcessEngine):
+    """Has no place for any job at first."""
+
+    has_place = False
+
+    async def wait_for_place(self, seconds: float, told: Callable[[str], None]) -> None:
+        deadline = time.monotonic() + seconds
+        told("waiting for a place")
+        while not self.has_place:
+            await asyncio.sleep(0.01)
+            if time.monotonic() > deadline:
+                raise WorkerDiedError("There was no place.")
+
+
+def test_jobs_wait_in_the_queue_until_there_is_a_place(tmp_path: Path) -> None:
+    engine = Lonely(1)
+    with running(tmp_path, engine) as client:
+        ids = [post(client) for _ in range(2)]
+        client.get(f"/v1/jobs/{ids[0]}", params={"wait": 0.2})
+        for id in ids:
+            job = client.get(f"/v1/jobs/{id}").json()
+            assert (job["status"], job["started"]) == ("queued", None)
+        assert client.get(f"/v1/jobs/{ids[0]}").json()["stage"] == "waiting for a place"
+        other = post(client, surface=fresh())
+        assert client.delete(f"/v1/jobs/{other}").status_code == 204
+        engine.has_place = True
+        assert [finished(client, id)["status"] for id in ids] == ["done", "done"]
+
+
+def test_jobs_that_find_no_place_in_time_fail(tmp_path: Path) -> None:
+    with running(tmp_path, Lonely(1), job_seconds=0.2) as client:
+        job = finished(client, post(client))
+        assert (job["status"], job["problem"]["detail"]) == ("failed", "There was no place.")
 
 
 def test_wait_holds_the_answer_and_lets_go(behave: Behave) -> None:
