@@ -24,7 +24,8 @@ from hexwrap_server.docs import add_docs
 from hexwrap_server.engine import Engine
 from hexwrap_server.head import Head
 from hexwrap_server.hops import hops_router
-from hexwrap_server.observe import Observer, set_up_logging
+from hexwrap_server.logs import set_up_logging
+from hexwrap_server.observe import Observer
 from hexwrap_server.problems import HttpError
 from hexwrap_server.routes import JobFailedError, router
 from hexwrap_server.security import Doorkeeper

@@ -310,7 +310,7 @@ class JobManager:
 
         outcome: Outcome = await self._engine.run(
             "hexwrap_server.work:solve",
-            await self._order(item.work),
+            await self._order(item.work, next(iter(item.jobs), "")),
             self.caching,
             report=report,
             seconds=self._settings.job_seconds,
@@ -318,14 +318,14 @@ class JobManager:
         )
         return outcome
 
-    async def _order(self, work: Work) -> Order:
+    async def _order(self, work: Work, job: str) -> Order:
         """Workers on this machine read and write the files themselves."""
         if self._engine.shares_disk:
             surface = str(self.store.surface_path(work.surface))
             files = (str(self.store.result_path(work.identity)), str(self.store.solution_path(work.identity)))
-            return Order(work.surface, surface, work.wanted, files)
+            return Order(work.surface, surface, work.wanted, files, job)
         data = await asyncio.to_thread(self.store.surface, work.surface)
-        return Order(work.surface, data or b"", work.wanted, None)
+        return Order(work.surface, data or b"", work.wanted, None, job)
 
     def _change(self, item: _Item, *, written: bool = False, **changes: Any) -> None:
         for id, job in item.jobs.items():

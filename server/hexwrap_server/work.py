@@ -9,7 +9,7 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
-from hexwrap_server import codec, wire
+from hexwrap_server import codec, logs, wire
 from hexwrap_server.cache import CachingRunner, StageCache
 from hexwrap_server.disk import read_whole, write_whole
 from hexwrap_server.files import WRITERS, Meta
@@ -31,6 +31,7 @@ KEPT_SOLUTIONS = 4
 
 def solve(report: Report, order: Order, caching: CacheSettings) -> Outcome:
     """The whole way, stage by stage, each looked up first. Raises HexwrapError, StorageError."""
+    logs.at_work_for(order.job)
     with Packer(wire.dump) as packer:
         runner = CachingRunner(_stages(caching), report, packing(packer))
         solution = _staged(order.surface_id, lambda: _sent(order), order.wanted, runner)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import itertools
+import json
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -326,3 +327,20 @@ def test_stop_ends_long_polls_at_once(tmp_path: Path) -> None:
         client.delete(f"/v1/jobs/{id}")
     assert len(answers) == 1
     assert answers[0] < 5
+
+
+def test_workers_know_for_whom_they_work(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    surface = fresh()
+    with running(tmp_path, workers=1) as client:
+        assert finished(client, post(client, surface=surface))["status"] == "done"
+        deadline = time.monotonic() + 10
+        while not list((tmp_path / "stages").glob("*.stage")):  # written when the worker has a pause
+            assert time.monotonic() < deadline
+            time.sleep(0.02)
+    for path in (tmp_path / "stages").iterdir():
+        path.write_bytes(b"damaged")
+    with running(tmp_path, workers=1) as client:
+        id = post(client, surface=surface, name="again", panels={"sizes": 3})
+        assert finished(client, id)["status"] == "done"
+    told = [json.loads(line) for line in capfd.readouterr().err.splitlines() if "cached stage" in line]
+    assert {line["job"] for line in told} == {id}
