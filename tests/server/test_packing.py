@@ -6,6 +6,7 @@ import gzip
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from hexwrap_server import wire
@@ -77,3 +78,11 @@ def test_faults_of_a_part_are_raised_at_the_end() -> None:
         assert "map" in packer
         with pytest.raises(KeyError, match="a bug"):
             packer.finish()
+
+
+@pytest.mark.parametrize("n", [0, 1, 5, 200])
+@pytest.mark.parametrize("share", [0.0, 0.1, 1.0])
+def test_sheets_are_written_as_any_table(n: int, share: float) -> None:
+    r = np.random.default_rng(n)
+    table = r.integers(-12, 13, (n, 3)) * (r.random((n, 1)) < share)
+    assert wire.dump(wire.mostly_zero(table)) == wire.dump(table)
