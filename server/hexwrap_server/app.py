@@ -18,13 +18,14 @@ from starlette.exceptions import HTTPException
 from starlette.middleware.gzip import GZipMiddleware
 from starlette.responses import Response
 
-from hexwrap_server import __version__
+from hexwrap_server import __version__, garbage
 from hexwrap_server.answers import WORTH_PACKING, problem_response
 from hexwrap_server.docs import add_docs
 from hexwrap_server.engine import Engine
 from hexwrap_server.head import Head
 from hexwrap_server.hops import hops_router
-from hexwrap_server.observe import Observer, set_up_logging
+from hexwrap_server.logs import set_up_logging
+from hexwrap_server.observe import Observer
 from hexwrap_server.problems import HttpError
 from hexwrap_server.routes import JobFailedError, router
 from hexwrap_server.security import Doorkeeper
@@ -100,6 +101,7 @@ def serve(settings: Settings) -> None:
             timeout_graceful_shutdown=GRACE,
             h11_max_incomplete_event_size=64 * 1024,
         )
+        garbage.look_no_more()
         _Server(config, app.state.service).run(sockets=[listener])
     except KeyboardInterrupt:
         return

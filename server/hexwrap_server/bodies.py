@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import hashlib
 import zlib
+from dataclasses import dataclass
+from typing import Any
 
 from starlette.requests import ClientDisconnect, Request
 
@@ -13,34 +16,63 @@ from hexwrap_server.settings import MIB
 _STEP = 4 * MIB
 
 
+@dataclass(frozen=True)
+class Body:
+    """A body as it was sent. mark: SHA-256 of how it is packed and of its bytes."""
+
+    data: bytes
+    encoding: str
+    mark: str
+
+
 async def read_body(request: Request, max_mib: float) -> bytes:
     """The body, unpacked. The limit holds for what is declared, sent and unpacked. Raises HttpError."""
-    limit = int(max_mib * MIB)
-    declared = request.headers.get("content-length", "0")
-    if declared.isdecimal() and int(declared) > limit:
-        raise _too_large(max_mib)
-    data = await _streamed(request, limit, max_mib)
-    encoding = request.headers.get("content-encoding", "identity").strip().lower()
-    if encoding in ("", "identity"):
-        return data
-    if encoding not in ("gzip", "x-gzip"):
+    return await plain_body(Body(await _streamed(request, max_mib, []), _encoding(request), ""), max_mib)
+
+
+async def sent_body(request: Request, max_mib: float) -> Body:
+    """The body as it is sent, hashed while it comes in. Raises HttpError."""
+    encoding = _encoding(request)
+    sha = hashlib.sha256(encoding.encode() + b"\n")
+    data = await _streamed(request, max_mib, [sha])
+    return Body(data, encoding, sha.hexdigest())
+
+
+async def plain_body(body: Body, max_mib: float) -> bytes:
+    """The body, unpacked. Raises HttpError."""
+    if body.encoding in ("", "identity"):
+        return body.data
+    if body.encoding not in ("gzip", "x-gzip"):
         raise HttpError(
             415,
             "content-encoding",
             "This encoding is not read",
-            f"Content-Encoding '{encoding[:40]}' is not read here; send the body plain or as gzip.",
+            f"Content-Encoding '{body.encoding[:40]}' is not read here; send the body plain or as gzip.",
             {"Accept-Encoding": "gzip"},
         )
-    return await asyncio.to_thread(_unpacked, data, limit, max_mib)
+    return await asyncio.to_thread(_unpacked, body.data, int(max_mib * MIB), max_mib)
 
 
-async def _streamed(request: Request, limit: int, max_mib: float) -> bytes:
-    chunks = bytearray()
+def _encoding(request: Request) -> str:
+    return request.headers.get("content-encoding", "identity").strip().lower()
+
+
+async def _streamed(request: Request, max_mib: float, hashes: list[Any]) -> bytes:
+    """hashes: told of every piece; pieces are small, so that the event loop gets its turn."""
+    limit = int(max_mib * MIB)
+    declared = request.headers.get("content-length", "0")
+    if declared.isdecimal() and int(declared) > limit:
+        raise _too_large(max_mib)
+    chunks: list[bytes] = []
+    size = 0
     try:
         async for chunk in request.stream():
-            chunks += chunk
-            if len(chunks) > limit:
+            chunks.append(chunk)
+            size += len(chunk)
+            if size > limit:
                 raise _too_large(max_mib)
+            for sha in hashes:
+                sha.update(chunk)
     except ClientDisconnect:
         raise HttpError(
             400,
@@ -48,7 +80,7 @@ async def _streamed(request: Request, limit: int, max_mib: float) -> bytes:
             "The body is incomplete",
             "The connection closed before the whole body was sent.",
         ) from None
-    return bytes(chunks)
+    return b"".join(chunks)
 
 
 def _unpacked(data: bytes, limit: int, max_mib: float) -> bytes:

@@ -12,6 +12,7 @@ import contextlib
 import logging
 import threading
 import uuid
+from collections import OrderedDict
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -26,6 +27,8 @@ from hexwrap_solver.errors import HexwrapError
 CHECK_INTERVAL = 0.5
 #: Seconds within which the scheduler has to answer at start.
 CONNECT_SECONDS = 15
+#: Seconds within which it has to say which machines there are.
+LOOK_SECONDS = 10.0
 #: Seconds that we wait for the cluster to stop something.
 STOP_SECONDS = 1.0
 _TOPIC = "hexwrap-progress"
@@ -75,6 +78,21 @@ class DaskEngine:
         for end in (partial(self._client.run, _close_idle, on_error="ignore"), self._client.close):
             with contextlib.suppress(OSError, RuntimeError):
                 await asyncio.wait_for(end(), STOP_SECONDS)
+
+    async def wait_for_place(self, seconds: float, told: Callable[[str], None]) -> None:
+        """Clusters that grow with their work have no machines at first."""
+        if self._machines:
+            return
+        told("waiting for a machine of the cluster")
+        try:
+            async with asyncio.timeout(seconds):
+                while not self._machines:
+                    await asyncio.sleep(CHECK_INTERVAL)
+        except TimeoutError:
+            raise ClusterError(
+                f"The dask cluster at {self._address} had no machines for {seconds:g} s; start some, and "
+                "send the job again."
+            ) from None
 
     async def run(self, function: str, *arguments: Any, report: Report, seconds: float, mib: float) -> Any:
         if not self._machines:
@@ -136,7 +154,7 @@ class DaskEngine:
 
     async def _look(self) -> None:
         """Ask the scheduler which machines there are."""
-        identity = await self._client.scheduler.identity(n_workers=-1)
+        identity = await asyncio.wait_for(self._client.scheduler.identity(n_workers=-1), LOOK_SECONDS)
         self._machines = {address: machine["nthreads"] for address, machine in identity["workers"].items()}
 
     async def _keep_looking(self) -> None:
@@ -179,7 +197,9 @@ def _content(answer: asyncio.Future[Any]) -> Any:
 _GUARD = threading.Lock()
 _IDLE: list[WorkerProcess] = []
 _BUSY: dict[str, WorkerProcess] = {}
-_STOPPED: set[str] = set()
+#: Calls that were stopped, which may not have begun yet; the oldest have long come and gone.
+_STOPPED: OrderedDict[str, None] = OrderedDict()
+MOST_STOPPED = 10_000
 
 
 def _in_process(ticket: str, function: str, arguments: tuple[Any, ...], seconds: float, mib: float) -> Any:
@@ -213,7 +233,9 @@ def _in_process(ticket: str, function: str, arguments: tuple[Any, ...], seconds:
 def _stop(ticket: str) -> None:
     """Runs on every machine of the cluster; one of them has the job."""
     with _GUARD:
-        _STOPPED.add(ticket)
+        _STOPPED[ticket] = None
+        while len(_STOPPED) > MOST_STOPPED:
+            _STOPPED.popitem(last=False)
         if ticket in _BUSY:
             _BUSY[ticket].stop()
 

@@ -14,6 +14,8 @@ from hexwrap_server.worker import WorkError
 
 #: Seconds for which pruning leaves a file alone.
 YOUNG = 300.0
+#: Seconds between two attempts to put a file in the place of one that is open.
+PAUSES = (0.01, 0.05, 0.2, 0.5)
 #: Suffix of files that are being written.
 PART = ".part"
 log = logging.getLogger("hexwrap.disk")
@@ -38,11 +40,22 @@ def write_whole(path: Path, content: Iterable[bytes | memoryview]) -> None:
     try:
         with part.open("wb") as file:
             file.writelines(content)
-        os.replace(part, path)
+        put_in_place(part, path)
     except OSError as error:
         with contextlib.suppress(OSError):
             part.unlink()
         raise StorageError.of(error) from error
+
+
+def put_in_place(part: Path, path: Path) -> None:
+    """Rename part to path. Windows refuses that for the moment that somebody reads what is there."""
+    for pause in PAUSES:
+        try:
+            os.replace(part, path)
+            return
+        except PermissionError:
+            time.sleep(pause)
+    os.replace(part, path)
 
 
 def read_whole(path: Path, is_whole: Callable[[bytes], bool]) -> bytes | None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Protocol
 
@@ -41,6 +42,13 @@ class Engine(Protocol):
 
     async def stop(self) -> None:
         """Kill whatever runs; afterwards no process of the engine is left."""
+        ...
+
+    async def wait_for_place(self, seconds: float, told: Callable[[str], None]) -> None:
+        """Until there is any place where a call could run. told: what it waits for, if it has to.
+
+        Raises WorkError after seconds.
+        """
         ...
 
     async def run(self, function: str, *arguments: Any, report: Report, seconds: float, mib: float) -> Any:
@@ -89,6 +97,9 @@ class ProcessEngine:
         await asyncio.to_thread(self._threads.shutdown, wait=True)
         for worker in self._workers:
             worker.close()
+
+    async def wait_for_place(self, seconds: float, told: Callable[[str], None]) -> None:
+        return  # workers that die are started again
 
     async def run(self, function: str, *arguments: Any, report: Report, seconds: float, mib: float) -> Any:
         loop = asyncio.get_running_loop()

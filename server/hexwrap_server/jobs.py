@@ -139,7 +139,7 @@ class JobManager:
                 f"{len(self._queue)} jobs are waiting, the limit of this server; try again in a few seconds.",
                 {"Retry-After": "5"},
             )
-        if item is not None and item in self._running:
+        if item is not None and any(other.status == "running" for other in item.jobs.values()):
             job = replace(job, status="running", started=job.created)
         self.store.add(job, Work(identity, parsed.surface_id, parsed.wanted))
         self._attach(job, item, Work(identity, parsed.surface_id, parsed.wanted))
@@ -259,18 +259,24 @@ class JobManager:
 
     async def _run(self, item: _Item) -> None:
         identity = item.work.identity
+        begun = False
         try:
+            await self._engine.wait_for_place(
+                self._settings.job_seconds, lambda what: self._change(item, stage=what)
+            )
             self.store.start_work(identity)
+            begun = True
             now = time.time()
-            self._change(item, written=True, status="running", started=now)
+            self._change(item, written=True, status="running", stage="", started=now)
             outcome = await self._compute(item)
             packed = await asyncio.to_thread(self.store.keep_outcome, identity, outcome)
             self.store.finish_work(identity, outcome)
             self._heat(identity, packed)
             self._end([_done(job, outcome) for job in item.jobs.values()])
         except asyncio.CancelledError:
-            with contextlib.suppress(StorageError):
-                self.store.take_back(identity)
+            if begun:
+                with contextlib.suppress(StorageError):
+                    self.store.take_back(identity)
             raise
         except HexwrapError as error:
             self._fail(item, error)
@@ -304,7 +310,7 @@ class JobManager:
 
         outcome: Outcome = await self._engine.run(
             "hexwrap_server.work:solve",
-            await self._order(item.work),
+            await self._order(item.work, next(iter(item.jobs), "")),
             self.caching,
             report=report,
             seconds=self._settings.job_seconds,
@@ -312,14 +318,14 @@ class JobManager:
         )
         return outcome
 
-    async def _order(self, work: Work) -> Order:
+    async def _order(self, work: Work, job: str) -> Order:
         """Workers on this machine read and write the files themselves."""
         if self._engine.shares_disk:
             surface = str(self.store.surface_path(work.surface))
             files = (str(self.store.result_path(work.identity)), str(self.store.solution_path(work.identity)))
-            return Order(work.surface, surface, work.wanted, files)
+            return Order(work.surface, surface, work.wanted, files, job)
         data = await asyncio.to_thread(self.store.surface, work.surface)
-        return Order(work.surface, data or b"", work.wanted, None)
+        return Order(work.surface, data or b"", work.wanted, None, job)
 
     def _change(self, item: _Item, *, written: bool = False, **changes: Any) -> None:
         for id, job in item.jobs.items():
@@ -367,6 +373,10 @@ class JobManager:
         while True:
             await asyncio.sleep(CATCH_UP_INTERVAL)
             self._ledger.catch_up()
+            try:
+                await asyncio.to_thread(self.store.check_point)
+            except (StorageError, OSError) as error:
+                log.error("the list of jobs cannot be tidied: %s", error)
 
     def _log(self, job: Job, what: str) -> None:
         seconds = round(job.finished - job.started, 3) if job.finished and job.started else None

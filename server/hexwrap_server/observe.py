@@ -1,12 +1,9 @@
-"""Log lines as JSON, request counts, and the headers that every answer carries."""
+"""Request counts, and the headers that every answer carries."""
 
 from __future__ import annotations
 
-import json
 import logging
-import sys
 import time
-from datetime import UTC, datetime
 
 from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -14,8 +11,6 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from hexwrap_server import __version__
 from hexwrap_server.metrics import Metrics
 
-#: Fields of a log record that are passed on when somebody sets them.
-FIELDS = ("job", "job_name", "seconds", "found", "method", "path", "status")
 log = logging.getLogger("hexwrap.http")
 
 
@@ -54,30 +49,3 @@ class Observer:
             "seconds": round(seconds, 4),
         }
         log.debug("answered", extra=extra | {"job": scope.get("path_params", {}).get("id")})
-
-
-class JsonLines(logging.Formatter):
-    """One JSON object per line."""
-
-    def format(self, record: logging.LogRecord) -> str:
-        line = {
-            "time": datetime.fromtimestamp(record.created, UTC).isoformat(timespec="milliseconds"),
-            "level": record.levelname.lower(),
-            "logger": record.name,
-            "message": record.getMessage(),
-        }
-        line |= {name: getattr(record, name) for name in FIELDS if getattr(record, name, None) is not None}
-        if record.exc_info:
-            line["traceback"] = self.formatException(record.exc_info)
-        return json.dumps(line, default=str)
-
-
-def set_up_logging(level: str) -> None:
-    """Log lines of hexwrap and uvicorn to standard error."""
-    handler = logging.StreamHandler(sys.stderr)
-    handler.setFormatter(JsonLines())
-    for name in ("hexwrap", "uvicorn"):
-        logger = logging.getLogger(name)
-        logger.handlers = [handler]
-        logger.propagate = False
-        logger.setLevel(level.upper() if name == "hexwrap" else "WARNING")

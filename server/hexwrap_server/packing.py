@@ -36,8 +36,20 @@ class Packer:
     def __contains__(self, name: str) -> bool:
         return name in self._names
 
+    def foresee(self, make: Callable[[], Any]) -> Callable[[], bytes]:
+        """The text of a part that will probably be added; ask for it when it is."""
+        return self._thread.submit(lambda: self._dump(make())).result
+
+    def begin(self, name: str, make: Callable[[], Any]) -> None:
+        """make: leads to the first members of an object; whoever adds the part gives the others."""
+        self._packed.append(self._thread.submit(self._pack, name, lambda: self._dump(make())[:-1]))
+
     def add(self, name: str, make: Callable[[], Any]) -> None:
         """make: leads to the part as dump takes it; called in the thread."""
+        self.add_text(name, lambda: self._dump(make()))
+
+    def add_text(self, name: str, make: Callable[[], bytes]) -> None:
+        """make: leads to the text of the part; called in the thread."""
         self._names.append(name)
         self._packed.append(self._thread.submit(self._pack, name, make))
 
@@ -46,11 +58,15 @@ class Packer:
         self._packed.append(self._thread.submit(lambda: self._gzip.compress(b"}") + self._gzip.flush()))
         return b"".join(piece.result() for piece in self._packed)
 
-    def _pack(self, name: str, make: Callable[[], Any]) -> bytes:
-        text = self._dump(make())
-        head = b'%s"%s":' % (b"," if self.places else b"{", name.encode())
-        start = self._position + len(head)
-        self._position = start + len(text)
+    def _pack(self, name: str, make: Callable[[], bytes]) -> bytes:
+        text = make()
+        if name in self.places:  # begun: a comma for the brace that opens the other members
+            head, text = b",", text[1:]
+            start = self.places[name][0]
+        else:
+            head = b'%s"%s":' % (b"," if self.places else b"{", name.encode())
+            start = self._position + len(head)
+        self._position += len(head) + len(text)
         self.places[name] = (start, self._position)
         packed: bytes = self._gzip.compress(head) + self._gzip.compress(text)
         return packed

@@ -24,6 +24,10 @@ TABLES = ("vertices", "normals", "points")
 MOST_NAMES = 100
 
 
+#: What is left of a list of three numbers when everything in ``NUMBERS`` is left out.
+TRIPLE, NUMBERS = b"[,,]", b"0123456789.-+eE \t\r\n"
+
+
 class UnusualError(ValueError):
     """Not a body that can be read quickly."""
 
@@ -32,60 +36,83 @@ def read(text: bytes) -> Any:
     """The document; tables in it are arrays (n, k), and faces are Ragged. None where anything is unusual."""
     if simdjson is None or text.startswith(codecs.BOM_UTF8):  # which simdjson would pass over
         return None
+    reader = _Reader()
     try:
-        document, n_lists = _value("", simdjson.Parser().parse(text))
+        document = reader.value("", simdjson.Parser().parse(text))
     except (TypeError, ValueError, RuntimeError):
         return None
-    # brackets that were not counted: lists in rows, names given twice, or text, which alone is harmless
-    return document if text.count(b"[") == n_lists else None
+    return document if reader.has_seen_all(text) else None
 
 
-def _value(name: str, value: Any) -> tuple[Any, int]:
-    """A value, and how many lists it is made of."""
-    if isinstance(value, simdjson.Object):
-        return _object(value)
-    if not isinstance(value, simdjson.Array):
-        return value, 0
-    if name in TABLES:
-        return _table(value), 1 + len(value)
-    if name == "faces":
-        return _faces(value), 1 + len(value)
-    plain = value.as_list()
-    return plain, _n_lists(plain)
+class _Reader:
+    """Reads, and keeps count of what the text must look like if it was read rightly.
 
+    lists: in all. triples: rows taken for three numbers unseen. others: other lists that look like them.
+    """
 
-def _object(value: Any) -> tuple[dict[str, Any], int]:
-    if len(value) > MOST_NAMES:
-        raise UnusualError
-    names = list(value)
-    if len(set(names)) < len(names):  # the last one counts, but only the first one can be had
-        raise UnusualError
-    if "\0" in "".join(names):  # what follows it is not looked at
-        raise UnusualError
-    members = {name: _value(name, value[name]) for name in names}
-    return {name: inner for name, (inner, _) in members.items()}, sum(n for _, n in members.values())
+    def __init__(self) -> None:
+        self._lists = 0
+        self._triples = 0
+        self._others = 0
 
+    def has_seen_all(self, text: bytes) -> bool:
+        """Whether the brackets in the text are those that were counted.
 
-def _table(rows: Any) -> Floats:
-    lengths = _lengths(rows)
-    if not len(lengths) or np.any(lengths != lengths[0]) or not lengths[0]:
-        raise UnusualError
-    return np.frombuffer(rows.as_buffer(of_type="d")).reshape(len(lengths), -1)
+        There are more where lists are in rows, a name is given twice, or in text, which alone is harmless.
+        """
+        marks = text.translate(None, NUMBERS)
+        return marks.count(b"[") == self._lists and marks.count(TRIPLE) - self._others >= self._triples
 
+    def value(self, name: str, value: Any) -> Any:
+        if isinstance(value, simdjson.Object):
+            return self._object(value)
+        if not isinstance(value, simdjson.Array):
+            return value
+        if name in TABLES:
+            return self._table(value)
+        if name == "faces":
+            return self._faces(value)
+        plain = value.as_list()
+        self._count(plain)
+        return plain
 
-def _faces(rows: Any) -> Ragged:
-    lengths = _lengths(rows)
-    if np.any((lengths != 3) & (lengths != 4)):
-        raise UnusualError
-    corners: Ints = np.frombuffer(rows.as_buffer(of_type="i"), dtype=np.int64)
-    return Ragged(corners, np.concatenate([[0], np.cumsum(lengths)]))
+    def _object(self, value: Any) -> dict[str, Any]:
+        if len(value) > MOST_NAMES:
+            raise UnusualError
+        names = list(value)
+        if len(set(names)) < len(names):  # the last one counts, but only the first one can be had
+            raise UnusualError
+        if "\0" in "".join(names):  # what follows it is not looked at
+            raise UnusualError
+        return {name: self.value(name, value[name]) for name in names}
 
+    def _table(self, rows: Any) -> Floats:
+        numbers = np.frombuffer(rows.as_buffer(of_type="d"))
+        lengths = self._lengths(rows, len(numbers))
+        if not len(lengths) or np.any(lengths != lengths[0]) or not lengths[0]:
+            raise UnusualError
+        return numbers.reshape(len(lengths), -1)
 
-def _lengths(rows: Any) -> Ints:
-    return np.fromiter(map(len, rows), dtype=np.int64, count=len(rows))
+    def _faces(self, rows: Any) -> Ragged:
+        corners: Ints = np.frombuffer(rows.as_buffer(of_type="i"), dtype=np.int64)
+        lengths = self._lengths(rows, len(corners))
+        if np.any((lengths != 3) & (lengths != 4)):
+            raise UnusualError
+        return Ragged(corners, np.concatenate([[0], np.cumsum(lengths)]))
 
+    def _lengths(self, rows: Any, size: int) -> Ints:
+        """Numbers per row, of size numbers in all: looking at each row takes half of the reading."""
+        n = len(rows)
+        self._lists += 1 + n
+        if size == 3 * n:
+            self._triples += n
+            return np.full(n, 3)
+        return np.fromiter(map(len, rows), dtype=np.int64, count=n)
 
-def _n_lists(value: Any) -> int:
-    if isinstance(value, list):
-        return 1 + sum(map(_n_lists, value))
-    return sum(map(_n_lists, value.values())) if isinstance(value, dict) else 0
+    def _count(self, value: Any) -> None:
+        if isinstance(value, list):
+            self._lists += 1
+            self._others += [type(x) in (int, float) for x in value] == [True] * 3
+        if isinstance(value, (list, dict)):
+            for inner in value.values() if isinstance(value, dict) else value:
+                self._count(inner)

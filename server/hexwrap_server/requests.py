@@ -52,13 +52,15 @@ class CacheSettings:
 class Order:
     """A job for a worker. surface: as sent, encoded, or the file where it is.
 
-    files: where the result and the solution are to be put; None: they are sent back.
+    files: where the result and the solution are to be put; None: they are sent back. job: one of those that
+    want it, for log lines.
     """
 
     surface_id: str
     surface: bytes | str
     wanted: Wanted
     files: tuple[str, str] | None
+    job: str = ""
 
 
 @dataclass(frozen=True)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import hashlib
-from collections import OrderedDict
 from collections.abc import AsyncIterator
 from typing import Annotated, Any
 
@@ -19,11 +17,10 @@ from hexwrap_server.answers import (
     problem_response,
     takes_gzip,
 )
-from hexwrap_server.bodies import read_body
-from hexwrap_server.engine import nobody
+from hexwrap_server.bodies import plain_body, read_body, sent_body
+from hexwrap_server.intake import keep, read_and_keep
 from hexwrap_server.jobs import JobManager, unpacked
 from hexwrap_server.metrics import MEDIA_TYPE as METRICS_TYPE
-from hexwrap_server.parsing import read_request
 from hexwrap_server.parts import PARTS, names
 from hexwrap_server.problems import HttpError, dumped, not_found
 from hexwrap_server.requests import Intake, ParsedRequest
@@ -226,20 +223,18 @@ async def _read(request: Request) -> ParsedRequest:
     """The request of a body; the same bytes again are not read again."""
     service = service_of(request)
     settings = service.settings
-    body = await read_body(request, settings.max_body_mib)
-    known: OrderedDict[str, ParsedRequest] = service.known_bodies
-    mark = await asyncio.to_thread(lambda: hashlib.sha256(body).hexdigest())
-    if mark in known and service.store.has_surface(known[mark].surface_id):
-        known.move_to_end(mark)
-        return known[mark]
+    sent = await sent_body(request, settings.max_body_mib)
+    known = service.known_body(sent.mark)
+    if known is not None:
+        return known
+    text = await plain_body(sent, settings.max_body_mib)
     limits = (settings.max_vertices, settings.max_panels)
-    if len(body) <= SMALL_BODY and body.count(b'"') <= FEW_QUOTES:
-        parsed = await service.read(read_request, nobody, body, *limits)
+    if len(text) <= SMALL_BODY and text.count(b'"') <= FEW_QUOTES:
+        parsed = await service.read(read_and_keep, service.store, text, *limits)
     else:
-        parsed = await service.errand("hexwrap_server.parsing:read_request", body, *limits)
-    if parsed.surface is not None:
-        await asyncio.to_thread(service.store.keep_surface, parsed.surface_id, parsed.surface)
-    return service.remember_body(mark, parsed)
+        parsed = await service.errand("hexwrap_server.parsing:read_request", text, *limits)
+        await asyncio.to_thread(keep, service.store, parsed)
+    return service.remember_body(sent.mark, parsed)
 
 
 async def _carry(request: Request, id: str, what: str) -> Response:

@@ -41,7 +41,7 @@ class Service:
         self.errands = ProcessEngine(1)
         self.manager = JobManager(self.store, self.engine, settings, self.metrics)
         self._reader = ThreadPoolExecutor(1, thread_name_prefix="hexwrap-reader")
-        self.known_bodies: OrderedDict[str, ParsedRequest] = OrderedDict()
+        self._known_bodies: OrderedDict[str, ParsedRequest] = OrderedDict()
         self._since = time.time()
 
     async def start(self) -> None:
@@ -78,12 +78,20 @@ class Service:
         """Read a body in the one thread for it: several would keep the event loop from its turn."""
         return await asyncio.get_running_loop().run_in_executor(self._reader, function, *arguments)
 
+    def known_body(self, mark: str) -> ParsedRequest | None:
+        """What was read from the same bytes before, if its surface is still kept."""
+        known = self._known_bodies.get(mark)
+        if known is None or not self.store.has_surface(known.surface_id):
+            return None
+        self._known_bodies.move_to_end(mark)
+        return known
+
     def remember_body(self, mark: str, parsed: ParsedRequest) -> ParsedRequest:
         """The surface itself is on disk; only what points to it is remembered."""
         light = replace(parsed, surface=None)
-        self.known_bodies[mark] = light
-        while len(self.known_bodies) > KNOWN_BODIES:
-            self.known_bodies.popitem(last=False)
+        self._known_bodies[mark] = light
+        while len(self._known_bodies) > KNOWN_BODIES:
+            self._known_bodies.popitem(last=False)
         return light
 
 

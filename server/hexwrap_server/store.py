@@ -28,6 +28,11 @@ from hexwrap_server.requests import Outcome, Wanted
 
 Status = Literal["queued", "running", "done", "failed", "cancelled"]
 log = logging.getLogger("hexwrap.store")
+#: Bytes of the write-ahead log at which it is brought into the database beside the work, and those at which
+#: whoever writes has to do it, and every answer waits for the disk.
+CHECKPOINT, LATEST_CHECKPOINT = 2**22, 2**26
+#: Bytes of a page of the database.
+PAGE = 4096
 HEX_ID = re.compile(r"[0-9a-f]{64}")
 
 _SCHEMA = """
@@ -113,11 +118,14 @@ class Store:
         for path in (self.surfaces, self.results, self.stages):
             path.mkdir(parents=True, exist_ok=True)
         self._lock = _locked(folder / "lock.sqlite3")
-        path = folder / "hexwrap.sqlite3"
+        self._path = path = folder / "hexwrap.sqlite3"
+        self._log = folder / "hexwrap.sqlite3-wal"
+        self._checked = 0.0
         try:
             self._db = sqlite3.connect(path, check_same_thread=False, isolation_level=None)
             self._db.execute("PRAGMA journal_mode = WAL")
             self._db.execute("PRAGMA synchronous = NORMAL")
+            self._db.execute(f"PRAGMA wal_autocheckpoint = {LATEST_CHECKPOINT // PAGE}")
             self._db.executescript(_SCHEMA)
         except sqlite3.DatabaseError as error:
             self._lock.close()
@@ -126,6 +134,18 @@ class Store:
     def close(self) -> None:
         self._db.close()
         self._lock.close()
+
+    def check_point(self) -> None:
+        """Bring a long write-ahead log into the database. Waits for the disk; for a thread of its own."""
+        state = self._log.stat()
+        if state.st_size < CHECKPOINT or state.st_mtime == self._checked:
+            return
+        self._checked = state.st_mtime
+        try:
+            with contextlib.closing(sqlite3.connect(self._path, isolation_level=None)) as db:
+                db.execute("PRAGMA wal_checkpoint(PASSIVE)")  # nobody waits for it
+        except sqlite3.DatabaseError as error:
+            raise StorageError.of(error) from error
 
     # surfaces (files)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from hexwrap_server.files.colours import size_colours
 from hexwrap_server.parts import PARTS, join_parts
-from hexwrap_solver.arrays import Complexes, Floats, Ragged
+from hexwrap_solver.arrays import Complexes, Floats, Ints, Ragged
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.panels.types import Components, Panels, Support, TradeOff
 from hexwrap_solver.pattern.types import Pattern
@@ -57,13 +57,6 @@ def part(solution: Solution, name: str, timings: dict[str, float]) -> Any:
             return timings
 
 
-#: By stage: the parts that are known once it is done.
-EARLY: dict[str, dict[str, Callable[[Any], Any]]] = {
-    "map": {"mesh": lambda made: mesh(made.surface), "map": lambda made: conformal(made)},
-    "pattern": {"pattern": lambda made: pattern(made)},
-}
-
-
 def dump(value: Any) -> bytes:
     """JSON, numpy arrays included."""
     return orjson.dumps(value, option=orjson.OPT_SERIALIZE_NUMPY)
@@ -86,7 +79,7 @@ def conformal(cmap: ConformalMap) -> dict[str, Any]:
         "cone_angle": float(cmap.deck.angle),
         "log_scale": flat(cmap.log_scale),
         "uv": plane(cmap.uv),
-        "sheet": flat(cmap.sheet),
+        "sheet": mostly_zero(cmap.sheet),
         "deck": {
             "angle": float(cmap.deck.angle),
             "translation": [cmap.deck.translation.real, cmap.deck.translation.imag],
@@ -123,9 +116,13 @@ def pattern(laid: Pattern) -> dict[str, Any]:
 
 
 def panels(solution: Solution) -> dict[str, Any]:
-    made, laid, measured = solution.panels, solution.pattern, solution.quality
-    assert made is not None
-    assert laid is not None
+    assert solution.panels is not None
+    assert solution.pattern is not None
+    return shapes(solution.panels, solution.pattern) | measures(solution)
+
+
+def shapes(made: Panels, laid: Pattern) -> dict[str, Any]:
+    """What is known of the panels before they are measured."""
     labels = laid.labels()
     return {
         "mode": made.mode,
@@ -139,6 +136,15 @@ def panels(solution: Solution) -> dict[str, Any]:
         "normal": flat(made.normal),
         "whole": flat(made.whole),
         "outside": flat(made.outside),
+    }
+
+
+def measures(solution: Solution) -> dict[str, Any]:
+    """What is measured on each panel."""
+    made, laid, measured = solution.panels, solution.pattern, solution.quality
+    assert made is not None
+    assert laid is not None
+    return {
         "planarity": flat(measured.planarity),
         "edge_deviation": flat(measured.edge_deviation),
         "angle_deviation": flat(measured.angle_deviation),
@@ -249,6 +255,15 @@ def rows(ragged: Ragged) -> Any:
 def flat(array: NDArray[Any] | None) -> Any:
     """What orjson asks of an array: contiguous."""
     return None if array is None else np.ascontiguousarray(array)
+
+
+def mostly_zero(table: Ints) -> orjson.Fragment:
+    """(n, 3) integers, few of them other than 0, as text: only the seam is written, a third of the work."""
+    other = np.flatnonzero(table[:, 0] | table[:, 1] | table[:, 2])
+    zeros = np.diff(other, prepend=-1, append=len(table)) - 1
+    written = [b"", *(b"[%d,%d,%d]," % tuple(row) for row in table[other].tolist())]
+    rows = b"".join([row + b"[0,0,0]," * n for row, n in zip(written, zeros.tolist(), strict=True)])
+    return orjson.Fragment(b"[" + rows[:-1] + b"]")
 
 
 def plane(z: Complexes) -> Floats:

@@ -9,7 +9,7 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
-from hexwrap_server import codec, wire
+from hexwrap_server import codec, logs, wire
 from hexwrap_server.cache import CachingRunner, StageCache
 from hexwrap_server.disk import read_whole, write_whole
 from hexwrap_server.files import WRITERS, Meta
@@ -31,12 +31,11 @@ KEPT_SOLUTIONS = 4
 
 def solve(report: Report, order: Order, caching: CacheSettings) -> Outcome:
     """The whole way, stage by stage, each looked up first. Raises HexwrapError, StorageError."""
+    logs.at_work_for(order.job)
     with Packer(wire.dump) as packer:
-        runner = CachingRunner(_stages(caching), report, _packing(packer))
+        runner = CachingRunner(_stages(caching), report, packing(packer))
         solution = _staged(order.surface_id, lambda: _sent(order), order.wanted, runner)
-        for name in PARTS:
-            if name not in packer:
-                packer.add(name, partial(wire.part, solution, name, runner.timings))
+        pack_rest(packer, solution, runner.timings)
         return _outcome(order, solution, packer, runner)
 
 
@@ -57,14 +56,37 @@ def _outcome(order: Order, solution: pipeline.Solution, packer: Packer, runner: 
     )
 
 
-def _packing(packer: Packer) -> Callable[[str, Any], None]:
-    """A listener to stages that packs the parts which are known by then."""
+def packing(packer: Packer) -> Callable[[str, Any], None]:
+    """A listener to stages that packs what is known by then."""
+    known: dict[str, Any] = {}
+    texts: dict[str, Callable[[], bytes]] = {}
 
     def made(stage: str, value: Any) -> None:
-        for name, make in wire.EARLY.get(stage, {}).items():
-            packer.add(name, partial(make, value))
+        known[stage] = value
+        match stage:
+            case "surface":  # written beside the map, whose long steps leave the interpreter to others
+                texts["mesh"] = packer.foresee(partial(wire.mesh, value))
+            case "map":
+                if value.surface is known["surface"]:
+                    packer.add_text("mesh", texts["mesh"])
+                else:  # the map needed vertices of its own
+                    packer.add("mesh", partial(wire.mesh, value.surface))
+                packer.add("map", partial(wire.conformal, value))
+            case "pattern":
+                packer.add("pattern", partial(wire.pattern, value))
+            case "panels":
+                packer.begin("panels", partial(wire.shapes, value, known["pattern"]))
 
     return made
+
+
+def pack_rest(packer: Packer, solution: pipeline.Solution, timings: dict[str, float]) -> None:
+    """Pack what is known when all stages are done."""
+    for name in PARTS:
+        if name == "panels" and solution.panels is not None:  # begun when they were made
+            packer.add(name, partial(wire.measures, solution))
+        elif name not in packer:
+            packer.add(name, partial(wire.part, solution, name, timings))
 
 
 def _sent(order: Order) -> SentSurface:

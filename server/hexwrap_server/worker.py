@@ -8,6 +8,7 @@ parent dies, however it dies, the worker reads the end of its input and leaves.
 from __future__ import annotations
 
 import contextlib
+import logging
 import os
 import pickle
 import queue
@@ -17,14 +18,13 @@ import subprocess
 import sys
 import threading
 import time
-import traceback
 from collections.abc import Callable
 from importlib import import_module
 from typing import IO, Any
 
 import psutil
 
-from hexwrap_server import later
+from hexwrap_server import garbage, later, logs
 from hexwrap_solver.errors import HexwrapError
 
 #: Two workers with two BLAS threads each are many times slower than with one each.
@@ -55,6 +55,7 @@ REPORT_INTERVAL = 0.05
 PAUSE = 0.02
 #: Seconds after which a thread makes way for another: stages wait for the packing of results otherwise.
 SWITCH_INTERVAL = 0.0005
+log = logging.getLogger("hexwrap.worker")
 _LENGTH = struct.Struct("<Q")
 
 #: A function's name and its arguments.
@@ -101,8 +102,10 @@ class WorkerProcess:
         paths = [os.path.abspath(p) for p in sys.path if p]
         self._stopped = False
         environment = os.environ | ONE_THREAD | KEEP_MEMORY | {"PYTHONPATH": os.pathsep.join(paths)}
+        level = logging.getLevelName(log.getEffectiveLevel())
+        program = "from hexwrap_server.worker import main; main()"
         self._process = subprocess.Popen(
-            [sys.executable, "-P", "-c", "from hexwrap_server.worker import main; main()", self._preload],
+            [sys.executable, "-P", "-c", program, level, self._preload],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             env=environment,
@@ -230,8 +233,10 @@ def main() -> None:
     os.dup2(2, 1)  # whatever libraries print must not end up between the frames
     calls: queue.SimpleQueue[Call] = queue.SimpleQueue()
     threading.Thread(target=_listen, args=(inlet, calls), daemon=True).start()
-    for module in filter(None, sys.argv[1:]):
+    logs.set_up_logging(sys.argv[1])
+    for module in filter(None, sys.argv[2:]):
         import_module(module)
+    garbage.look_no_more()
     sys.setswitchinterval(SWITCH_INTERVAL)
     _write_frame(outlet, ("ready",))
     while True:
@@ -263,6 +268,7 @@ def _listen(inlet: IO[bytes], calls: queue.SimpleQueue[Call]) -> None:
 
 
 def _answer(function: str, arguments: tuple[Any, ...], report: Report) -> tuple[Any, ...]:
+    logs.at_work_for("")
     try:
         module, name = function.split(":")
         return "result", getattr(import_module(module), name)(report, *arguments)
@@ -271,7 +277,7 @@ def _answer(function: str, arguments: tuple[Any, ...], report: Report) -> tuple[
     except MemoryError:
         return "error", MemoryLimitError("The job ran out of memory; make the mesh or the pattern coarser.")
     except Exception as error:
-        traceback.print_exc()
+        log.exception("a fault in %s", function)
         return "error", InternalError(
             f"The job failed because of a fault in hexwrap, not in the request "
             f"({type(error).__name__}: {error}); please report it together with the request."

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import gc
+import logging
 import os
 import time
+import warnings
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from hexwrap_server import later
+from hexwrap_server import later, logs
 from hexwrap_server.worker import Report
 from hexwrap_solver.errors import RequestError
 
@@ -24,6 +27,18 @@ def pid(report: Report) -> int:
 
 def environment(report: Report, name: str) -> str | None:
     return os.environ.get(name)
+
+
+def frozen(report: Report) -> int:
+    """Objects that are left out when garbage is looked for."""
+    return gc.get_freeze_count()
+
+
+def complain(report: Report, job: str) -> None:
+    logs.at_work_for(job)
+    logging.getLogger("hexwrap.calls").warning("something is odd")
+    warnings.warn("a library says", stacklevel=1)
+    raise ValueError("a bug")
 
 
 def talk(report: Report) -> str:

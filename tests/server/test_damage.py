@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import sqlite3
 import subprocess
 import sys
 from collections.abc import Callable
@@ -10,7 +12,9 @@ from typing import Any
 
 import pytest
 
-from hexwrap_server.store import DamagedError, FolderInUseError, Store
+from hexwrap_server.requests import Wanted
+from hexwrap_server.store import DamagedError, FolderInUseError, Job, Store, Work
+from hexwrap_solver.conformal.types import BoundaryCondition
 from tests.server.bodies import request
 from tests.server.live import Live, finished, running
 
@@ -120,3 +124,26 @@ def test_work_of_another_version_is_told_as_lost(tmp_path: Path) -> None:
     with running(tmp_path, workers=1) as client:
         told = client.get(f"/v1/jobs/{id}").json()
         assert (told["status"], told["problem"]["type"]) == ("failed", "/problems/internal")
+
+
+def test_the_log_of_writes_goes_into_the_database_beside_the_writing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def in_database() -> int:
+        with contextlib.closing(sqlite3.connect(f"file:{database}?immutable=1", uri=True)) as db:
+            count: int = db.execute("SELECT count(*) FROM jobs").fetchone()[0]
+            return count
+
+    database = tmp_path / "hexwrap.sqlite3"
+    store = Store(tmp_path)
+    monkeypatch.setattr("hexwrap_server.store.CHECKPOINT", 1)
+    store.check_point()
+    before = database.read_bytes()
+    for i in range(1500):  # SQLite alone would stop for the disk after about 300
+        store.add(
+            Job(str(i), "identity", ""), Work("identity", "surface", Wanted(BoundaryCondition(), None, None))
+        )
+    assert database.read_bytes() == before
+    store.check_point()
+    assert in_database() == 1500
+    store.close()

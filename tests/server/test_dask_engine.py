@@ -6,6 +6,7 @@ import asyncio
 import os
 import signal
 import time
+from collections import OrderedDict
 from collections.abc import AsyncIterator, Coroutine
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -235,3 +236,60 @@ def test_jobs_run_on_a_cluster(tmp_path: Path) -> None:
         job = finished(client, client.post("/v1/jobs", json=request()).json()["id"])
         assert job["status"] == "done"
         assert client.get(f"/v1/jobs/{job['id']}/files/panels.csv").status_code == 200
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_jobs_wait_for_the_first_machine(tmp_path: Path) -> None:
+    with (
+        distributed.LocalCluster(
+            n_workers=0, threads_per_worker=1, dashboard_address=":0", protocol="tcp://", silence_logs=50
+        ) as made,
+        running(tmp_path, engine="dask", scheduler=made.scheduler_address) as client,
+    ):
+        id = client.post("/v1/jobs", json=request()).json()["id"]
+        client.get(f"/v1/jobs/{id}", params={"wait": 1})
+        job = client.get(f"/v1/jobs/{id}").json()
+        assert (job["status"], job["stage"]) == ("queued", "waiting for a machine of the cluster")
+        made.scale(1)
+        assert finished(client, id)["status"] == "done"
+
+
+def test_waiting_for_machines_has_an_end() -> None:
+    from hexwrap_server.dask_engine import ClusterError, DaskEngine
+
+    told: list[str] = []
+    with pytest.raises(ClusterError, match=r"no machines for 0\.1 s"):
+        asyncio.run(DaskEngine("tcp://127.0.0.1:1").wait_for_place(0.1, told.append))
+    assert told == ["waiting for a machine of the cluster"]
+
+
+def test_scheduler_that_does_not_answer_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    from hexwrap_server import dask_engine
+
+    class Silent:
+        scheduler: Any
+
+        async def identity(self, n_workers: int) -> None:
+            await asyncio.sleep(60)
+
+    async def story() -> None:
+        e = dask_engine.DaskEngine("tcp://127.0.0.1:1")
+        e._client = Silent()
+        e._client.scheduler = e._client
+        with pytest.raises(OSError):  # noqa: PT011 - as the loop that looks catches it
+            await e._look()
+
+    monkeypatch.setattr(dask_engine, "LOOK_SECONDS", 0.05)
+    start = time.monotonic()
+    run(story())
+    assert time.monotonic() - start < 5
+
+
+def test_stopped_calls_are_not_remembered_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
+    from hexwrap_server import dask_engine
+
+    monkeypatch.setattr(dask_engine, "MOST_STOPPED", 3)
+    monkeypatch.setattr(dask_engine, "_STOPPED", OrderedDict())
+    for i in range(5):
+        dask_engine._stop(str(i))
+    assert list(dask_engine._STOPPED) == ["2", "3", "4"]

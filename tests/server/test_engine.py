@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import os
 import signal
 import subprocess
@@ -58,6 +59,7 @@ def test_values_go_there_and_back() -> None:
                 "a": [1, 2.5, b"x" * 2_000_000]
             }
             assert await call(e, "environment", "OPENBLAS_NUM_THREADS") == "1"
+            assert await call(e, "frozen") > 10_000  # numpy alone makes more
 
     run(story())
 
@@ -220,3 +222,20 @@ def test_workers_notice_that_their_parent_was_killed() -> None:
         while any(psutil.pid_exists(pid) for pid in pids):
             assert time.monotonic() < deadline, "workers outlived their parent"
             time.sleep(0.05)
+
+
+def test_log_lines_of_workers_are_json_and_name_the_job(capfd: pytest.CaptureFixture[str]) -> None:
+    async def story() -> None:
+        async with engine() as e:
+            with pytest.raises(InternalError):
+                await call(e, "complain", "a1b2")
+            with pytest.raises(InternalError):
+                await call(e, "no_such_function")
+
+    run(story())
+    lines = [json.loads(line) for line in capfd.readouterr().err.splitlines()]
+    assert [line["level"] for line in lines] == ["warning", "warning", "error", "error"]
+    assert [line.get("job") for line in lines] == ["a1b2", "a1b2", "a1b2", None]
+    assert lines[0]["message"] == "something is odd"
+    assert "a library says" in lines[1]["message"]
+    assert "ValueError: a bug" in lines[2]["traceback"]

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from hexwrap_server import jobs
+from hexwrap_server import disk, jobs
 from hexwrap_server.engine import ProcessEngine
 from hexwrap_server.requests import Order
 from hexwrap_server.store import Store
@@ -192,3 +192,27 @@ def test_database_that_is_really_full_refuses_and_goes_on(tmp_path: Path) -> Non
     store._db.execute("PRAGMA max_page_count = 100000")
     store._write(insert, "large", bytes(10**6))
     store.close()
+
+
+@pytest.mark.parametrize("refusals", [1, 3, 100])
+def test_files_that_are_open_are_replaced_a_moment_later(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, refusals: int
+) -> None:
+    """As on Windows, where nobody may replace what somebody reads."""
+    left = [refusals]
+
+    def replace(part: Path, path: Path) -> None:
+        left[0] -= 1
+        if left[0] >= 0:
+            raise PermissionError(errno.EACCES, "in use")
+        part.rename(path)
+
+    monkeypatch.setattr(disk.os, "replace", replace)
+    monkeypatch.setattr(disk, "PAUSES", (0.0, 0.001, 0.001, 0.001))
+    if refusals < 10:
+        disk.write_whole(tmp_path / "a", [b"new"])
+        assert (tmp_path / "a").read_bytes() == b"new"
+    else:
+        with pytest.raises(disk.StorageError):
+            disk.write_whole(tmp_path / "a", [b"new"])
+    assert len(list(tmp_path.iterdir())) == (refusals < 10)

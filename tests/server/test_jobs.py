@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 import itertools
+import json
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -18,6 +20,7 @@ from hexwrap_server.jobs import JobManager
 from hexwrap_server.metrics import Metrics
 from hexwrap_server.settings import MIB, Settings
 from hexwrap_server.store import FolderInUseError, Store
+from hexwrap_server.worker import WorkerDiedError
 from tests.server.bodies import request, tube
 from tests.server.live import Live, finished, running
 
@@ -207,6 +210,41 @@ def test_what_is_remembered_leaves_room_for_the_next_job(tmp_path: Path, job_mib
     store.close()
 
 
+class Lonely(ProcessEngine):
+    """Has no place for any job at first."""
+
+    has_place = False
+
+    async def wait_for_place(self, seconds: float, told: Callable[[str], None]) -> None:
+        deadline = time.monotonic() + seconds
+        told("waiting for a place")
+        while not self.has_place:
+            await asyncio.sleep(0.01)
+            if time.monotonic() > deadline:
+                raise WorkerDiedError("There was no place.")
+
+
+def test_jobs_wait_in_the_queue_until_there_is_a_place(tmp_path: Path) -> None:
+    engine = Lonely(1)
+    with running(tmp_path, engine) as client:
+        ids = [post(client) for _ in range(2)]
+        client.get(f"/v1/jobs/{ids[0]}", params={"wait": 0.2})
+        for id in ids:
+            job = client.get(f"/v1/jobs/{id}").json()
+            assert (job["status"], job["started"]) == ("queued", None)
+        assert client.get(f"/v1/jobs/{ids[0]}").json()["stage"] == "waiting for a place"
+        other = post(client, surface=fresh())
+        assert client.delete(f"/v1/jobs/{other}").status_code == 204
+        engine.has_place = True
+        assert [finished(client, id)["status"] for id in ids] == ["done", "done"]
+
+
+def test_jobs_that_find_no_place_in_time_fail(tmp_path: Path) -> None:
+    with running(tmp_path, Lonely(1), job_seconds=0.2) as client:
+        job = finished(client, post(client))
+        assert (job["status"], job["problem"]["detail"]) == ("failed", "There was no place.")
+
+
 def test_wait_holds_the_answer_and_lets_go(behave: Behave) -> None:
     client = behave("solve_after", 1.5)
     id = post(client, surface=fresh())
@@ -289,3 +327,20 @@ def test_stop_ends_long_polls_at_once(tmp_path: Path) -> None:
         client.delete(f"/v1/jobs/{id}")
     assert len(answers) == 1
     assert answers[0] < 5
+
+
+def test_workers_know_for_whom_they_work(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    surface = fresh()
+    with running(tmp_path, workers=1) as client:
+        assert finished(client, post(client, surface=surface))["status"] == "done"
+        deadline = time.monotonic() + 10
+        while not list((tmp_path / "stages").glob("*.stage")):  # written when the worker has a pause
+            assert time.monotonic() < deadline
+            time.sleep(0.02)
+    for path in (tmp_path / "stages").iterdir():
+        path.write_bytes(b"damaged")
+    with running(tmp_path, workers=1) as client:
+        id = post(client, surface=surface, name="again", panels={"sizes": 3})
+        assert finished(client, id)["status"] == "done"
+    told = [json.loads(line) for line in capfd.readouterr().err.splitlines() if "cached stage" in line]
+    assert {line["job"] for line in told} == {id}

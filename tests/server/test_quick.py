@@ -134,3 +134,29 @@ def test_without_simdjson_everything_goes_the_long_way(monkeypatch: pytest.Monke
     text = orjson.dumps(request(surface=tube(12, 5)))
     assert quick.read(text) is None
     assert loads(text) == request(surface=tube(12, 5))
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        [[1, 2], [3, 4, 5, 6]],
+        [[], [1, 2, 3, 4, 5, 6]],
+        [[1, 2, 3], [4, 5], [6, 7, 8, 9]],
+        [[1, [2], 3], [4, 5, 6]],
+    ],
+)
+@pytest.mark.parametrize("name", ["vertices", "faces"])
+@pytest.mark.parametrize("beside", [{}, {"phase": [1, 2, 3]}, {"a": "[,,]"}, {"a": [[1, 2, 3], [1, 2, 3]]}])
+def test_rows_are_not_taken_for_triples_when_they_are_three_long_on_average(
+    rows: Any, name: str, beside: Any
+) -> None:
+    assert quick.read(orjson.dumps({name: rows} | beside)) is None
+
+
+def test_other_lists_of_three_do_not_keep_triples_from_being_read() -> None:
+    document = {
+        "points": [[1.0, 2.0, 3.0]],
+        "angles": [[1, 2, 3], {"point": [1.0, 2.0, 3.5]}],
+        "x": [[], 1, 2],
+    }
+    assert plain(quick.read(json.dumps(document).encode())) == document

@@ -111,6 +111,13 @@ def test_gzip_goes_both_ways(client: Live) -> None:
     assert "content-encoding" not in refused.headers or refused.json()
 
 
+def test_known_bytes_are_read_again_when_they_are_said_to_be_packed(client: Live) -> None:
+    plain = json.dumps(request()).encode()
+    assert client.post("/v1/solve", content=plain).status_code == 200
+    answer = client.post("/v1/solve", content=plain, headers={"Content-Encoding": "gzip"})
+    assert (answer.status_code, answer.json()["type"]) == (400, "/problems/not-gzip")
+
+
 @pytest.mark.parametrize(
     ("body", "encoding", "status"),
     [
