@@ -20,6 +20,7 @@ class Packer:
         self._dump = dump
         self.places: Places = {}
         self._names: list[str] = []
+        self._begun: list[str] = []
         self._position = 0
         self._gzip: Any = isal_zlib.compressobj(GZIP_LEVEL, wbits=GZIP_WINDOW)
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="hexwrap-packer")
@@ -36,12 +37,16 @@ class Packer:
     def __contains__(self, name: str) -> bool:
         return name in self._names
 
+    def has_begun(self, name: str) -> bool:
+        return name in self._begun
+
     def foresee(self, make: Callable[[], Any]) -> Callable[[], bytes]:
         """The text of a part that will probably be added; ask for it when it is."""
         return self._thread.submit(lambda: self._dump(make())).result
 
     def begin(self, name: str, make: Callable[[], Any]) -> None:
         """make: leads to the first members of an object; whoever adds the part gives the others."""
+        self._begun.append(name)
         self._packed.append(self._thread.submit(self._pack, name, lambda: self._dump(make())[:-1]))
 
     def add(self, name: str, make: Callable[[], Any]) -> None:

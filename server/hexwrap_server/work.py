@@ -5,26 +5,27 @@ from __future__ import annotations
 import contextlib
 from collections import OrderedDict
 from collections.abc import Callable
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
-from typing import Any
 
-from hexwrap_server import codec, logs, wire
+from hexwrap_server import codec, later, logs
 from hexwrap_server.cache import CachingRunner, StageCache
 from hexwrap_server.disk import read_whole, write_whole
 from hexwrap_server.files import WRITERS, Meta
-from hexwrap_server.packing import Packer
 from hexwrap_server.parsing import loads
-from hexwrap_server.parts import PARTS
 from hexwrap_server.problems import FormError
 from hexwrap_server.requests import CacheSettings, Intake, Order, Outcome, SentSurface, Wanted
 from hexwrap_server.schemas import parse_surface
+from hexwrap_server.scribe import Scribe, There
 from hexwrap_server.worker import Report
+from hexwrap_server.writing import Here, Writer
 from hexwrap_solver import pipeline
 from hexwrap_solver.errors import HexwrapError
 from hexwrap_solver.surface import surface_from_mesh, surface_from_nurbs
 from hexwrap_solver.surface.types import Surface
 
+#: Of this worker process.
+_SCRIBE = Scribe()
 #: Finished solutions that a worker keeps for lift, flatten and files.
 KEPT_SOLUTIONS = 4
 
@@ -32,61 +33,34 @@ KEPT_SOLUTIONS = 4
 def solve(report: Report, order: Order, caching: CacheSettings) -> Outcome:
     """The whole way, stage by stage, each looked up first. Raises HexwrapError, StorageError."""
     logs.at_work_for(order.job)
-    with Packer(wire.dump) as packer:
-        runner = CachingRunner(_stages(caching), report, packing(packer))
+    with _writer() as writer:
+        runner = CachingRunner(_stages(caching), report, writer.made)
         solution = _staged(order.surface_id, lambda: _sent(order), order.wanted, runner)
-        pack_rest(packer, solution, runner.timings)
-        return _outcome(order, solution, packer, runner)
+        writer.rest(solution, runner.timings)
+        return _outcome(order, solution, writer, runner)
 
 
-def _outcome(order: Order, solution: pipeline.Solution, packer: Packer, runner: CachingRunner) -> Outcome:
+def _writer() -> Writer:
+    """From the second job on, the scribe's: those who ask for one thing only do not wait for its start."""
+    if _SCRIBE.is_ready:
+        return There(_SCRIBE)
+    later.put_off(_SCRIBE.start)
+    return Here()
+
+
+def _outcome(order: Order, solution: pipeline.Solution, writer: Writer, runner: CachingRunner) -> Outcome:
     content = codec.pieces(solution)
-    if order.files:  # beside the packing of the last parts
+    if order.files:  # beside the writing of the last parts
         write_whole(Path(order.files[1]), content)
-    result = packer.finish()
-    if order.files:
-        write_whole(Path(order.files[0]), [result])
+    written = writer.finish(order.files[0] if order.files else None)
     return Outcome(
-        result=None if order.files else result,
+        result=written.result,
         solution=None if order.files else b"".join(content),
-        parts=packer.places,
-        size=len(result) + sum(map(len, content)),
+        parts=written.parts,
+        size=written.size + sum(map(len, content)),
         timings=runner.timings,
         found=runner.found,
     )
-
-
-def packing(packer: Packer) -> Callable[[str, Any], None]:
-    """A listener to stages that packs what is known by then."""
-    known: dict[str, Any] = {}
-    texts: dict[str, Callable[[], bytes]] = {}
-
-    def made(stage: str, value: Any) -> None:
-        known[stage] = value
-        match stage:
-            case "surface":  # written beside the map, whose long steps leave the interpreter to others
-                texts["mesh"] = packer.foresee(partial(wire.mesh, value))
-            case "map":
-                if value.surface is known["surface"]:
-                    packer.add_text("mesh", texts["mesh"])
-                else:  # the map needed vertices of its own
-                    packer.add("mesh", partial(wire.mesh, value.surface))
-                packer.add("map", partial(wire.conformal, value))
-            case "pattern":
-                packer.add("pattern", partial(wire.pattern, value))
-            case "panels":
-                packer.begin("panels", partial(wire.shapes, value, known["pattern"]))
-
-    return made
-
-
-def pack_rest(packer: Packer, solution: pipeline.Solution, timings: dict[str, float]) -> None:
-    """Pack what is known when all stages are done."""
-    for name in PARTS:
-        if name == "panels" and solution.panels is not None:  # begun when they were made
-            packer.add(name, partial(wire.measures, solution))
-        elif name not in packer:
-            packer.add(name, partial(wire.part, solution, name, timings))
 
 
 def _sent(order: Order) -> SentSurface:

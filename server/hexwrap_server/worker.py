@@ -13,7 +13,6 @@ import os
 import pickle
 import queue
 import signal
-import struct
 import subprocess
 import sys
 import threading
@@ -25,6 +24,7 @@ from typing import IO, Any
 import psutil
 
 from hexwrap_server import garbage, later, logs
+from hexwrap_server.frames import read_frame, write_frame
 from hexwrap_solver.errors import HexwrapError
 
 #: Two workers with two BLAS threads each are many times slower than with one each.
@@ -56,7 +56,6 @@ PAUSE = 0.02
 #: Seconds after which a thread makes way for another: stages wait for the packing of results otherwise.
 SWITCH_INTERVAL = 0.0005
 log = logging.getLogger("hexwrap.worker")
-_LENGTH = struct.Struct("<Q")
 
 #: A function's name and its arguments.
 Call = tuple[str, tuple[Any, ...]]
@@ -192,14 +191,14 @@ class WorkerProcess:
         assert self._process is not None
         assert self._process.stdin is not None
         try:
-            _write_frame(self._process.stdin, message)
+            write_frame(self._process.stdin, message)
         except OSError:
             raise self._death() from None
 
     def _read(self) -> tuple[Any, ...]:
         assert self._process is not None
         assert self._process.stdout is not None
-        return _read_frame(self._process.stdout) or ("end",)
+        return read_frame(self._process.stdout) or ("end",)
 
     def _death(self) -> WorkError:
         assert self._process is not None
@@ -238,7 +237,7 @@ def main() -> None:
         import_module(module)
     garbage.look_no_more()
     sys.setswitchinterval(SWITCH_INTERVAL)
-    _write_frame(outlet, ("ready",))
+    write_frame(outlet, ("ready",))
     while True:
         function, arguments = _next(calls)
         _say(outlet, _answer(function, arguments, _reporter(outlet)))
@@ -255,14 +254,14 @@ def _next(calls: queue.SimpleQueue[Call]) -> Call:
 
 def _say(outlet: IO[bytes], answer: tuple[Any, ...]) -> None:
     try:
-        _write_frame(outlet, answer)
+        write_frame(outlet, answer)
     except (TypeError, AttributeError, pickle.PicklingError) as error:
         fault = InternalError(f"The answer cannot be sent because of a fault in hexwrap: {error}.")
-        _write_frame(outlet, ("error", fault))
+        write_frame(outlet, ("error", fault))
 
 
 def _listen(inlet: IO[bytes], calls: queue.SimpleQueue[Call]) -> None:
-    while (call := _read_frame(inlet)) is not None:
+    while (call := read_frame(inlet)) is not None:
         calls.put((call[0], call[1]))
     os._exit(0)
 
@@ -292,25 +291,6 @@ def _reporter(outlet: IO[bytes]) -> Report:
         now = time.monotonic()
         if stage != last[0] or now - last[1] >= REPORT_INTERVAL:
             last = (stage, now)
-            _write_frame(outlet, ("progress", stage, fraction, what))
+            write_frame(outlet, ("progress", stage, fraction, what))
 
     return report
-
-
-def _write_frame(pipe: IO[bytes], message: object) -> None:
-    data = pickle.dumps(message, protocol=5)
-    pipe.write(_LENGTH.pack(len(data)))
-    pipe.write(data)
-    pipe.flush()
-
-
-def _read_frame(pipe: IO[bytes]) -> tuple[Any, ...] | None:
-    try:
-        head = pipe.read(_LENGTH.size)
-        if len(head) < _LENGTH.size:
-            return None
-        (length,) = _LENGTH.unpack(head)
-        data = pipe.read(length)
-        return pickle.loads(data) if len(data) == length else None
-    except (OSError, EOFError, ValueError):
-        return None

@@ -13,7 +13,7 @@ from hexwrap_server import wire
 from hexwrap_server.packing import Packer
 from hexwrap_server.parts import PARTS, chosen
 from hexwrap_server.wire import result_json
-from hexwrap_server.work import pack_rest, packing
+from hexwrap_server.writing import pack_rest, packing
 from tests.server.analytic import cylinder
 
 
