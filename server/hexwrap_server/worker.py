@@ -25,6 +25,7 @@ import psutil
 
 from hexwrap_server import garbage, later, logs
 from hexwrap_server.frames import read_frame, write_frame
+from hexwrap_server.heap import Heap
 from hexwrap_solver.errors import HexwrapError
 
 #: Two workers with two BLAS threads each are many times slower than with one each.
@@ -93,6 +94,7 @@ class WorkerProcess:
     def __init__(self, preload: str = "") -> None:
         self._preload = preload
         self._process: subprocess.Popen[bytes] | None = None
+        self._seen: psutil.Process | None = None
         self._reason: WorkError | None = None
         self._stopped = False
 
@@ -114,6 +116,8 @@ class WorkerProcess:
         """Until the worker has imported everything. Raises WorkerDiedError."""
         if self._read()[0] != "ready":
             raise self._death()
+        with contextlib.suppress(psutil.NoSuchProcess):
+            self._seen = psutil.Process(self.pid)  # takes a millisecond, which no job is to wait for
 
     @property
     def pid(self) -> int:
@@ -169,12 +173,12 @@ class WorkerProcess:
             with contextlib.suppress(OSError):
                 if pipe:
                     pipe.close()
-        self._process = None
+        self._process = self._seen = None
 
     def _watch(self, done: threading.Event, seconds: float, mib: float) -> None:
         deadline = time.monotonic() + seconds
         try:
-            process = psutil.Process(self.pid)
+            process = self._seen or psutil.Process(self.pid)
             while not done.wait(WATCH_INTERVAL):
                 used = process.memory_info().rss / 2**20
                 if time.monotonic() > deadline:
@@ -238,17 +242,20 @@ def main() -> None:
     garbage.look_no_more()
     sys.setswitchinterval(SWITCH_INTERVAL)
     write_frame(outlet, ("ready",))
+    heap = Heap()
     while True:
-        function, arguments = _next(calls)
+        function, arguments = _next(calls, heap)
         _say(outlet, _answer(function, arguments, _reporter(outlet)))
 
 
-def _next(calls: queue.SimpleQueue[Call]) -> Call:
+def _next(calls: queue.SimpleQueue[Call], heap: Heap) -> Call:
     """The next call. What was put off is done in a pause, or else just before it."""
     call = None
     with contextlib.suppress(queue.Empty):
         call = calls.get(timeout=PAUSE)
     later.catch_up()
+    if call is None:
+        heap.fetch()
     return call or calls.get()
 
 
