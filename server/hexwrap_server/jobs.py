@@ -26,7 +26,7 @@ from hexwrap_server.requests import CacheSettings, Order, Outcome, ParsedRequest
 from hexwrap_server.settings import MIB, Settings
 from hexwrap_server.store import Job, Store, Work
 from hexwrap_server.version import service_version
-from hexwrap_server.worker import InternalError, WorkError
+from hexwrap_server.worker import InternalError, WorkerDiedError, WorkError
 from hexwrap_solver.errors import HexwrapError
 
 #: A work that was running this often when the server died is not started again.
@@ -181,13 +181,15 @@ class JobManager:
         """The job now and after each change until it is over; None after heartbeat seconds without one."""
         while True:
             job = self.get(id)
-            yield job
             if job.is_over or self._closing.is_set():
+                yield job
                 return
+            event = self._event(id)  # before the job is sent: that may take long, and the job end meanwhile
+            yield job
             while True:
                 try:
                     async with asyncio.timeout(heartbeat):
-                        await self._event(id).wait()
+                        await event.wait()
                     break
                 except TimeoutError:
                     yield None
@@ -252,10 +254,15 @@ class JobManager:
     def _pump(self) -> None:
         while self._queue and len(self._running) < self._engine.capacity and not self._closing.is_set():
             _, item = self._queue.popitem(last=False)
-            self._running.add(item)
-            item.task = asyncio.create_task(self._run(item))
+            self._take(item)
         self._metrics.queued.set(len(self._queue))
         self._metrics.running.set(len(self._running))
+
+    def _take(self, item: _Item) -> None:
+        self._running.add(item)
+        item.task = asyncio.create_task(self._run(item))
+        # a task that is cancelled before its first step never comes to its own end
+        item.task.add_done_callback(lambda _: self._leave(item))
 
     async def _run(self, item: _Item) -> None:
         identity = item.work.identity
@@ -274,21 +281,35 @@ class JobManager:
             self._heat(identity, packed)
             self._end([_done(job, outcome) for job in item.jobs.values()])
         except asyncio.CancelledError:
-            if begun:
-                with contextlib.suppress(StorageError):
-                    self.store.take_back(identity)
+            self._take_back(item, begun)
             raise
         except HexwrapError as error:
-            self._fail(item, error)
+            if (
+                isinstance(error, WorkerDiedError) and self._closing.is_set()
+            ):  # it was told to end, as we were
+                self._take_back(item, begun)
+            else:
+                self._fail(item, error)
         except Exception as error:
             log.exception("a job failed unexpectedly")
             fault = InternalError(f"The server could not finish the job ({type(error).__name__}: {error}).")
             self._fail(item, fault)
         finally:
-            self._running.discard(item)
-            if self._items.get(identity) is item:
-                del self._items[identity]
-            self._pump()
+            self._leave(item)
+
+    def _leave(self, item: _Item) -> None:
+        """Make room for the next work. Does no harm twice."""
+        if item not in self._running:
+            return
+        self._running.discard(item)
+        if self._items.get(item.work.identity) is item:
+            del self._items[item.work.identity]
+        self._pump()
+
+    def _take_back(self, item: _Item, begun: bool) -> None:
+        if begun:
+            with contextlib.suppress(StorageError):  # then it counts as an attempt
+                self.store.take_back(item.work.identity)
 
     def _fail(self, item: _Item, error: HexwrapError) -> None:
         self._settle(item.work.identity)

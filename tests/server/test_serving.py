@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
@@ -39,6 +40,23 @@ def test_signals_end_it_cleanly_while_it_works(tmp_path: Path, number: signal.Si
     log = (tmp_path / "log").read_text()
     assert "Traceback" not in log
     assert ids[0] in log
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_signal_to_the_whole_group_costs_no_job(tmp_path: Path, number: signal.Signals) -> None:
+    """As service managers and consoles send it: to the workers as well."""
+    port = free_port()
+    with httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=60, trust_env=False) as client:
+        with served(tmp_path, port, workers=1, group=True) as process:
+            ids = [client.post("/v1/jobs", json=heavy(i)).json()["id"] for i in range(2)]
+            while not client.get(f"/v1/jobs/{ids[0]}").json()["stage"]:  # the worker is at it
+                time.sleep(0.02)
+            os.killpg(process.pid, number)
+            assert process.wait(10) == 0
+        with served(tmp_path, port, workers=1):
+            for id in ids:
+                assert client.get(f"/v1/jobs/{id}?wait=50").json()["status"] == "done"
 
 
 def test_taken_port_is_told_clearly(tmp_path: Path) -> None:
