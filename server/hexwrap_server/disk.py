@@ -34,6 +34,11 @@ class StorageError(WorkError):
         )
 
 
+def make_private(folder: Path) -> None:
+    """Make a folder that only its owner can look into. One that is there already stays as it is."""
+    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+
+
 def write_whole(path: Path, content: Iterable[bytes | memoryview]) -> None:
     """Write a file that other processes see whole or not at all. Raises StorageError."""
     part = path.with_name(f"{path.name}.{uuid.uuid4().hex}{PART}")

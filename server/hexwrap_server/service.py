@@ -14,12 +14,13 @@ from typing import Any, TypeVar
 import platformdirs
 
 from hexwrap_server import __version__
+from hexwrap_server.disk import make_private
 from hexwrap_server.engine import Engine, ProcessEngine, nobody
 from hexwrap_server.jobs import JobManager
 from hexwrap_server.metrics import Metrics
 from hexwrap_server.requests import ParsedRequest
 from hexwrap_server.settings import Settings
-from hexwrap_server.store import FolderInUseError, Store
+from hexwrap_server.store import Store
 
 T = TypeVar("T")
 
@@ -105,11 +106,12 @@ def make_engine(settings: Settings) -> Engine:
 
 
 def open_store(settings: Settings) -> Store:
-    """The store in ``--data``; without it, in the user's data folder, beside other servers."""
+    """The store in ``--data``; without it, in the user's data folder.
+
+    The port alone decides where in there: servers that start again in another order find their own jobs.
+    """
     if settings.data:
         return Store(Path(settings.data))
     base = Path(platformdirs.user_data_dir("hexwrap", appauthor=False))
-    try:
-        return Store(base)
-    except FolderInUseError:
-        return Store(base / f"port-{settings.port}")
+    make_private(base)
+    return Store(base if settings.port == Settings.port else base / f"port-{settings.port}")

@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import json
 import logging
+import os
 import re
 import sqlite3
 import time
@@ -23,7 +24,7 @@ from isal import isal_zlib
 
 from hexwrap_server import codec
 from hexwrap_server.answers import GZIP_WINDOW
-from hexwrap_server.disk import StorageError, prune, read_whole, write_whole
+from hexwrap_server.disk import StorageError, make_private, prune, read_whole, write_whole
 from hexwrap_server.requests import Outcome, Wanted
 
 Status = Literal["queued", "running", "done", "failed", "cancelled"]
@@ -115,8 +116,9 @@ class Store:
         self.surfaces = folder / "surfaces"
         self.results = folder / "results"
         self.stages = folder / "stages"
+        make_private(folder)
         for path in (self.surfaces, self.results, self.stages):
-            path.mkdir(parents=True, exist_ok=True)
+            path.mkdir(exist_ok=True)
         self._lock = _locked(folder / "lock.sqlite3")
         self._path = path = folder / "hexwrap.sqlite3"
         self._log = folder / "hexwrap.sqlite3-wal"
@@ -152,9 +154,12 @@ class Store:
     def keep_surface(self, id: str, data: bytes) -> None:
         """Writes a file. Raises StorageError."""
         path = self.surface_path(id)
-        if path.exists() and path.read_bytes() == data:
-            path.touch()
-        else:
+        try:
+            is_kept = path.read_bytes() == data
+            os.utime(path)  # touch() would make an empty one in the place of one that was just pruned
+        except OSError:
+            is_kept = False
+        if not is_kept:
             write_whole(path, [data])
 
     def has_surface(self, id: str) -> bool:
