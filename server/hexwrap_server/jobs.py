@@ -8,7 +8,7 @@ import logging
 import time
 import uuid
 from collections import OrderedDict
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -16,7 +16,7 @@ from isal import isal_zlib
 
 from hexwrap_server.answers import GZIP_WINDOW
 from hexwrap_server.codec import digest
-from hexwrap_server.disk import StorageError
+from hexwrap_server.disk import BusyError, StorageError
 from hexwrap_server.engine import Engine
 from hexwrap_server.ledger import Ledger
 from hexwrap_server.metrics import Metrics
@@ -35,6 +35,8 @@ MAX_ATTEMPTS = 3
 PRUNE_INTERVAL = 600.0
 #: Seconds between two attempts to write what a full disk refused.
 CATCH_UP_INTERVAL = 2.0
+#: Seconds that a job waits for the database while another program holds it, and between two attempts.
+PATIENCE, BUSY_INTERVAL = 10.0, 0.1
 #: Results kept in memory as they go over the wire.
 HOT_RESULT_BYTES = 64 * MIB
 log = logging.getLogger("hexwrap.jobs")
@@ -128,7 +130,7 @@ class JobManager:
             self.store.add(job, finished)
             self._metrics.jobs.labels("reused").inc()
             return job
-        if not self.store.has_surface(parsed.surface_id):
+        if not self.store.use_surface(parsed.surface_id):
             raise FormError.at("/surface/id", "no such surface is kept here; send it to /v1/surfaces again")
         item = self._items.get(identity)
         if item is None and len(self._queue) >= self._settings.max_queue:
@@ -271,13 +273,15 @@ class JobManager:
             await self._engine.wait_for_place(
                 self._settings.job_seconds, lambda what: self._change(item, stage=what)
             )
-            self.store.start_work(identity)
+            await _patiently(lambda: self.store.start_work(identity))
             begun = True
             now = time.time()
-            self._change(item, written=True, status="running", stage="", started=now)
+            await _patiently(
+                lambda: self._change(item, written=True, status="running", stage="", started=now)
+            )
             outcome = await self._compute(item)
             packed = await asyncio.to_thread(self.store.keep_outcome, identity, outcome)
-            self.store.finish_work(identity, outcome)
+            await _patiently(lambda: self.store.finish_work(identity, outcome))
             self._heat(identity, packed)
             self._end([_done(job, outcome) for job in item.jobs.values()])
         except asyncio.CancelledError:
@@ -349,11 +353,11 @@ class JobManager:
         return Order(work.surface, data or b"", work.wanted, None, job)
 
     def _change(self, item: _Item, *, written: bool = False, **changes: Any) -> None:
-        for id, job in item.jobs.items():
-            item.jobs[id] = replace(job, **changes)
+        changed = {id: replace(job, **changes) for id, job in item.jobs.items()}
         if written:
-            self.store.update(item.jobs.values())
-        for id in item.jobs:
+            self.store.update(changed.values())
+        item.jobs.update(changed)
+        for id in changed:
             self._tell(id)
 
     def _end(self, jobs: list[Job]) -> None:
@@ -384,8 +388,9 @@ class JobManager:
         s = self._settings
         while True:
             try:
-                works = self.store.prune_rows(s.results_days, s.results_mib * MIB)
-                await asyncio.to_thread(self.store.prune_files, works, s.results_mib * MIB, s.cache_mib * MIB)
+                surfaces = await asyncio.to_thread(self.store.surface_files)
+                kept = self.store.prune_rows(s.results_days, s.results_mib * MIB, surfaces)
+                await asyncio.to_thread(self.store.prune_files, kept, s.cache_mib * MIB)
             except StorageError as error:
                 log.error("old results cannot be pruned: %s", error)
             await asyncio.sleep(PRUNE_INTERVAL)
@@ -403,6 +408,21 @@ class JobManager:
         seconds = round(job.finished - job.started, 3) if job.finished and job.started else None
         extra = {"job": job.id, "job_name": job.name, "seconds": seconds, "found": job.found}
         log.info("job %s", what, extra=extra)
+
+
+async def _patiently(write: Callable[[], None]) -> None:
+    """Write when whoever else holds the database lets go; requests are answered meanwhile.
+
+    Raises StorageError after PATIENCE seconds: no job fails because somebody made a copy.
+    """
+    deadline = time.monotonic() + PATIENCE
+    while True:
+        try:
+            return write()
+        except BusyError:
+            if time.monotonic() > deadline:
+                raise
+        await asyncio.sleep(BUSY_INTERVAL)
 
 
 def unpacked(packed: bytes, work: Work, include: list[str] | None) -> bytes:
