@@ -39,7 +39,8 @@ class Service:
         self.store = open_store(settings)
         self.metrics = Metrics()
         self.engine = engine or make_engine(settings)
-        self.errands = ProcessEngine(1)
+        self.errands = ProcessEngine(2)
+        self._one_reading = asyncio.Semaphore(1)
         self.manager = JobManager(self.store, self.engine, settings, self.metrics)
         self._reader = ThreadPoolExecutor(1, thread_name_prefix="hexwrap-reader")
         self._known_bodies: OrderedDict[str, ParsedRequest] = OrderedDict()
@@ -74,6 +75,11 @@ class Service:
         return await self.errands.run(
             function, *arguments, report=nobody, seconds=ERRAND_SECONDS, mib=self.settings.job_mib
         )
+
+    async def reading(self, function: str, *arguments: Any) -> Any:
+        """An errand that reads what may be large: one at a time, so that the short ones need not wait."""
+        async with self._one_reading:
+            return await self.errand(function, *arguments)
 
     async def read(self, function: Callable[..., T], *arguments: Any) -> T:
         """Read a body in the one thread for it: several would keep the event loop from its turn."""

@@ -8,6 +8,7 @@ import json
 import threading
 import time
 from collections.abc import AsyncIterator, Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager
 from functools import reduce
 from pathlib import Path
@@ -417,6 +418,20 @@ def test_stop_ends_long_polls_at_once(tmp_path: Path) -> None:
         client.delete(f"/v1/jobs/{id}")
     assert len(answers) == 1
     assert answers[0] < 5
+
+
+def test_solve_that_the_server_ends_says_where_the_job_is(tmp_path: Path) -> None:
+    with running(tmp_path, slow(60)) as client, ThreadPoolExecutor(1) as thread:
+        solving = thread.submit(client.post, "/v1/solve", json=request())
+        while not client.service.manager.n_running:
+            time.sleep(0.02)
+        client.service.manager.close_waits()
+        answer = solving.result(10)
+        id = client.get("/v1/jobs").json()["jobs"][0]["id"]
+        client.delete(f"/v1/jobs/{id}")
+    assert (answer.status_code, answer.json()["type"]) == (503, "/problems/shutting-down")
+    assert answer.headers["location"] == f"/v1/jobs/{id}"
+    assert int(answer.headers["retry-after"]) > 0
 
 
 def test_workers_know_for_whom_they_work(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
