@@ -67,3 +67,23 @@ def test_taken_port_is_told_clearly(tmp_path: Path) -> None:
         second = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert second.returncode != 0
     assert f"Cannot listen on 127.0.0.1:{port}" in second.stderr
+
+
+BROKEN = """
+import sys
+from hexwrap_server import cli, engine
+async def start(self):
+    raise OSError("There is no machine.")
+engine.ProcessEngine.start = start
+sys.exit(cli.main(["serve", "--port", "0", "--data", sys.argv[1]]))
+"""
+
+
+def test_what_keeps_it_from_starting_is_told_in_a_sentence(tmp_path: Path) -> None:
+    paths = os.pathsep.join(os.path.abspath(p or ".") for p in sys.path)
+    command = [sys.executable, "-c", BROKEN, str(tmp_path)]
+    environment = os.environ | {"PYTHONPATH": paths}
+    told = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60, check=False)
+    assert told.returncode == 1
+    assert told.stderr.endswith("hexwrap: There is no machine.\n")
+    assert "Traceback" not in told.stderr
