@@ -93,7 +93,7 @@ async def _streamed(request: Request, max_mib: float, hashes: list[Any]) -> byte
 def _unpacked(data: bytes, limit: int, max_mib: float) -> bytes:
     """A gzip bomb is not unpacked further than the limit."""
     whole, at = bytearray(), 0
-    for _ in range(MAX_MEMBERS):
+    for _ in range(MAX_MEMBERS + 1):
         if at == len(data):
             return bytes(whole)
         at = _member(data, at, whole, limit, max_mib)

@@ -288,9 +288,8 @@ class JobManager:
             self._take_back(item, begun)
             raise
         except HexwrapError as error:
-            if (
-                isinstance(error, WorkerDiedError) and self._closing.is_set()
-            ):  # it was told to end, as we were
+            told_to_end = isinstance(error, WorkerDiedError) and self._closing.is_set()
+            if told_to_end:  # as this server was; the next one goes on with the job
                 self._take_back(item, begun)
             else:
                 self._fail(item, error)
