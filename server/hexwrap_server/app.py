@@ -17,6 +17,7 @@ from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 from starlette.middleware.gzip import GZipMiddleware
 from starlette.responses import Response
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from hexwrap_server import __version__, garbage
 from hexwrap_server.answers import WORTH_PACKING, problem_response
@@ -54,7 +55,12 @@ def create_app(settings: Settings | None = None, engine: Engine | None = None) -
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        await service.start()
+        try:
+            await service.start()
+        except Exception as error:
+            app.state.failed = error
+            await service.stop()
+            raise
         try:
             yield
         finally:
@@ -70,6 +76,7 @@ def create_app(settings: Settings | None = None, engine: Engine | None = None) -
         redoc_url=None,
     )
     app.state.service = service
+    app.state.failed = None
     app.include_router(router)
     app.include_router(hops_router())
     add_viewer(app)
@@ -86,7 +93,10 @@ def create_app(settings: Settings | None = None, engine: Engine | None = None) -
 
 
 def serve(settings: Settings) -> None:
-    """Serve until Ctrl-C or SIGTERM. Raises PortTakenError, FolderInUseError, DamagedError, OSError."""
+    """Serve until Ctrl-C or SIGTERM.
+
+    Raises PortTakenError, FolderInUseError, DamagedError, OSError, and what keeps the engine from starting.
+    """
     set_up_logging(settings.log_level)
     # uvicorn raises the signal again once it has shut down; that shall end the program quietly
     signal.signal(signal.SIGTERM, lambda number, frame: None)
@@ -94,7 +104,7 @@ def serve(settings: Settings) -> None:
     try:
         app = create_app(settings)
         config = uvicorn.Config(
-            app,
+            _without_traceback(app),
             log_config=None,
             access_log=False,
             server_header=False,
@@ -102,11 +112,35 @@ def serve(settings: Settings) -> None:
             h11_max_incomplete_event_size=64 * 1024,
         )
         garbage.look_no_more()
-        _Server(config, app.state.service).run(sockets=[listener])
+        _run(_Server(config, app.state.service), app, listener)
     except KeyboardInterrupt:
         return
     finally:
         listener.close()
+
+
+def _run(server: uvicorn.Server, app: FastAPI, listener: socket.socket) -> None:
+    """Raises what kept the application from starting; uvicorn would only give an exit status of its own."""
+    try:
+        server.run(sockets=[listener])
+    except SystemExit:
+        if app.state.failed is None:
+            raise
+    if app.state.failed is not None:
+        raise app.state.failed
+
+
+def _without_traceback(app: FastAPI) -> ASGIApp:
+    """Whoever called ``serve`` tells why it did not start, in one sentence."""
+
+    async def told(scope: Scope, receive: Receive, send: Send) -> None:
+        async def short(message: Message) -> None:
+            failed = message["type"] == "lifespan.startup.failed"
+            await send({**message, "message": ""} if failed else message)
+
+        await app(scope, receive, short if scope["type"] == "lifespan" else send)
+
+    return told
 
 
 class _Server(uvicorn.Server):

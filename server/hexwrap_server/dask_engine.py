@@ -63,7 +63,13 @@ class DaskEngine:
 
     async def start(self) -> None:
         """Raises OSError when the scheduler does not answer."""
-        await self._connect()
+        try:
+            await self._connect()
+        except (OSError, RuntimeError, ValueError) as error:
+            raise OSError(
+                f"The dask scheduler at {self._address} does not answer ({error or type(error).__name__}); "
+                "start it, or give the address of another as --scheduler."
+            ) from error
         self._looking = asyncio.create_task(self._keep_looking())
 
     async def stop(self) -> None:

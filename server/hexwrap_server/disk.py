@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import logging
 import os
+import sqlite3
 import time
 import uuid
 from collections.abc import Callable, Iterable
@@ -25,13 +26,27 @@ class StorageError(WorkError):
     slug = "storage"
     title = "The server cannot use its files"
 
-    @classmethod
-    def of(cls, error: Exception) -> StorageError:
+    @staticmethod
+    def of(error: Exception) -> StorageError:
+        if getattr(error, "sqlite_errorcode", 0) & 0xFF == sqlite3.SQLITE_BUSY:
+            return BusyError(
+                "Another program is using the server's list of jobs (hexwrap.sqlite3 in its data folder); "
+                "close it, and send the request again."
+            )
         reason = getattr(error, "strerror", None) or error
-        return cls(
+        return StorageError(
             f"The server could not read or write in its data folder ({reason}); make room there, or start it "
             "with another --data, and send the request again."
         )
+
+
+class BusyError(StorageError):
+    """Another program holds the database; a moment later it may be free."""
+
+
+def make_private(folder: Path) -> None:
+    """Make a folder that only its owner can look into. One that is there already stays as it is."""
+    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
 
 
 def write_whole(path: Path, content: Iterable[bytes | memoryview]) -> None:
@@ -72,8 +87,10 @@ def read_whole(path: Path, is_whole: Callable[[bytes], bool]) -> bytes | None:
     return None
 
 
-def prune(folder: Path, limit_bytes: float, keep: Callable[[str], bool] = lambda name: False) -> None:
-    """Delete the longest unused files until the rest fits into limit_bytes.
+def prune(
+    folder: Path, limit_bytes: float, keep: Callable[[str], bool] = lambda name: False, oldest: float = 0.0
+) -> None:
+    """Delete what was last used before oldest, and the longest unused until the rest fits into limit_bytes.
 
     keep: names that stay. Files of the last minutes stay too: their owner may be about to name them. What a
     process that was killed had begun to write goes in any case.
@@ -89,7 +106,7 @@ def prune(folder: Path, limit_bytes: float, keep: Callable[[str], bool] = lambda
                 entries.append((state.st_mtime, state.st_size, path))
                 total += state.st_size
     for used, size, path in sorted(entries):
-        if total <= limit_bytes or used > time.time() - YOUNG:
+        if (total <= limit_bytes and used >= oldest) or used > time.time() - YOUNG:
             break
         with contextlib.suppress(OSError):  # in use, on Windows
             path.unlink()

@@ -35,7 +35,7 @@ class Engine(Protocol):
 
     @property
     def is_ready(self) -> bool:
-        """Whether a call would start at once."""
+        """Whether there is a place where a call could run, now or when it is free."""
         ...
 
     async def start(self) -> None: ...
@@ -78,7 +78,7 @@ class ProcessEngine:
 
     @property
     def is_ready(self) -> bool:
-        return not self._stopping and not self._starting and any(w.is_alive for w in self._workers)
+        return not self._stopping and len(self._starting) < len(self._workers)
 
     @property
     def pids(self) -> list[int]:
@@ -108,7 +108,8 @@ class ProcessEngine:
             with contextlib.suppress(RuntimeError):  # the loop is gone, and with it whoever listened
                 loop.call_soon_threadsafe(report, stage, fraction, what)
 
-        worker = await self._idle.get()
+        while not (worker := await self._idle.get()).is_alive:  # it died while it had nothing to do
+            self._begin(worker)
         call = loop.run_in_executor(self._threads, worker.run, function, arguments, relay, seconds, mib)
         try:
             return await asyncio.shield(call)

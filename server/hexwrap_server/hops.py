@@ -53,7 +53,7 @@ async def _solve(request: Request) -> Response:
     service: Service = request.app.state.service
     settings = service.settings
     body = await read_body(request, settings.max_body_mib)
-    call: Call = await service.errand(
+    call: Call = await service.reading(
         "hexwrap_server.hops_calls:read_call", body, settings.max_vertices, settings.max_panels
     )
     if call.request is None:

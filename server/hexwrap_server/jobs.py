@@ -8,7 +8,7 @@ import logging
 import time
 import uuid
 from collections import OrderedDict
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -16,7 +16,7 @@ from isal import isal_zlib
 
 from hexwrap_server.answers import GZIP_WINDOW
 from hexwrap_server.codec import digest
-from hexwrap_server.disk import StorageError
+from hexwrap_server.disk import BusyError, StorageError
 from hexwrap_server.engine import Engine
 from hexwrap_server.ledger import Ledger
 from hexwrap_server.metrics import Metrics
@@ -26,7 +26,7 @@ from hexwrap_server.requests import CacheSettings, Order, Outcome, ParsedRequest
 from hexwrap_server.settings import MIB, Settings
 from hexwrap_server.store import Job, Store, Work
 from hexwrap_server.version import service_version
-from hexwrap_server.worker import InternalError, WorkError
+from hexwrap_server.worker import InternalError, WorkerDiedError, WorkError
 from hexwrap_solver.errors import HexwrapError
 
 #: A work that was running this often when the server died is not started again.
@@ -35,6 +35,8 @@ MAX_ATTEMPTS = 3
 PRUNE_INTERVAL = 600.0
 #: Seconds between two attempts to write what a full disk refused.
 CATCH_UP_INTERVAL = 2.0
+#: Seconds that a job waits for the database while another program holds it, and between two attempts.
+PATIENCE, BUSY_INTERVAL = 10.0, 0.1
 #: Results kept in memory as they go over the wire.
 HOT_RESULT_BYTES = 64 * MIB
 log = logging.getLogger("hexwrap.jobs")
@@ -128,7 +130,7 @@ class JobManager:
             self.store.add(job, finished)
             self._metrics.jobs.labels("reused").inc()
             return job
-        if not self.store.has_surface(parsed.surface_id):
+        if not self.store.use_surface(parsed.surface_id):
             raise FormError.at("/surface/id", "no such surface is kept here; send it to /v1/surfaces again")
         item = self._items.get(identity)
         if item is None and len(self._queue) >= self._settings.max_queue:
@@ -181,13 +183,15 @@ class JobManager:
         """The job now and after each change until it is over; None after heartbeat seconds without one."""
         while True:
             job = self.get(id)
-            yield job
             if job.is_over or self._closing.is_set():
+                yield job
                 return
+            event = self._event(id)  # before the job is sent: that may take long, and the job end meanwhile
+            yield job
             while True:
                 try:
                     async with asyncio.timeout(heartbeat):
-                        await self._event(id).wait()
+                        await event.wait()
                     break
                 except TimeoutError:
                     yield None
@@ -252,10 +256,15 @@ class JobManager:
     def _pump(self) -> None:
         while self._queue and len(self._running) < self._engine.capacity and not self._closing.is_set():
             _, item = self._queue.popitem(last=False)
-            self._running.add(item)
-            item.task = asyncio.create_task(self._run(item))
+            self._take(item)
         self._metrics.queued.set(len(self._queue))
         self._metrics.running.set(len(self._running))
+
+    def _take(self, item: _Item) -> None:
+        self._running.add(item)
+        item.task = asyncio.create_task(self._run(item))
+        # a task that is cancelled before its first step never comes to its own end
+        item.task.add_done_callback(lambda _: self._leave(item))
 
     async def _run(self, item: _Item) -> None:
         identity = item.work.identity
@@ -264,31 +273,46 @@ class JobManager:
             await self._engine.wait_for_place(
                 self._settings.job_seconds, lambda what: self._change(item, stage=what)
             )
-            self.store.start_work(identity)
+            await _patiently(lambda: self.store.start_work(identity))
             begun = True
             now = time.time()
-            self._change(item, written=True, status="running", stage="", started=now)
+            await _patiently(
+                lambda: self._change(item, written=True, status="running", stage="", started=now)
+            )
             outcome = await self._compute(item)
             packed = await asyncio.to_thread(self.store.keep_outcome, identity, outcome)
-            self.store.finish_work(identity, outcome)
+            await _patiently(lambda: self.store.finish_work(identity, outcome))
             self._heat(identity, packed)
             self._end([_done(job, outcome) for job in item.jobs.values()])
         except asyncio.CancelledError:
-            if begun:
-                with contextlib.suppress(StorageError):
-                    self.store.take_back(identity)
+            self._take_back(item, begun)
             raise
         except HexwrapError as error:
-            self._fail(item, error)
+            told_to_end = isinstance(error, WorkerDiedError) and self._closing.is_set()
+            if told_to_end:  # as this server was; the next one goes on with the job
+                self._take_back(item, begun)
+            else:
+                self._fail(item, error)
         except Exception as error:
             log.exception("a job failed unexpectedly")
             fault = InternalError(f"The server could not finish the job ({type(error).__name__}: {error}).")
             self._fail(item, fault)
         finally:
-            self._running.discard(item)
-            if self._items.get(identity) is item:
-                del self._items[identity]
-            self._pump()
+            self._leave(item)
+
+    def _leave(self, item: _Item) -> None:
+        """Make room for the next work. Does no harm twice."""
+        if item not in self._running:
+            return
+        self._running.discard(item)
+        if self._items.get(item.work.identity) is item:
+            del self._items[item.work.identity]
+        self._pump()
+
+    def _take_back(self, item: _Item, begun: bool) -> None:
+        if begun:
+            with contextlib.suppress(StorageError):  # then it counts as an attempt
+                self.store.take_back(item.work.identity)
 
     def _fail(self, item: _Item, error: HexwrapError) -> None:
         self._settle(item.work.identity)
@@ -328,11 +352,11 @@ class JobManager:
         return Order(work.surface, data or b"", work.wanted, None, job)
 
     def _change(self, item: _Item, *, written: bool = False, **changes: Any) -> None:
-        for id, job in item.jobs.items():
-            item.jobs[id] = replace(job, **changes)
+        changed = {id: replace(job, **changes) for id, job in item.jobs.items()}
         if written:
-            self.store.update(item.jobs.values())
-        for id in item.jobs:
+            self.store.update(changed.values())
+        item.jobs.update(changed)
+        for id in changed:
             self._tell(id)
 
     def _end(self, jobs: list[Job]) -> None:
@@ -363,8 +387,9 @@ class JobManager:
         s = self._settings
         while True:
             try:
-                works = self.store.prune_rows(s.results_days, s.results_mib * MIB)
-                await asyncio.to_thread(self.store.prune_files, works, s.results_mib * MIB, s.cache_mib * MIB)
+                surfaces = await asyncio.to_thread(self.store.surface_files)
+                kept = self.store.prune_rows(s.results_days, s.results_mib * MIB, surfaces)
+                await asyncio.to_thread(self.store.prune_files, kept, s.cache_mib * MIB)
             except StorageError as error:
                 log.error("old results cannot be pruned: %s", error)
             await asyncio.sleep(PRUNE_INTERVAL)
@@ -382,6 +407,21 @@ class JobManager:
         seconds = round(job.finished - job.started, 3) if job.finished and job.started else None
         extra = {"job": job.id, "job_name": job.name, "seconds": seconds, "found": job.found}
         log.info("job %s", what, extra=extra)
+
+
+async def _patiently(write: Callable[[], None]) -> None:
+    """Write when whoever else holds the database lets go; requests are answered meanwhile.
+
+    Raises StorageError after PATIENCE seconds: no job fails because somebody made a copy.
+    """
+    deadline = time.monotonic() + PATIENCE
+    while True:
+        try:
+            return write()
+        except BusyError:
+            if time.monotonic() > deadline:
+                raise
+        await asyncio.sleep(BUSY_INTERVAL)
 
 
 def unpacked(packed: bytes, work: Work, include: list[str] | None) -> bytes:

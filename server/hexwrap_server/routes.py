@@ -145,6 +145,14 @@ async def solve(
     parts = _parts(include)
     job = manager.submit(await _read(request))
     job = await manager.wait(job.id, None)
+    if not job.is_over:
+        raise HttpError(
+            503,
+            "shutting-down",
+            "The server is shutting down",
+            f"The job is kept and goes on when the server runs again; then ask for /v1/jobs/{job.id}/result.",
+            {"Retry-After": "5", "Location": f"/v1/jobs/{job.id}"},
+        )
     return await _result(request, job, parts)
 
 
@@ -167,9 +175,9 @@ async def post_surface(
             int(settings.max_body_mib * MIB),
             caching,
         )
-        intake: Intake = await service.errand("hexwrap_server.uploads:read_upload", *arguments)
+        intake: Intake = await service.reading("hexwrap_server.uploads:read_upload", *arguments)
     else:
-        intake = await service.errand(
+        intake = await service.reading(
             "hexwrap_server.work:read_surface", body, settings.max_vertices, caching
         )
     await asyncio.to_thread(service.store.keep_surface, intake.id, intake.surface)
@@ -232,7 +240,7 @@ async def _read(request: Request) -> ParsedRequest:
     if len(text) <= SMALL_BODY and text.count(b'"') <= FEW_QUOTES:
         parsed = await service.read(read_and_keep, service.store, text, *limits)
     else:
-        parsed = await service.errand("hexwrap_server.parsing:read_request", text, *limits)
+        parsed = await service.reading("hexwrap_server.parsing:read_request", text, *limits)
         await asyncio.to_thread(keep, service.store, parsed)
     return service.remember_body(sent.mark, parsed)
 

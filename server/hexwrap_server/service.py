@@ -14,12 +14,13 @@ from typing import Any, TypeVar
 import platformdirs
 
 from hexwrap_server import __version__
+from hexwrap_server.disk import make_private
 from hexwrap_server.engine import Engine, ProcessEngine, nobody
 from hexwrap_server.jobs import JobManager
 from hexwrap_server.metrics import Metrics
 from hexwrap_server.requests import ParsedRequest
 from hexwrap_server.settings import Settings
-from hexwrap_server.store import FolderInUseError, Store
+from hexwrap_server.store import Store
 
 T = TypeVar("T")
 
@@ -38,7 +39,8 @@ class Service:
         self.store = open_store(settings)
         self.metrics = Metrics()
         self.engine = engine or make_engine(settings)
-        self.errands = ProcessEngine(1)
+        self.errands = ProcessEngine(2)
+        self._one_reading = asyncio.Semaphore(1)
         self.manager = JobManager(self.store, self.engine, settings, self.metrics)
         self._reader = ThreadPoolExecutor(1, thread_name_prefix="hexwrap-reader")
         self._known_bodies: OrderedDict[str, ParsedRequest] = OrderedDict()
@@ -74,6 +76,11 @@ class Service:
             function, *arguments, report=nobody, seconds=ERRAND_SECONDS, mib=self.settings.job_mib
         )
 
+    async def reading(self, function: str, *arguments: Any) -> Any:
+        """An errand that reads what may be large: one at a time, so that the short ones need not wait."""
+        async with self._one_reading:
+            return await self.errand(function, *arguments)
+
     async def read(self, function: Callable[..., T], *arguments: Any) -> T:
         """Read a body in the one thread for it: several would keep the event loop from its turn."""
         return await asyncio.get_running_loop().run_in_executor(self._reader, function, *arguments)
@@ -105,11 +112,12 @@ def make_engine(settings: Settings) -> Engine:
 
 
 def open_store(settings: Settings) -> Store:
-    """The store in ``--data``; without it, in the user's data folder, beside other servers."""
+    """The store in ``--data``; without it, in the user's data folder.
+
+    The port alone decides where in there: servers that start again in another order find their own jobs.
+    """
     if settings.data:
         return Store(Path(settings.data))
     base = Path(platformdirs.user_data_dir("hexwrap", appauthor=False))
-    try:
-        return Store(base)
-    except FolderInUseError:
-        return Store(base / f"port-{settings.port}")
+    make_private(base)
+    return Store(base if settings.port == Settings.port else base / f"port-{settings.port}")

@@ -21,7 +21,9 @@ def _setting(default: Any, help: str, metavar: str = "N") -> Any:
 
 
 def _processors() -> int:
-    return max(1, min(8, os.cpu_count() or 1))
+    """Those that this process may use, where the system tells; a container often has fewer than its host."""
+    usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return max(1, min(8, usable or 1))
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,9 @@ class Settings:
         default_factory=_processors,
         metadata={"help": "worker processes, one job each", "metavar": "N", "shown": "processors, at most 8"},
     )
-    data: str = _setting("", "folder for jobs and results; empty: the user's data folder", "FOLDER")
+    data: str = _setting(
+        "", "folder for jobs and results; empty: in the user's data folder, one for each port", "FOLDER"
+    )
     token: str = _setting("", "secret that clients must send as 'Authorization: Bearer TOKEN'", "TOKEN")
     allowed_hosts: str = _setting(
         "", "further names in a Host header to answer to, separated by commas", "NAMES"

@@ -10,10 +10,11 @@ from __future__ import annotations
 import contextlib
 import json
 import logging
+import os
 import re
 import sqlite3
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -23,7 +24,7 @@ from isal import isal_zlib
 
 from hexwrap_server import codec
 from hexwrap_server.answers import GZIP_WINDOW
-from hexwrap_server.disk import StorageError, prune, read_whole, write_whole
+from hexwrap_server.disk import StorageError, make_private, prune, read_whole, write_whole
 from hexwrap_server.requests import Outcome, Wanted
 
 Status = Literal["queued", "running", "done", "failed", "cancelled"]
@@ -31,6 +32,8 @@ log = logging.getLogger("hexwrap.store")
 #: Bytes of the write-ahead log at which it is brought into the database beside the work, and those at which
 #: whoever writes has to do it, and every answer waits for the disk.
 CHECKPOINT, LATEST_CHECKPOINT = 2**22, 2**26
+#: Milliseconds that a write waits, and the event loop with it, while another program holds the database.
+PATIENCE = 100
 #: Bytes of a page of the database.
 PAGE = 4096
 HEX_ID = re.compile(r"[0-9a-f]{64}")
@@ -95,6 +98,23 @@ class Work:
     timings: dict[str, float] = field(default_factory=dict)
 
 
+@dataclass(frozen=True)
+class FileState:
+    """used: when a file was last written or asked for, Unix time. size: its bytes."""
+
+    used: float
+    size: int
+
+
+@dataclass(frozen=True)
+class Kept:
+    """What pruning leaves: works and surfaces, and the Unix time before which nothing is kept."""
+
+    works: set[str]
+    surfaces: set[str]
+    oldest: float
+
+
 class FolderInUseError(Exception):
     """Another server works in this folder."""
 
@@ -115,8 +135,9 @@ class Store:
         self.surfaces = folder / "surfaces"
         self.results = folder / "results"
         self.stages = folder / "stages"
+        make_private(folder)
         for path in (self.surfaces, self.results, self.stages):
-            path.mkdir(parents=True, exist_ok=True)
+            path.mkdir(exist_ok=True)
         self._lock = _locked(folder / "lock.sqlite3")
         self._path = path = folder / "hexwrap.sqlite3"
         self._log = folder / "hexwrap.sqlite3-wal"
@@ -127,6 +148,7 @@ class Store:
             self._db.execute("PRAGMA synchronous = NORMAL")
             self._db.execute(f"PRAGMA wal_autocheckpoint = {LATEST_CHECKPOINT // PAGE}")
             self._db.executescript(_SCHEMA)
+            self._db.execute(f"PRAGMA busy_timeout = {PATIENCE}")
         except sqlite3.DatabaseError as error:
             self._lock.close()
             raise _unusable(path, error) from None
@@ -152,13 +174,28 @@ class Store:
     def keep_surface(self, id: str, data: bytes) -> None:
         """Writes a file. Raises StorageError."""
         path = self.surface_path(id)
-        if path.exists() and path.read_bytes() == data:
-            path.touch()
-        else:
+        try:
+            is_kept = path.read_bytes() == data
+            os.utime(path)  # touch() would make an empty one in the place of one that was just pruned
+        except OSError:
+            is_kept = False
+        if not is_kept:
             write_whole(path, [data])
 
     def has_surface(self, id: str) -> bool:
         return HEX_ID.fullmatch(id) is not None and self.surface_path(id).exists()
+
+    def use_surface(self, id: str) -> bool:
+        """Whether it is there; if so, no pruning that has begun takes it away."""
+        if not self.has_surface(id):
+            return False
+        try:
+            os.utime(self.surface_path(id))
+        except FileNotFoundError:
+            return False
+        except OSError as error:  # it can be read all the same
+            log.warning("the use of a surface cannot be noted: %s", error)
+        return True
 
     def surface(self, id: str) -> bytes | None:
         """Reads a file; None where it is gone or damaged, and then it is forgotten."""
@@ -282,31 +319,46 @@ class Store:
     def forget(self, id: str) -> None:
         self._write("DELETE FROM jobs WHERE id = ?", id)
 
-    def prune_rows(self, days: float, result_bytes: float) -> dict[str, str]:
-        """Forget jobs and works that are too old or too much, oldest first; the rest with surfaces."""
+    def prune_rows(self, days: float, result_bytes: float, surfaces: Mapping[str, FileState]) -> Kept:
+        """Forget jobs, works and surfaces that are too old or too much, the longest unused first.
+
+        surfaces: what ``surface_files`` found. Each counts once, with the last work that used it.
+        """
         oldest = time.time() - days * 86400
         over = "status IN ('done', 'failed', 'cancelled')"
         busy = "SELECT identity FROM jobs WHERE status IN ('queued', 'running')"
         with self._transaction():
             self._db.execute(f"DELETE FROM jobs WHERE {over} AND finished < ?", (oldest,))
-            listed = self._rows(
-                f"SELECT identity, size, used FROM works WHERE identity NOT IN ({busy}) ORDER BY used DESC"
+            works = self._rows(
+                f"SELECT used, identity, surface, size FROM works WHERE identity NOT IN ({busy})"
             )
-            gone, total = [], 0
-            for identity, size, used in listed:
-                total += size
-                if total > result_bytes or used < oldest:
-                    gone.append((identity,))
+            loose = [(state.used, "", id, 0) for id, state in surfaces.items()]
+            gone, kept = _divided(sorted([*works, *loose], reverse=True), oldest, result_bytes, surfaces)
             self._db.executemany(f"DELETE FROM jobs WHERE identity = ? AND {over}", gone)
             self._db.executemany("DELETE FROM works WHERE identity = ?", gone)
-        return dict(self._rows("SELECT identity, surface FROM works"))
+        left = self._rows("SELECT identity, surface FROM works")
+        return Kept({identity for identity, _ in left}, kept | {surface for _, surface in left}, oldest)
 
-    def prune_files(self, works: dict[str, str], result_bytes: float, stage_bytes: float) -> None:
-        """Delete the files that no work needs any more. Touches many files."""
-        surfaces = set(works.values())
-        prune(self.results, 0.0, keep=lambda name: name.partition(".")[0] in works)
-        prune(self.surfaces, result_bytes, keep=lambda name: name.partition(".")[0] in surfaces)
-        prune(self.stages, stage_bytes)
+    def surface_files(self) -> dict[str, FileState]:
+        """The kept surfaces by id. Looks at many files. Raises StorageError."""
+        found = {}
+        try:
+            with os.scandir(self.surfaces) as entries:
+                for entry in entries:
+                    id, _, ending = entry.name.partition(".")
+                    if ending == "surface":
+                        with contextlib.suppress(FileNotFoundError):
+                            state = entry.stat()
+                            found[id] = FileState(state.st_mtime, state.st_size)
+        except OSError as error:
+            raise StorageError.of(error) from error
+        return found
+
+    def prune_files(self, kept: Kept, stage_bytes: float) -> None:
+        """Delete the files that nobody needs any more. Touches many files."""
+        prune(self.results, 0.0, keep=lambda name: name.partition(".")[0] in kept.works)
+        prune(self.surfaces, 0.0, keep=lambda name: name.partition(".")[0] in kept.surfaces)
+        prune(self.stages, stage_bytes, oldest=kept.oldest)
 
     def _rows(self, statement: str, *values: Any) -> list[Any]:
         try:
@@ -335,6 +387,32 @@ class Store:
         if self._db.in_transaction:  # on a full disk SQLite may have done so already
             with contextlib.suppress(sqlite3.DatabaseError):
                 self._db.execute("ROLLBACK")
+
+
+def _divided(
+    listed: list[tuple[float, str, str, int]],
+    oldest: float,
+    limit_bytes: float,
+    surfaces: Mapping[str, FileState],
+) -> tuple[list[tuple[str]], set[str]]:
+    """Works to forget, and surfaces to keep.
+
+    listed: last use, work (or none), its surface, size of its result; the last used first.
+    """
+    gone: list[tuple[str]] = []
+    kept: set[str] = set()
+    total = 0
+    counted: set[str] = set()
+    for used, identity, surface, size in listed:
+        total += size
+        if surface in surfaces and surface not in counted:
+            counted.add(surface)
+            total += surfaces[surface].size
+        if total <= limit_bytes and used >= oldest:
+            kept.add(surface)
+        elif identity:
+            gone.append((identity,))
+    return gone, kept
 
 
 def _is_packed(data: bytes) -> bool:

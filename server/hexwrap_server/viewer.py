@@ -84,7 +84,7 @@ async def preview(
     service = service_of(request)
     body = await read_body(request, service.settings.max_body_mib)
     kind = request.headers.get("content-type", "")
-    data = await service.errand(
+    data = await service.reading(
         "hexwrap_server.viewer:read_preview", body, kind, name or "", service.settings.max_vertices
     )
     return await packed_response(request, data)

@@ -230,7 +230,9 @@ def _too_much(used: float, mib: float) -> WorkError:
 
 def main() -> None:
     """The life of a worker: take a call, answer, until the parent is gone."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C goes to the whole console; the parent decides
+    for name in ("SIGINT", "SIGTERM", "SIGBREAK"):  # sent to all of us; the parent decides
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.SIG_IGN)
     inlet = os.fdopen(os.dup(0), "rb")
     outlet = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # whatever libraries print must not end up between the frames

@@ -29,13 +29,16 @@ def free_port() -> int:
 
 
 @contextmanager
-def served(data: Path, port: int, workers: int = 2, **settings: object) -> Iterator[subprocess.Popen[bytes]]:
-    """A server process that answers."""
+def served(
+    data: Path, port: int, workers: int = 2, *, group: bool = False, **settings: object
+) -> Iterator[subprocess.Popen[bytes]]:
+    """A server process that answers. group: it leads a process group of its own."""
     paths = os.pathsep.join(os.path.abspath(p or ".") for p in sys.path)
     command = [sys.executable, "-c", PROGRAM, str(port), str(data), str(workers)]
     with (data / "log").open("ab") as log:
-        environment = {f"HEXWRAP_{name.upper()}": str(value) for name, value in settings.items()}
-        process = subprocess.Popen(command, env=os.environ | environment | {"PYTHONPATH": paths}, stderr=log)
+        variables = {f"HEXWRAP_{name.upper()}": str(value) for name, value in settings.items()}
+        environment = os.environ | variables | {"PYTHONPATH": paths}
+        process = subprocess.Popen(command, env=environment, stderr=log, start_new_session=group)
     try:
         deadline = time.monotonic() + 60
         while True:

@@ -72,6 +72,35 @@ def test_damaged_surface_is_asked_for_again(tmp_path: Path) -> None:
         )
 
 
+def test_surface_whose_file_cannot_be_read_is_a_problem(tmp_path: Path) -> None:
+    with running(tmp_path, workers=1) as client:
+        id = client.post("/v1/surfaces", json=request()["surface"]).json()["id"]
+        file = tmp_path / "surfaces" / f"{id}.surface"
+        file.unlink()
+        file.mkdir()
+        answer = client.post("/v1/surfaces", json=request()["surface"])
+        assert (answer.status_code, answer.json()["type"]) == (503, "/problems/storage")
+        file.rmdir()
+        assert client.post("/v1/surfaces", json=request()["surface"]).status_code == 201
+
+
+def test_surface_that_is_pruned_while_it_is_sent_again_is_written_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store = Store(tmp_path)
+    store.keep_surface("a" * 64, b"surface")
+
+    def read(path: Path) -> bytes:
+        path.unlink()
+        return b"surface"
+
+    monkeypatch.setattr(Path, "read_bytes", read)
+    store.keep_surface("a" * 64, b"surface")
+    monkeypatch.undo()
+    assert store.surface_path("a" * 64).read_bytes() == b"surface"
+    store.close()
+
+
 def test_lost_solution_is_made_again(tmp_path: Path) -> None:
     with running(tmp_path, workers=1) as client:
         id, _ = solved(client)

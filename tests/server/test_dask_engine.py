@@ -5,6 +5,8 @@ from __future__ import annotations
 import asyncio
 import os
 import signal
+import subprocess
+import sys
 import time
 from collections import OrderedDict
 from collections.abc import AsyncIterator, Coroutine
@@ -293,3 +295,28 @@ def test_stopped_calls_are_not_remembered_for_ever(monkeypatch: pytest.MonkeyPat
     for i in range(5):
         dask_engine._stop(str(i))
     assert list(dask_engine._STOPPED) == ["2", "3", "4"]
+
+
+NO_SCHEDULER = """
+import sys
+from hexwrap_server import cli, dask_engine
+dask_engine.CONNECT_SECONDS = 0.3
+words = ["serve", "--port", "0", "--engine", "dask", "--scheduler", sys.argv[1], "--data", sys.argv[2]]
+sys.exit(cli.main(words))
+"""
+
+
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "nowhere://127.0.0.1:9"])
+def test_scheduler_that_is_down_at_start_is_told_in_a_sentence(tmp_path: Path, address: str) -> None:
+    paths = os.pathsep.join(os.path.abspath(p or ".") for p in sys.path)
+    told = subprocess.run(
+        [sys.executable, "-c", NO_SCHEDULER, address, str(tmp_path)],
+        env=os.environ | {"PYTHONPATH": paths},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert told.returncode == 1
+    assert f"hexwrap: The dask scheduler at {address} does not answer" in told.stderr
+    assert "Traceback" not in told.stderr

@@ -67,8 +67,7 @@ def test_values_go_there_and_back() -> None:
 def test_calls_one_after_the_other_go_to_the_worker_that_remembers_most() -> None:
     async def story() -> None:
         async with engine(2) as e:
-            while not e.is_ready:
-                await asyncio.sleep(0.05)
+            await asyncio.gather(*e._starting)
             assert len({await call(e, "pid") for _ in range(4)}) == 1
 
     run(story())
@@ -140,6 +139,47 @@ def test_death_of_a_worker_harms_its_own_call_only() -> None:
             assert caught.value.data == {"exit_status": 7}
             assert await neighbour == "slept"
             assert await asyncio.gather(*(call(e, "echo", i) for i in range(5))) == list(range(5))
+
+    run(story())
+
+
+def test_worker_that_dies_while_it_waits_fails_no_call() -> None:
+    async def story() -> None:
+        async with engine() as e:
+            for _ in range(2):
+                idle = psutil.Process(await call(e, "pid"))
+                idle.kill()
+                idle.wait()
+                assert e.is_ready
+                assert await call(e, "echo", "next") == "next"
+
+    run(story())
+
+
+def test_one_worker_that_starts_keeps_nobody_from_the_others(tmp_path: Path) -> None:
+    async def story() -> None:
+        async with engine(2) as e:
+            await asyncio.gather(*e._starting)
+            with pytest.raises(WorkerDiedError):
+                await call(e, "die")
+            assert len(e._starting) == 1
+            assert e.is_ready
+            assert await call(e, "echo", 1) == 1
+
+    run(story())
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_workers_leave_it_to_their_parent_when_to_end(number: signal.Signals) -> None:
+    async def story() -> None:
+        async with engine() as e:
+            pid = await call(e, "pid")
+            busy = asyncio.create_task(call(e, "sleep", 0.3))
+            await asyncio.sleep(0.1)
+            os.kill(pid, number)
+            assert await busy == "slept"
+            assert await call(e, "pid") == pid
 
     run(story())
 

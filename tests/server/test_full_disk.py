@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import sqlite3
 import time
@@ -192,6 +193,34 @@ def test_database_that_is_really_full_refuses_and_goes_on(tmp_path: Path) -> Non
     store._db.execute("PRAGMA max_page_count = 100000")
     store._write(insert, "large", bytes(10**6))
     store.close()
+
+
+def test_program_that_holds_the_database_holds_nobody_else(tmp_path: Path) -> None:
+    with running(tmp_path, workers=1) as client:
+        finished(client, client.post("/v1/jobs", json=request()).json()["id"])
+        with contextlib.closing(sqlite3.connect(tmp_path / "hexwrap.sqlite3", isolation_level=None)) as other:
+            other.execute("BEGIN IMMEDIATE")
+            start = time.monotonic()
+            answer = client.post("/v1/jobs", json=request(pattern={"around": 8}))
+            assert time.monotonic() - start < 1
+            assert (answer.status_code, answer.json()["type"]) == (503, "/problems/storage")
+            assert "Another program" in answer.json()["detail"]
+            other.execute("ROLLBACK")
+        assert client.post("/v1/solve", json=request(pattern={"around": 8})).status_code == 200
+
+
+def test_job_that_ends_while_the_database_is_held_is_written_when_it_is_free(tmp_path: Path) -> None:
+    engine = Elsewhere(1)
+    engine.seconds = 1.0
+    with running(tmp_path, engine) as client:
+        id = client.post("/v1/jobs", json=request()).json()["id"]
+        until_running(client, id)
+        with contextlib.closing(sqlite3.connect(tmp_path / "hexwrap.sqlite3", isolation_level=None)) as other:
+            other.execute("BEGIN IMMEDIATE")
+            job = client.get(f"/v1/jobs/{id}", params={"wait": 2}).json()
+            assert job["status"] == "running"
+            other.execute("ROLLBACK")
+        assert finished(client, id)["status"] == "done"
 
 
 @pytest.mark.parametrize("refusals", [1, 3, 100])

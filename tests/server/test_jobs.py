@@ -7,7 +7,9 @@ import itertools
 import json
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import asynccontextmanager
 from functools import reduce
 from pathlib import Path
 from typing import Any
@@ -16,10 +18,11 @@ import httpx
 import pytest
 
 from hexwrap_server.engine import ProcessEngine
+from hexwrap_server.intake import read_and_keep
 from hexwrap_server.jobs import JobManager
 from hexwrap_server.metrics import Metrics
 from hexwrap_server.settings import MIB, Settings
-from hexwrap_server.store import FolderInUseError, Store
+from hexwrap_server.store import FolderInUseError, Job, Store
 from hexwrap_server.worker import WorkerDiedError
 from tests.server.bodies import request, tube
 from tests.server.live import Live, finished, running
@@ -210,6 +213,94 @@ def test_what_is_remembered_leaves_room_for_the_next_job(tmp_path: Path, job_mib
     store.close()
 
 
+class Still(ProcessEngine):
+    """Runs nothing; a call ends when it is told how."""
+
+    def __init__(self) -> None:
+        super().__init__(1)
+        self.ends: list[asyncio.Future[Any]] = []
+
+    async def start(self) -> None: ...
+
+    async def run(self, function: str, *arguments: Any, **rest: Any) -> Any:
+        self.ends.append(asyncio.get_running_loop().create_future())
+        return await self.ends[-1]
+
+
+@asynccontextmanager
+async def managed(folder: Path) -> AsyncIterator[tuple[JobManager, Still, list[Job]]]:
+    """A manager in this event loop, three jobs, of which one runs."""
+    store, engine = Store(folder), Still()
+    manager = JobManager(store, engine, Settings(), Metrics())
+    await manager.start()
+    try:
+        jobs = []
+        for around in (8, 9, 10):
+            body = json.dumps(request(pattern={"around": around})).encode()
+            jobs.append(manager.submit(read_and_keep(store, body, 10**6, 10**6)))
+        while not engine.ends:
+            await asyncio.sleep(0)
+        yield manager, engine, jobs
+    finally:
+        await manager.stop()
+        store.close()
+
+
+def test_job_that_is_deleted_while_it_is_taken_frees_its_worker(tmp_path: Path) -> None:
+    async def story() -> None:
+        async with managed(tmp_path) as (manager, engine, (first, second, third)):
+
+            async def delete_when_taken() -> None:
+                while manager.position(manager.get(second.id)) == 0 and manager.n_queued == 2:
+                    await asyncio.sleep(0)
+                assert manager.get(second.id).status == "queued"  # its task has not made its first step
+                await manager.delete(second.id)
+
+            deleting = asyncio.create_task(delete_when_taken())
+            await manager.delete(first.id)
+            await deleting
+            while len(engine.ends) < 2:
+                await asyncio.sleep(0.01)
+            assert manager.get(third.id).status == "running"
+            assert (manager.n_running, manager.n_queued) == (1, 0)
+
+    asyncio.run(asyncio.wait_for(story(), 10))
+
+
+def test_end_of_a_job_is_told_to_readers_that_were_slow(tmp_path: Path) -> None:
+    async def story() -> None:
+        async with managed(tmp_path) as (manager, engine, (first, *_)):
+            told = []
+            async for job in manager.changes(first.id, heartbeat=0.2):
+                assert job is not None, "the end was missed"
+                told.append(job.status)
+                if not job.is_over:  # it ends while this is being sent
+                    engine.ends[0].set_exception(WorkerDiedError("It died."))
+                    await manager.wait(first.id, None)
+            assert told == ["running", "failed"]
+
+    asyncio.run(asyncio.wait_for(story(), 10))
+
+
+@pytest.mark.parametrize(("closing", "status"), [(True, "running"), (False, "failed")])
+def test_job_whose_worker_is_ended_with_the_server_goes_on_later(
+    tmp_path: Path, closing: bool, status: str
+) -> None:
+    async def story() -> None:
+        async with managed(tmp_path) as (manager, engine, (first, *_)):
+            if closing:
+                manager.close_waits()
+            engine.ends[0].set_exception(WorkerDiedError("It died."))
+            await asyncio.sleep(0.1)
+            kept = manager.store.job(first.id)
+            work = manager.store.work(first.identity)
+            assert kept is not None
+            assert work is not None
+            assert (kept.status, work.attempts) == (status, 0)
+
+    asyncio.run(asyncio.wait_for(story(), 10))
+
+
 class Lonely(ProcessEngine):
     """Has no place for any job at first."""
 
@@ -327,6 +418,20 @@ def test_stop_ends_long_polls_at_once(tmp_path: Path) -> None:
         client.delete(f"/v1/jobs/{id}")
     assert len(answers) == 1
     assert answers[0] < 5
+
+
+def test_solve_that_the_server_ends_says_where_the_job_is(tmp_path: Path) -> None:
+    with running(tmp_path, slow(60)) as client, ThreadPoolExecutor(1) as thread:
+        solving = thread.submit(client.post, "/v1/solve", json=request())
+        while not client.service.manager.n_running:
+            time.sleep(0.02)
+        client.service.manager.close_waits()
+        answer = solving.result(10)
+        id = client.get("/v1/jobs").json()["jobs"][0]["id"]
+        client.delete(f"/v1/jobs/{id}")
+    assert (answer.status_code, answer.json()["type"]) == (503, "/problems/shutting-down")
+    assert answer.headers["location"] == f"/v1/jobs/{id}"
+    assert int(answer.headers["retry-after"]) > 0
 
 
 def test_workers_know_for_whom_they_work(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

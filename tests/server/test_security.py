@@ -5,12 +5,15 @@ from __future__ import annotations
 import gzip
 import json
 import socket
+import time
 import zlib
 from collections.abc import Iterator
 
 import httpx
+import numpy as np
 import pytest
 
+from hexwrap_server.bodies import _unpacked
 from hexwrap_server.security import host_name
 from tests.server.bodies import request, tube
 from tests.server.live import Live, running
@@ -109,6 +112,34 @@ def test_gzip_goes_both_ways(client: Live) -> None:
     assert bare.json() == answer.json()
     refused = client.get("/openapi.json", headers={"Accept-Encoding": "gzip;q=0"})
     assert "content-encoding" not in refused.headers or refused.json()
+
+
+@pytest.mark.parametrize(
+    ("sizes", "padding"),
+    [((70_000, 0, 5, 200_000), b""), ((3,), b"\0" * 200_000), ((0, 0, 9), b"\0" * 70_000)],
+)
+def test_members_of_every_size_are_unpacked(sizes: tuple[int, ...], padding: bytes) -> None:
+    parts = [np.random.default_rng(size).bytes(size) for size in sizes]
+    packed = b"".join(gzip.compress(part) + padding for part in parts)
+    assert _unpacked(packed, 10**6, 1.0) == b"".join(parts) == gzip.decompress(packed)
+
+
+def test_empty_members_are_counted(client: Live) -> None:
+    """They unpack to nothing, however many there are."""
+    empty = gzip.compress(b"", 1)
+    assert _unpacked(empty * 10_000, 10, 1.0) == b""
+    body = empty * 10_001
+    answer = client.post("/v1/jobs", content=body, headers={"Content-Encoding": "gzip"})
+    assert (answer.status_code, answer.json()["type"]) == (400, "/problems/not-gzip")
+    assert "10,000" in answer.json()["detail"]
+
+
+def test_what_follows_a_member_is_not_copied_for_each() -> None:
+    last = np.random.default_rng(0).bytes(40_000_000)
+    packed = gzip.compress(b"", 1) * 9_000 + gzip.compress(last, 1)
+    start = time.monotonic()
+    assert _unpacked(packed, 10**8, 100.0) == last
+    assert time.monotonic() - start < 3  # copied for each, it is three times as long at the least
 
 
 def test_known_bytes_are_read_again_when_they_are_said_to_be_packed(client: Live) -> None:

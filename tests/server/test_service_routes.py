@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import asyncio
 import io
 from collections.abc import Iterator
+from pathlib import Path
 
 import ezdxf.filemanagement
+import httpx
 import numpy as np
 import orjson
 import pytest
 from ezdxf.entities import LWPolyline
 
 from hexwrap_server import quick, routes
+from hexwrap_server.service import Service
+from hexwrap_server.settings import Settings
 from tests.server.bodies import request, tube
 from tests.server.live import Live, finished, running
 
@@ -243,6 +248,46 @@ def test_what_may_take_long_to_read_is_read_in_a_process(
     monkeypatch.setattr(quick, "read", not_here)
     answer = client.post(path.format(done), content=body)
     assert (answer.status_code, answer.json()["type"]) == (422, "/problems/invalid-request")
+
+
+@pytest.mark.parametrize(
+    ("path", "body"),
+    [
+        ("/v1/surfaces", b"{}"),
+        ("/v1/surfaces?name=a.obj", b"v 0 0 0"),
+        ("/v1/surfaces/preview?name=a.obj", b"v 0 0 0"),
+        ("/v1/jobs", orjson.dumps({f"name {i}": i for i in range(routes.FEW_QUOTES)})),
+        ("/solve", b"{}"),
+    ],
+)
+def test_what_is_short_does_not_wait_for_what_is_being_read(
+    client: Live, done: str, monkeypatch: pytest.MonkeyPatch, path: str, body: bytes
+) -> None:
+    monkeypatch.setattr(client.service, "_one_reading", asyncio.Semaphore(0))  # somebody reads for ever
+    with pytest.raises(httpx.ReadTimeout):
+        client.post(path, content=body, timeout=0.3)
+    assert client.post(f"/v1/jobs/{done}/lift", json={"points": [[0.1, 0.1]]}).status_code == 200
+
+
+def test_errands_run_beside_one_that_reads(tmp_path: Path) -> None:
+    async def story() -> None:
+        service = Service(Settings(data=str(tmp_path)))
+        await service.errands.start()
+        try:
+            mark = tmp_path / "begun"
+            readings = [
+                asyncio.create_task(service.reading("tests.server.calls:sleep", 60, str(mark))) for _ in "ab"
+            ]
+            while not mark.exists():
+                await asyncio.sleep(0.01)
+            assert await service.errand("tests.server.calls:echo", 1) == 1
+            for reading in readings:
+                reading.cancel()
+            await asyncio.gather(*readings, return_exceptions=True)
+        finally:
+            await service.stop()
+
+    asyncio.run(asyncio.wait_for(story(), 30))
 
 
 def test_drawings_are_carried_to_the_surface_and_back(client: Live, done: str) -> None:

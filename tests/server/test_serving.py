@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
@@ -30,7 +31,7 @@ def test_signals_end_it_cleanly_while_it_works(tmp_path: Path, number: signal.Si
             time.sleep(0.05)
         ids = [client.post(f"{base}/v1/jobs", json=heavy(i)).json()["id"] for i in range(2)]
         workers = children(process)
-        assert len(workers) == 2
+        assert len(workers) == 3  # one for jobs, two for errands
         start = time.monotonic()
         process.send_signal(number)
         assert process.wait(10) == 0
@@ -41,6 +42,23 @@ def test_signals_end_it_cleanly_while_it_works(tmp_path: Path, number: signal.Si
     assert ids[0] in log
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_signal_to_the_whole_group_costs_no_job(tmp_path: Path, number: signal.Signals) -> None:
+    """As service managers and consoles send it: to the workers as well."""
+    port = free_port()
+    with httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=60, trust_env=False) as client:
+        with served(tmp_path, port, workers=1, group=True) as process:
+            ids = [client.post("/v1/jobs", json=heavy(i)).json()["id"] for i in range(2)]
+            while not client.get(f"/v1/jobs/{ids[0]}").json()["stage"]:  # the worker is at it
+                time.sleep(0.02)
+            os.killpg(process.pid, number)
+            assert process.wait(10) == 0
+        with served(tmp_path, port, workers=1):
+            for id in ids:
+                assert client.get(f"/v1/jobs/{id}?wait=50").json()["status"] == "done"
+
+
 def test_taken_port_is_told_clearly(tmp_path: Path) -> None:
     port = free_port()
     with served(tmp_path, port, workers=1):
@@ -49,3 +67,23 @@ def test_taken_port_is_told_clearly(tmp_path: Path) -> None:
         second = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert second.returncode != 0
     assert f"Cannot listen on 127.0.0.1:{port}" in second.stderr
+
+
+BROKEN = """
+import sys
+from hexwrap_server import cli, engine
+async def start(self):
+    raise OSError("There is no machine.")
+engine.ProcessEngine.start = start
+sys.exit(cli.main(["serve", "--port", "0", "--data", sys.argv[1]]))
+"""
+
+
+def test_what_keeps_it_from_starting_is_told_in_a_sentence(tmp_path: Path) -> None:
+    paths = os.pathsep.join(os.path.abspath(p or ".") for p in sys.path)
+    command = [sys.executable, "-c", BROKEN, str(tmp_path)]
+    environment = os.environ | {"PYTHONPATH": paths}
+    told = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60, check=False)
+    assert told.returncode == 1
+    assert told.stderr.endswith("hexwrap: There is no machine.\n")
+    assert "Traceback" not in told.stderr

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import argparse
+import os
+import sys
 from dataclasses import fields
 from pathlib import Path
 
 import pytest
 
+from hexwrap_server.service import open_store
 from hexwrap_server.settings import Settings, add_arguments, flag, readme_table, variable
+from hexwrap_server.store import FolderInUseError
 
 README = Path(__file__).parents[2] / "README.md"
 
@@ -65,3 +69,41 @@ def test_variable_of_the_wrong_kind_is_refused() -> None:
 
 def test_network_address_with_a_token_is_taken() -> None:
     assert not parsed("--host", "0.0.0.0", "--token", "secret").is_loopback
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_getaffinity"), reason="not told by this system")
+def test_there_are_no_more_workers_than_processors_they_may_use() -> None:
+    allowed = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {min(allowed)})
+    try:
+        assert Settings().workers == 1
+    finally:
+        os.sched_setaffinity(0, allowed)
+
+
+def test_port_alone_decides_where_the_jobs_are(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("platformdirs.user_data_dir", lambda *_, **__: str(tmp_path / "hexwrap"))
+
+    def folders(*ports: int) -> dict[int, Path]:
+        """Of servers that are started one after the other."""
+        stores = {port: open_store(Settings(port=port)) for port in ports}
+        for store in stores.values():
+            store.close()
+        return {port: store.folder for port, store in stores.items()}
+
+    first = folders(7001, 6789, 7002)
+    assert len(set(first.values())) == 3
+    assert folders(7002, 7001, 6789) == folders(7001, 6789, 7002) == first
+    open_first = open_store(Settings(port=7001))
+    with pytest.raises(FolderInUseError, match="--data"):
+        open_store(Settings(port=7001))
+    open_first.close()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="modes of POSIX")
+def test_data_is_nobody_elses_business(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("platformdirs.user_data_dir", lambda *_, **__: str(tmp_path / "user" / "hexwrap"))
+    for settings in (Settings(port=7001), Settings(data=str(tmp_path / "own"))):
+        open_store(settings).close()
+    for folder in (tmp_path / "user" / "hexwrap", tmp_path / "own"):
+        assert folder.stat().st_mode & 0o777 == 0o700

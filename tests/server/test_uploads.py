@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -102,10 +103,72 @@ def test_old_and_superfluous_results_are_forgotten(tmp_path: Path) -> None:
         store.add(job, Work(identity, "a" * 64, Wanted(BoundaryCondition(), None, None)))
         store.keep_outcome(identity, outcome)
         store.finish_work(identity, outcome)
-        time.sleep(0.01)
+        time.sleep(0.05)  # more than a step of any system's clock
     assert store.finished_work("0" * 64) is not None  # asked for: now the last used
-    assert len(store.prune_rows(days=1, result_bytes=4500)) == 2
+    assert len(store.prune_rows(1, 4500, store.surface_files()).works) == 2
     assert [job.id for job in store.jobs(10)] == ["job3", "job0"]
-    assert store.prune_rows(days=0, result_bytes=1e9) == {}
+    assert store.prune_rows(0, 1e9, store.surface_files()).works == set()
     assert store.jobs(10) == []
+    store.close()
+
+
+def failed_long_ago(store: Store, number: int) -> str:
+    """The surface of a job that failed, 1000 bytes."""
+    identity = surface = f"{number:064x}"
+    store.keep_surface(surface, bytes(1000))
+    moment = time.time() - 1000 + number
+    os.utime(store.surface_path(surface), (moment, moment))
+    job = Job(f"job{number}", identity, "", created=moment, finished=moment, status="failed")
+    store.add(job, Work(identity, surface, Wanted(BoundaryCondition(), None, None)))
+    store._write("UPDATE works SET used = ? WHERE identity = ?", moment, identity)
+    return surface
+
+
+def pruned(store: Store, days: float, result_bytes: float) -> set[str]:
+    """Surfaces that are still there."""
+    store.prune_files(store.prune_rows(days, result_bytes, store.surface_files()), 1e9)
+    return set(store.surface_files())
+
+
+def test_surfaces_of_failed_jobs_count(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    surfaces = [failed_long_ago(store, i) for i in range(8)]
+    store._write("UPDATE jobs SET status = 'queued' WHERE id = 'job0'")
+    assert pruned(store, days=1, result_bytes=3500) == {surfaces[0], *surfaces[-3:]}
+    assert {job.id for job in store.jobs(10)} == {"job0", "job5", "job6", "job7"}
+    store.close()
+
+
+def test_surfaces_that_many_works_share_count_once(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    surface = failed_long_ago(store, 1)
+    for i in range(2, 6):
+        job = Job(f"job{i}", f"{i:064x}", "", status="failed", finished=time.time())
+        store.add(job, Work(job.identity, surface, Wanted(BoundaryCondition(), None, None)))
+    assert pruned(store, days=1, result_bytes=1500) == {surface}
+    assert len(store.jobs(10)) == 5
+    store.close()
+
+
+def test_what_no_job_uses_has_an_age_too(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    for id, days in (("a" * 64, 3), ("b" * 64, 0.5)):
+        store.keep_surface(id, b"surface")
+        stage = store.stages / f"{id}.stage"
+        stage.write_bytes(b"stage")
+        for path in (store.surface_path(id), stage):
+            os.utime(path, (time.time() - days * 86400,) * 2)
+    assert pruned(store, days=1, result_bytes=1e9) == {"b" * 64}
+    assert [path.name[0] for path in store.stages.iterdir()] == ["b"]
+    store.close()
+
+
+def test_surface_that_a_job_asks_for_while_it_is_pruned_stays(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    surface = failed_long_ago(store, 1)
+    kept = store.prune_rows(0, 1e9, store.surface_files())
+    assert store.use_surface(surface)
+    store.prune_files(kept, 1e9)
+    assert store.has_surface(surface)
+    assert not store.use_surface("f" * 64)
     store.close()
