@@ -2,11 +2,28 @@
 
 from __future__ import annotations
 
+import os
 import pickle
+import signal
 import struct
 from typing import IO, Any
 
 _LENGTH = struct.Struct("<Q")
+
+
+def pipes_of_child() -> tuple[IO[bytes], IO[bytes]]:
+    """Where this process hears its parent, and where it answers: its standard input and output.
+
+    Signals go to all processes of a console or a service at once; the parent decides, and its end is the end
+    of the input.
+    """
+    for name in ("SIGINT", "SIGTERM", "SIGBREAK"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.SIG_IGN)
+    inlet = os.fdopen(os.dup(0), "rb")
+    outlet = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # whatever libraries print must not end up between the frames
+    return inlet, outlet
 
 
 def write_frame(pipe: IO[bytes], message: object) -> None:

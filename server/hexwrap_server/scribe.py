@@ -12,7 +12,6 @@ import contextlib
 import logging
 import os
 import queue
-import signal
 import subprocess
 import sys
 import threading
@@ -22,7 +21,7 @@ from types import TracebackType
 from typing import IO, Any, cast
 
 from hexwrap_server import codec, garbage, logs
-from hexwrap_server.frames import read_frame, write_frame
+from hexwrap_server.frames import pipes_of_child, read_frame, write_frame
 from hexwrap_server.writing import Here, Written
 from hexwrap_solver.errors import HexwrapError
 from hexwrap_solver.pipeline import Solution
@@ -151,12 +150,7 @@ class There:
 
 def main() -> None:
     """The life of a scribe: write what is sent, until the worker is gone."""
-    for name in ("SIGINT", "SIGTERM", "SIGBREAK"):  # they go to all of a console; the worker's end decides
-        if hasattr(signal, name):
-            signal.signal(getattr(signal, name), signal.SIG_IGN)
-    inlet = os.fdopen(os.dup(0), "rb")
-    outlet = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # whatever libraries print must not end up between the frames
+    inlet, outlet = pipes_of_child()
     orders: queue.SimpleQueue[Order] = queue.SimpleQueue()
     threading.Thread(target=_listen, args=(inlet, orders), daemon=True).start()
     logs.set_up_logging(sys.argv[1])

@@ -12,7 +12,6 @@ import logging
 import os
 import pickle
 import queue
-import signal
 import subprocess
 import sys
 import threading
@@ -24,7 +23,7 @@ from typing import IO, Any
 import psutil
 
 from hexwrap_server import garbage, later, logs
-from hexwrap_server.frames import read_frame, write_frame
+from hexwrap_server.frames import pipes_of_child, read_frame, write_frame
 from hexwrap_server.heap import Heap
 from hexwrap_solver.errors import HexwrapError
 
@@ -230,12 +229,7 @@ def _too_much(used: float, mib: float) -> WorkError:
 
 def main() -> None:
     """The life of a worker: take a call, answer, until the parent is gone."""
-    for name in ("SIGINT", "SIGTERM", "SIGBREAK"):  # sent to all of us; the parent decides
-        if hasattr(signal, name):
-            signal.signal(getattr(signal, name), signal.SIG_IGN)
-    inlet = os.fdopen(os.dup(0), "rb")
-    outlet = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # whatever libraries print must not end up between the frames
+    inlet, outlet = pipes_of_child()
     calls: queue.SimpleQueue[Call] = queue.SimpleQueue()
     threading.Thread(target=_listen, args=(inlet, calls), daemon=True).start()
     logs.set_up_logging(sys.argv[1])
