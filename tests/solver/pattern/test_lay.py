@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial import KDTree
 
 from hexwrap_solver.errors import NotAdaptedError, PatternError
 from hexwrap_solver.pattern import lay_pattern
 from hexwrap_solver.pattern.types import Pattern, PatternSettings
+from tests.solver.conformal.test_conformal_map import ring_with_corners
 from tests.solver.pattern import annuli
 
 DEGREE = {"hex": 3, "triangle": 6, "quad": 4}
@@ -103,3 +105,12 @@ def test_cells_that_shared_vertices_cannot_tell_apart_are_refused(kind, around, 
     cmap = annuli.revolution(np.cosh, np.linspace(-1, 1.5, 25), 40)
     with pytest.raises(PatternError, match="more cells around"):
         lay_pattern(cmap, PatternSettings(kind=kind, around=around, boundary=boundary))
+
+
+@pytest.mark.parametrize("align", ["none", "both"])
+def test_corner_angles_of_seven_digits_make_the_same_pattern(align):
+    exact, typed = (ring_with_corners(off) for off in (0.0, 6 * 4e-8))
+    one, other = (lay_pattern(cmap, PatternSettings(around=48, align=align)) for cmap in (exact, typed))
+    assert one.n_cells == other.n_cells
+    assert one.around == other.around
+    assert KDTree(one.vertices).query(other.vertices)[0].max() < 1e-4 * one.edge_length
