@@ -12,7 +12,14 @@ from hexwrap_solver.pattern.align import Straightening, place_by_sides, turn_bet
 from hexwrap_solver.pattern.cone import place_on_cone, place_on_flat_ring
 from hexwrap_solver.pattern.cylinder import place_on_cylinder
 from hexwrap_solver.pattern.lattice import Lattice
-from hexwrap_solver.pattern.placement import Placement, edge_angle, is_straight, quantized, quantum_turns
+from hexwrap_solver.pattern.placement import (
+    Placement,
+    check_phase,
+    edge_angle,
+    is_straight,
+    quantized,
+    quantum_turns,
+)
 from hexwrap_solver.pattern.sides import has_corners, is_polygon
 from hexwrap_solver.pattern.types import PatternSettings
 
@@ -41,6 +48,7 @@ class Placing:
 
     @classmethod
     def of(cls, cmap: ConformalMap, lattice: Lattice, settings: PatternSettings) -> Placing:
+        check_phase(settings)
         cmap = quantized(cmap, lattice)
         loops, notes = loops_to_align(cmap, lattice, settings)
         return cls(cmap, lattice, settings, quantum_turns(cmap, lattice), loops, notes)

@@ -8,12 +8,14 @@ import numpy as np
 
 from hexwrap_solver.arrays import Complexes
 from hexwrap_solver.conformal.types import ConformalMap, Deck
-from hexwrap_solver.errors import NotAdaptedError
+from hexwrap_solver.errors import NotAdaptedError, PatternError
 from hexwrap_solver.pattern.lattice import Lattice, Motion
 from hexwrap_solver.pattern.types import PatternSettings
 
 #: Largest |k| of a cone angle k·π/3 or k·π/2.
 MAX_TURNS = 12
+#: Largest phase, cells.
+MAX_PHASE = 1e6
 #: A cone angle this near to such a multiple counts as one (angles typed with seven digits).
 NEARLY = 1e-6
 #: Nearer than this, a multiple needs no correction (see Deck).
@@ -60,6 +62,16 @@ def quantized(cmap: ConformalMap, lattice: Lattice) -> ConformalMap:
     if abs(cmap.deck.angle - exact) <= EXACT:
         return cmap
     return replace(cmap, deck=Deck(exact, cmap.deck.translation))
+
+
+def check_phase(settings: PatternSettings) -> None:
+    """Raises PatternError where a phase has no digits left behind the point."""
+    if not all(abs(part) <= MAX_PHASE for part in settings.phase):
+        raise PatternError(
+            f"The phase is {settings.phase[0]:.6g}, {settings.phase[1]:.6g} cells, but at most "
+            f"{MAX_PHASE:,.0f} are understood.",
+            field=("pattern", "phase"),
+        )
 
 
 def anchor_vertex(cmap: ConformalMap) -> int:
