@@ -68,6 +68,12 @@ class Placing:
     def _straightening(self) -> Straightening:
         return Straightening.of(self.cmap, self.lattice, self.shape, self.turns, self.loops)
 
+    @cached_property
+    def _single_straightenings(self) -> list[Straightening]:
+        """Of each of two loops alone."""
+        loops = self.loops if len(self.loops) == 2 else []
+        return [Straightening.of(self.cmap, self.lattice, self.shape, self.turns, [loop]) for loop in loops]
+
     def _freely(self, settings: PatternSettings) -> Placement:
         """Aligned nowhere."""
         if self.turns == 0:
@@ -92,10 +98,7 @@ class Placing:
         turned = abs(np.rad2deg(turn_between_loops(cmap, lattice, loops)))
         if turned > 1:
             told += f" The sides of the two loops stand at {turned:.1f}° to each other about the apex."
-        single = [
-            Straightening.of(cmap, lattice, settings, self.turns, [loop]) for loop in loops if len(loops) == 2
-        ]
-        fewer = [place_by_sides(straightening, settings) for straightening in single]
+        fewer = [place_by_sides(single, settings) for single in self._single_straightenings]
         best = min(fewer, key=lambda placement: placement.distortion, default=tried)
         if best.distortion > BEARABLE:
             best = self._freely(settings)
