@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 from scipy.spatial import KDTree
 
+from hexwrap_solver.arrays import Ragged
 from hexwrap_solver.errors import NotAdaptedError, PatternError
 from hexwrap_solver.pattern import lay_pattern
 from hexwrap_solver.pattern.lattice import LATTICES
+from hexwrap_solver.pattern.lay import mean_edge
 from hexwrap_solver.pattern.place import place_lattice
 from hexwrap_solver.pattern.size import width_per_cell
 from hexwrap_solver.pattern.types import Pattern, PatternSettings
@@ -163,3 +165,12 @@ def test_whole_phases_keep_aligned_rows(align):
 def test_phases_without_digits_behind_the_point_are_refused(phase):
     with pytest.raises(PatternError, match="phase"):
         lay_pattern(CYLINDER, PatternSettings(around=24, phase=phase))
+
+
+def test_the_mean_edge_is_that_of_the_cells_wherever_they_stand():
+    """Of two squares with edges 1 and 3: weighted with their areas, 2.8."""
+    square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    vertices = np.concatenate([square, 3 * square + [5, 0, 0]])
+    faces = Ragged(np.arange(8), np.array([0, 4, 8]))
+    for offset in (0.0, 1e6, 1e10):
+        assert mean_edge(vertices + offset, faces) == pytest.approx(2.8, rel=1e-12)
