@@ -26,11 +26,8 @@ def boundary_direction(cmap: ConformalMap, lattice: Lattice, anchor: int) -> com
     The mean of (boundary edge)^order over both loops; where that cancels (round boundaries), the direction
     around the apex at the anchor.
     """
-    faces = cmap.surface.faces
     corners = cmap.corners()
-    n = len(cmap.uv)
-    rim = np.concatenate([loop * n + np.roll(loop, -1) for loop in cmap.surface.loops])
-    on_rim = np.isin(faces * n + np.roll(faces, -1, axis=1), rim)
+    on_rim = (cmap.surface.twin < 0).reshape(-1, 3)
     edges = (np.roll(corners, -1, axis=1) - corners)[on_rim]
     length = abs(edges)
     mean = complex((length * (edges / length) ** lattice.order).sum() / length.sum())
