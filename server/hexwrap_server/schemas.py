@@ -54,6 +54,7 @@ Whole = Annotated[int, BeforeValidator(_whole_number)]
 Positive = Annotated[FiniteFloat, Field(gt=0)]
 NotNegative = Annotated[FiniteFloat, Field(ge=0)]
 Pair = Annotated[list[FiniteFloat], Field(min_length=2, max_length=2)]
+Phase = Annotated[list[Annotated[FiniteFloat, Field(ge=-1e6, le=1e6)]], Field(min_length=2, max_length=2)]
 Point = Annotated[list[FiniteFloat], Field(min_length=3, max_length=3)]
 Rotation = Annotated[
     float | str,
@@ -98,7 +99,7 @@ class Pattern(Model):
     rotation: Rotation = "edge"
     align: Literal["none", "first", "both"] = "both"
     boundary: Literal["whole", "trim"] = "whole"
-    phase: Pair = [0.0, 0.0]
+    phase: Phase = [0.0, 0.0]
 
     @model_validator(mode="after")
     def one_size(self) -> Pattern:

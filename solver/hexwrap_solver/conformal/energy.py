@@ -33,7 +33,8 @@ def opposite_lengths(vertices: Floats, faces: Ints) -> Floats:
 class Corners:
     """Angles of every triangle of a metric, and what the Hessian needs.
 
-    angle: (3, m). broken: (m,) where the triangle inequality fails. cotangent: (3, m), 0 where broken.
+    angle: (3, m). excess: (3, m) s = b + c − a, and radius: (m,) r, of which tan(α/2) = r/s. broken: (m,)
+    where the triangle inequality fails.
     """
 
     angle: Floats
@@ -48,7 +49,8 @@ class Corners:
         return np.asarray(half / np.conj(half))
 
     def cotangent(self) -> Floats:
-        """cot α = (s² − r²) / (2 r s), from tan(α/2) = r/s; no cancellation beyond that in s itself."""
+        """(3, m) cot α = (s² − r²) / (2 r s), from tan(α/2) = r/s; no cancellation beyond that in s itself. 0
+        where broken."""
         with np.errstate(divide="ignore", invalid="ignore"):
             cot = (self.excess - self.radius) * (self.excess + self.radius) / (2 * self.radius * self.excess)
         if self.broken.any():

@@ -9,7 +9,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import breadth_first_order
 
-from hexwrap_solver.arrays import Complexes, Floats, Ints
+from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints
 from hexwrap_solver.conformal.cut import Cut, cut_open
 from hexwrap_solver.conformal.energy import Corners
 from hexwrap_solver.conformal.types import Deck
@@ -120,13 +120,12 @@ def _close(surface: Surface, corners: Complexes, cut: Cut, cone_angle: float) ->
     on_left = cut.sheet.T.ravel() > 0
     right = _mean_position(flat[~on_left], corners.ravel()[~on_left], n)
     left = _mean_position(flat[on_left], corners.ravel()[on_left], n)[cut.path]
-    # left = e^{iK} right + t along the cut: t in least squares, then the positions share the rest
+    # left = e^{iK} right + t along the cut: t in least squares; what is left over is the closing error.
     offsets = left - rotation * right[cut.path]
     translation = complex(offsets.mean())
     disagreement = float(np.abs(offsets - translation).max())
-    uv = right
     deck = Deck(cone_angle, translation)
-    uv, deck, circumference = normalise(surface, uv, cut.sheet, deck, int(cut.path[0]))
+    uv, deck, circumference = normalise(surface, right, cut.sheet, deck, int(cut.path[0]))
     return Layout(uv, cut.sheet, deck, circumference, disagreement / circumference)
 
 
@@ -148,8 +147,10 @@ def normalise(
         distance = np.abs(uv - apex)
         radius = float(np.sqrt(distance[loops[0]].mean()) * np.sqrt(distance[loops[1]].mean()))
         far = distance.min() > FAR * np.abs(uv - foot).max()
+        around = _runs_around(apex, surface, uv, sheet, deck)
+        length = abs(deck.angle) * radius if around else _loop_length(surface, uv, sheet, deck)
         moved, deck = _upright(uv, deck, foot) if far else _about(apex, uv, deck, foot)
-        return moved, deck, abs(deck.angle) * radius
+        return moved, deck, length
     if abs(deck.angle) < FULL_TURN:
         moved, deck = _upright(uv, deck, foot)
         moved -= 1j * moved[loops[0]].imag.mean()
@@ -161,11 +162,28 @@ def normalise(
 
 def _loop_length(surface: Surface, uv: Complexes, sheet: Ints, deck: Deck) -> float:
     """Geometric mean of the two loops' lengths in the domain, whatever copies the cut has picked."""
-    corner = deck.apply(uv[surface.faces], sheet).ravel()
-    rim = np.flatnonzero(surface.twin < 0)
-    edge = np.abs(corner[next_half_edge(rim)] - corner[rim])
-    first = np.isin(surface.faces.ravel()[rim], surface.loops[0])
+    start, end, first = _rim(surface, uv, sheet, deck)
+    edge = np.abs(end - start)
     return float(np.sqrt(edge[first].sum()) * np.sqrt(edge[~first].sum()))
+
+
+def _runs_around(apex: complex, surface: Surface, uv: Complexes, sheet: Ints, deck: Deck) -> bool:
+    """Whether both loops turn about the apex by K. Where K is near 2πm, m ≠ 0, they may lie beside it, and
+    turn by K − 2πm only."""
+    start, end, first = _rim(surface, uv, sheet, deck)
+    turn = np.angle((end - apex) / (start - apex))
+    swept = turn[first].sum(), -turn[~first].sum()
+    return bool(max(abs(angle - deck.angle) for angle in swept) < np.pi)
+
+
+def _rim(surface: Surface, uv: Complexes, sheet: Ints, deck: Deck) -> tuple[Complexes, Complexes, Bools]:
+    """(k,) where the boundary edges start and end in some sheet, and which of them belong to loop 0."""
+    rim = np.flatnonzero(surface.twin < 0)
+    flat, sheets = surface.faces.ravel(), sheet.ravel()
+    start, end = (deck.apply(uv[flat[h]], sheets[h]) for h in (rim, next_half_edge(rim)))
+    first = np.zeros(len(uv), dtype=bool)
+    first[surface.loops[0]] = True
+    return start, end, first[flat[rim]]
 
 
 def _upright(uv: Complexes, deck: Deck, foot: complex) -> tuple[Complexes, Deck]:

@@ -58,8 +58,7 @@ def _isometric(surface: Surface, condition: BoundaryCondition, progress: Progres
         spread = boundary.spread_evenly
         targets = boundary.prescribed(surface, (spread(angles[0], rounded), spread(angles[1], -rounded)))
     second = _map(surface, targets, first.u, _part(progress, 0.5), flips=not plain.holds)
-    if condition.spread == "even":
-        second = _scaled(second, -_mean_on_boundary(second.surface, second.log_scale))
+    second = _scaled(second, -_mean_on_boundary(second.surface, second.log_scale))
     second = with_inserted(second, inserted)
     return replace(second, notes=(_rounding_note(found, rounded), *second.notes))
 

@@ -63,10 +63,10 @@ class Deck:
     @property
     def is_translation(self) -> bool:
         """K a multiple of 2π (cylinders, and flat rings): g has no fixed point."""
-        return abs(self._reduced) < 1e-9
+        return abs(self.reduced) < 1e-9
 
     @property
-    def _reduced(self) -> float:
+    def reduced(self) -> float:
         """K modulo 2π, in [−π, π]."""
         return math.remainder(self.angle, 2 * math.pi)
 
@@ -75,7 +75,7 @@ class Deck:
         """The fixed point t / (1 − e^{iK}) of g, or None where g is a translation."""
         if self.is_translation:
             return None
-        half = self._reduced / 2  # 1 − e^{iK} = −2i sin(K/2) e^{iK/2} does not cancel where K is small
+        half = self.reduced / 2  # 1 − e^{iK} = −2i sin(K/2) e^{iK/2} does not cancel where K is small
         return complex(self.translation * 0.5j / (math.sin(half) * np.exp(1j * half)))
 
     def power(self, s: Ints) -> tuple[Complexes, Complexes]:
@@ -87,7 +87,7 @@ class Deck:
         s = np.asarray(s)
         if self.is_translation:
             return np.ones(s.shape, dtype=complex), self.translation * s.astype(complex)
-        half = self._reduced / 2
+        half = self.reduced / 2
         share = np.sin(half * s) / math.sin(half) * np.exp(1j * half * (s - 1))
         return np.exp(2j * half * s), np.asarray(self.translation * share)
 
@@ -108,8 +108,8 @@ class ConformalMap:
     positively oriented triangle.
     boundary_angles: per loop, angle sums in the domain, aligned with surface.loops.
     circumference: length of one turn: |translation| on a cylinder; on a cone |K| × apex distance of its
-    middle ring (the geometric mean of the loops' mean distances); on a ring without an apex (K = 2πm) the
-    geometric mean of the loops' lengths.
+    middle ring (the geometric mean of the loops' mean distances); on a ring without an apex (K = 2πm), or
+    one that does not run around it (K near 2πm), the geometric mean of the loops' lengths.
     residual: max |angle sum − target|. flips: number of edges flipped; inserted: number of vertices inserted.
     closing_error: largest disagreement of the layout around the annulus / length of one turn.
     notes: sentences for the user.

@@ -15,7 +15,7 @@ ON_EDGE = 1e-9
 #: Buckets beyond these are empty: sizes of triangles differ by less, and places farther off are outside.
 FARTHEST = 2.0**31
 
-#: Sheets tried to either side when g is a translation much shorter than the domain.
+#: Sheets tried to either side when g moves the domain by much less than its size.
 FEW_SHEETS = 64
 
 
@@ -118,15 +118,32 @@ def find_places(cmap: ConformalMap, places: Complexes) -> tuple[Ints, Floats]:
         if not len(missing):
             break
         face[missing], weights[missing] = index.find(cmap.deck.apply(places[missing], -s))
+    missing = np.flatnonzero((face < 0) & np.isfinite(places))
+    for sheet in _sheets_about_apex(cmap, places) if len(missing) else ():
+        face[missing], weights[missing] = index.find(cmap.deck.apply(places[missing], -sheet[missing]))
+        missing = missing[face[missing] < 0]
     return face, weights
 
 
+def _sheets_about_apex(cmap: ConformalMap, places: Complexes) -> list[Ints]:
+    """(k,) sheets on which the places can lie, from their angles about the apex. Nothing where g turns by so
+    much that ``_sheets`` has tried all."""
+    apex, reduced = cmap.deck.apex, cmap.deck.reduced
+    if apex is None or abs(reduced) * FEW_SHEETS >= 2 * np.pi:
+        return []
+    own = np.angle((cmap.corners() - apex) / (cmap.uv[0] - apex)) / reduced
+    known = np.where(np.isfinite(places), places, cmap.uv[0])
+    first = np.ceil(np.angle((known - apex) / (cmap.uv[0] - apex)) / reduced - own.max() - 1e-3)
+    many = min(int(np.ceil(np.ptp(own))) + 1, 2 * FEW_SHEETS)
+    return [(first + step).astype(np.int64) for step in range(many)]
+
+
 def _sheets(cmap: ConformalMap, places: Complexes) -> list[int]:
-    """Sheets on which any of the places can lie: 0, 1, −1, 2, …"""
+    """Sheets on which any of the places can lie: 0, 1, −1, 2, …, no more than a few of very many."""
     deck = cmap.deck
     spread = int(abs(cmap.sheet).max(initial=0))
     if not deck.is_translation:
-        most = int(np.ceil(2 * np.pi / abs(np.angle(np.exp(1j * deck.angle))))) + spread + 1
+        most = min(int(np.ceil(2 * np.pi / abs(deck.reduced))), FEW_SHEETS) + spread + 1
     elif abs(deck.translation) == 0 or not len(places):
         most = 0
     else:

@@ -40,11 +40,12 @@ def jointly_largest(
         s·c + ℓ h − s·c' + ℓ' h' ≤ −joint.
     Sizes are weighted by those of the inscribed panels, since dA ∝ ℓ dℓ. The programme is solved to a
     tolerance; the lengths are taken anew from the planes that its centres leave, which excludes overlap
-    exactly. Raises ConvergenceError. Where some cell has no room at all, the inscribed lengths are returned.
+    exactly. Raises ConvergenceError. Where some cell has no room at all, or there is none, the inscribed
+    lengths are returned.
     """
     r = len(offset)
     start, center = inscribed(poses, direction, offset)
-    if start.min(initial=1.0) <= 0:
+    if not r or start.min() <= 0:
         return start, center
     unit = float(np.median(start))
     h = reach(poses, direction)

@@ -60,6 +60,9 @@ WATERTIGHT_NOTES = (
     " always energy.",
 )
 
+#: An energy above this that no step lowers is told.
+MINIMAL = 1e-12
+STUCK_NOTE = ("No step lowered the energy: the corners stand where the pattern has them.",)
 
 #: Where panels have all but no room, rounding can leave the programme for their sizes without an answer.
 JOINTLY_NOTE = (
@@ -129,6 +132,8 @@ def _fit_watertight(
     tree = surface.tree if settings.weights.surface > 0 else None
     moved, energy = minimise_watertight(pattern, target, settings.weights, tree, progress)
     shapes = Ragged(moved[pattern.faces.values.astype(np.int64)], pattern.faces.offsets)
+    unmoved = 2 if settings.weights.planarity > 0 else 1  # energies: the beginning, and the end made flat
+    stuck = len(energy) <= unmoved and energy[0] > MINIMAL
     return FittedPanels(
         mode="watertight",
         face=np.arange(pattern.n_cells),
@@ -141,7 +146,7 @@ def _fit_watertight(
         whole=pattern.whole,
         cell_area=fan_areas(_corner_points(pattern)),
         energy=energy,
-        notes=WATERTIGHT_NOTES + collapsed_note(shapes),
+        notes=WATERTIGHT_NOTES + (STUCK_NOTE if stuck else ()) + collapsed_note(shapes),
     )
 
 

@@ -51,7 +51,8 @@ def inscribed(poses: Poses, direction: Floats, offset: Floats) -> tuple[Floats, 
         best = np.where(better, value, best)
         chosen[better] = triple
     shift = _touching_centre(flat, h, room, chosen)
-    short = _room_length(shift, flat, h, room) < best - SHORTFALL * np.abs(best)
+    bounded = np.where(np.isfinite(best), best, 0.0)
+    short = ~np.isfinite(best) | (_room_length(shift, flat, h, room) < bounded - SHORTFALL * np.abs(bounded))
     again = np.flatnonzero(short | _is_loose(flat, chosen))
     shift[again] = _middle_vertex(flat[again], h[again], room[again])
     center = poses.center + np.einsum("qe,qed->qd", shift, axes)

@@ -15,6 +15,7 @@ from hexwrap_solver.conformal.normal_matrix import NormalMatrix
 from hexwrap_solver.panels.halfedges import half_edges
 from hexwrap_solver.panels.types import Support
 from hexwrap_solver.pattern.types import Pattern
+from hexwrap_solver.surface.topology import unit
 
 #: Greatest |det| of unit vectors that counts as no torsion.
 TORSION_TOLERANCE = 1e-13
@@ -37,12 +38,12 @@ def support(pattern: Pattern, depth: float, progress: Progress = no_progress) ->
     many unknowns as edges and triangles fewer: what torsion remains is in the result.
     """
     edges = _edges(pattern)
-    along = _unit(pattern.vertices[edges[:, 1]] - pattern.vertices[edges[:, 0]])
+    along = unit(pattern.vertices[edges[:, 1]] - pattern.vertices[edges[:, 0]])
     frame = _tangents(pattern.normals)
     shift = np.zeros((len(pattern.vertices), 2))
     best, least = shift, np.inf
     gram = NormalMatrix(pattern.vertices[edges].mean(axis=1))
-    unit = np.ones(2 * len(shift))
+    weight = np.ones(2 * len(shift))
     for step in range(MOST_STEPS):
         axes = pattern.normals + np.einsum("pe,ped->pd", shift, frame)
         twist = _twist(along, axes, edges)
@@ -54,9 +55,9 @@ def support(pattern: Pattern, depth: float, progress: Progress = no_progress) ->
             break
         progress(step / MOST_STEPS, f"turning node axes, torsion {least:.1e}")
         jacobian = _jacobian(along, axes, frame, edges)
-        gram.factorise(csr_array(jacobian.T), unit, REGULARIZATION)
+        gram.factorise(csr_array(jacobian.T), weight, REGULARIZATION)
         shift = (jacobian.T @ gram.solve(jacobian @ shift.ravel() - twist)).reshape(-1, 2)
-    axes = _unit(pattern.normals + np.einsum("pe,ped->pd", best, frame))
+    axes = unit(pattern.normals + np.einsum("pe,ped->pd", best, frame))
     return _finish(pattern, edges, along, axes, depth)
 
 
@@ -99,10 +100,5 @@ def _tangents(normal: Floats) -> Floats:
     """(p, 2, 3) two unit vectors across each normal."""
     axis = np.zeros_like(normal)
     axis[np.arange(len(normal)), np.abs(normal).argmin(axis=1)] = 1.0
-    t = _unit(np.cross(normal, axis))
+    t = unit(np.cross(normal, axis))
     return np.stack([t, np.cross(normal, t)], axis=1)
-
-
-def _unit(vectors: Floats) -> Floats:
-    length = np.linalg.norm(vectors, axis=1)
-    return np.asarray(vectors / np.where(length > 0, length, 1.0)[:, None])

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from hexwrap_solver.arrays import Floats
+from hexwrap_solver.surface.normals import with_tangents
 from hexwrap_solver.surface.projection import project, start_parameters
+from hexwrap_solver.surface.topology import unit
 from hexwrap_solver.surface.types import Surface
 
 
@@ -18,13 +20,7 @@ def surface_normals(surface: Surface, points: Floats) -> Floats:
     corners = surface.normals[surface.faces[nearest.face]]
     interpolated = np.einsum("kc,kcd->kd", nearest.barycentric, corners)
     if surface.nurbs is None:
-        return _unit(interpolated)
+        return unit(interpolated)
     start = start_parameters(surface, nearest.face, nearest.barycentric)
     _, _, exact = project(surface.nurbs, points, start)
-    side = np.einsum("kd,kd->k", exact, interpolated)
-    # Where the parameterization is singular the cross product of the tangents vanishes.
-    return _unit(np.where((side == 0)[:, None], interpolated, np.sign(side)[:, None] * exact))
-
-
-def _unit(vectors: Floats) -> Floats:
-    return np.asarray(vectors / np.linalg.norm(vectors, axis=1)[:, None])
+    return with_tangents(exact, interpolated)

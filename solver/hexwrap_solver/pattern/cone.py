@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +16,8 @@ from hexwrap_solver.pattern.types import PatternSettings
 
 #: A translation g shorter than this part of the circumference is none.
 NO_SHIFT = 1e-9
+#: Half an edge towards the apex must not turn cells as large as the cone inside out.
+LEAST_GROWTH = 0.1
 
 
 def boundary_direction(cmap: ConformalMap, lattice: Lattice, anchor: int) -> complex:
@@ -23,11 +26,8 @@ def boundary_direction(cmap: ConformalMap, lattice: Lattice, anchor: int) -> com
     The mean of (boundary edge)^order over both loops; where that cancels (round boundaries), the direction
     around the apex at the anchor.
     """
-    faces = cmap.surface.faces
     corners = cmap.corners()
-    n = len(cmap.uv)
-    rim = np.concatenate([loop * n + np.roll(loop, -1) for loop in cmap.surface.loops])
-    on_rim = np.isin(faces * n + np.roll(faces, -1, axis=1), rim)
+    on_rim = (cmap.surface.twin < 0).reshape(-1, 3)
     edges = (np.roll(corners, -1, axis=1) - corners)[on_rim]
     length = abs(edges)
     mean = complex((length * (edges / length) ** lattice.order).sum() / length.sum())
@@ -67,12 +67,14 @@ def _frame(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings) -> _
 def place_on_cone(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings, turns: int) -> Placement:
     """Paper, definition 2. The apex becomes the lattice point 0, a centre of the full symmetry.
 
-    phase: moves the pattern around by cells at the middle ring, and up or down by edges there.
+    phase: moves the pattern around by cells at the middle ring, and up or down by edges there; whole edges
+    are left out, since they would change the size, and so are turns by which the lattice is symmetric.
     """
     frame = _frame(cmap, lattice, settings)
     radius = cmap.circumference / abs(cmap.deck.angle) * abs(frame.factor)
-    turned = np.exp(1j * settings.phase[0] * frame.width / radius)
-    factor = frame.factor * turned * (1 + settings.phase[1] * lattice.edge / radius)
+    turn = math.remainder(settings.phase[0] * frame.width / radius, lattice.quantum)
+    up = settings.phase[1] - math.ceil(settings.phase[1] - 0.5)
+    factor = frame.factor * np.exp(1j * turn) * max(1 + up * lattice.edge / radius, LEAST_GROWTH)
     place = (cmap.uv - _middle(cmap)) * factor
     around = round(cmap.circumference * abs(factor) / frame.width)
     return Placement(place, Motion(lattice, turns, (0, 0)), frame.angle, around, 0.0, ())
@@ -92,7 +94,9 @@ def place_on_flat_ring(
     shift = lattice.translation_near(wanted)
     nearest = complex(lattice.position(shift))
     motion = Motion(lattice, turns, (int(shift[0]), int(shift[1])))
-    phase = frame.width * settings.phase[0] + 1j * lattice.edge * settings.phase[1]
+    phase = lattice.without_translations(
+        complex(frame.width * settings.phase[0], lattice.edge * settings.phase[1])
+    )
     closes = abs(wanted) < NO_SHIFT * abs(frame.factor) * cmap.circumference
     origin = _middle(cmap) if closes else cmap.uv[anchor_vertex(cmap)]
     fits = nearest != 0 and abs(nearest / wanted - 1) < ASKED if not closes else True

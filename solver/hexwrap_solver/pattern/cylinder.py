@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,9 +54,16 @@ def place_on_cylinder(
     if loops and settings.phase[1]:
         notes.append("phase moves the pattern only around: its rows are bound to the boundary.")
     scale = abs(along) / strip.length
-    x = strip.place.real * scale + settings.phase[0] * width_per_cell(lattice, angle) * lattice.edge
-    y = _heights(strip, rows, settings, loops, scale * stretch)
-    place = (x + 1j * y) * along / abs(along)
+    unit = along / abs(along)
+    # A translation of the tiling that keeps the rows, or any, changes nothing: far ones would cost digits.
+    around_by = settings.phase[0] * width_per_cell(lattice, angle) * lattice.edge
+    if loops:
+        step = abs(complex(lattice.position(lattice.primitive(T))))
+        phase = complex(math.remainder(around_by, step))
+    else:
+        phase = lattice.without_translations((around_by + 1j * settings.phase[1] * rows.period) * unit) / unit
+    place = strip.place.real * scale + 1j * _heights(strip, rows, loops, scale * stretch)
+    place = (place + phase) * unit
     distortion = max(stretch, 1 / stretch) - 1
     return Placement(
         place,
@@ -109,10 +117,10 @@ def _stretch(strip: _Strip, rows: Rows, lattice: Lattice, T: Ints) -> float:
     return rows.nearest_height(height) / height
 
 
-def _heights(strip: _Strip, rows: Rows, settings: PatternSettings, loops: list[int], scale: float) -> Floats:
+def _heights(strip: _Strip, rows: Rows, loops: list[int], scale: float) -> Floats:
     """Heights in lattice units; a loop that is aligned lies on a row line, exactly."""
     if not loops:
-        return strip.place.imag * scale + settings.phase[1] * rows.period
+        return np.asarray(strip.place.imag * scale)
     loop = strip.anchored if strip.anchored in loops else loops[0]
     upper = strip.height[loop] > strip.height[1 - loop]
     line = -rows.first if upper else rows.first

@@ -111,6 +111,16 @@ class Lattice:
         corners = (start + np.array([[0, 0], [1, 0], [0, 1], [1, 1]])) @ self.basis
         return np.asarray(corners[np.argmin(abs(self.position(corners) - wanted))])
 
+    def without_translations(self, offset: complex) -> complex:
+        """The same offset up to a translation of the tiling, near 0: small ones stay as they are."""
+        return offset - complex(self.position(self.translation_near(offset)))
+
+    def primitive(self, translation: Ints) -> Ints:
+        """The shortest translation of the same direction."""
+        e1 = complex(self.position(self.basis[0]))
+        x, y = np.rint(self.coordinates(self.position(translation) / e1)).astype(np.int64)
+        return np.asarray(translation // max(int(np.gcd(x, y)), 1))
+
     def shortest_towards(self, direction: complex) -> Ints:
         """The shortest translation along an edge or across a corner."""
         every = np.stack(

@@ -27,6 +27,7 @@ from hexwrap_solver.pattern.rotation import with_rotation
 from hexwrap_solver.pattern.size import ASKED
 from hexwrap_solver.pattern.trim import Points, TooCoarse, Trimmed, trim
 from hexwrap_solver.pattern.types import Pattern, PatternSettings
+from hexwrap_solver.surface.normals import with_tangents
 from hexwrap_solver.surface.projection import project, start_parameters
 
 #: Relative error of an edge length asked for that calls for a second attempt.
@@ -193,7 +194,7 @@ def _on_input_surface(cmap: ConformalMap, triangle: Ints, weights: Floats) -> tu
         return points, normals
     start = start_parameters(surface, triangle, weights)
     points, _, exact = project(surface.nurbs, points, start)
-    return points, exact * np.sign((exact * normals).sum(axis=1, keepdims=True))
+    return points, with_tangents(exact, normals)
 
 
 def mean_edge(vertices: Floats, faces: Ragged) -> float:
@@ -201,7 +202,8 @@ def mean_edge(vertices: Floats, faces: Ragged) -> float:
     corner = faces.values
     tail, head = vertices[corner], vertices[corner[faces.next()]]
     length = np.add.reduceat(np.linalg.norm(head - tail, axis=1), faces.offsets[:-1]) / faces.lengths
-    vector = np.add.reduceat(np.cross(tail, head), faces.offsets[:-1])
+    beside = vertices[corner[faces.offsets[:-1]]][faces.row]  # far off, areas about the origin lose digits
+    vector = np.add.reduceat(np.cross(tail - beside, head - beside), faces.offsets[:-1])
     area = np.linalg.norm(vector, axis=1)
     return float(length @ area / area.sum())
 

@@ -11,7 +11,15 @@ from scipy.sparse.csgraph import connected_components
 from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints
 from hexwrap_solver.domain.cover import Cover
 from hexwrap_solver.domain.locate import runs
+from hexwrap_solver.errors import PatternError
 from hexwrap_solver.pattern.lattice import Lattice, Motion
+
+#: Sightings are told apart by one integer each.
+MOST_KEYS = 1 << 62
+UNCLEAR = (
+    "Rounding hides which cells lie in the domain: it is too large for the cells, or too uneven. Ask for "
+    "larger cells."
+)
 
 
 @dataclass(frozen=True)
@@ -120,6 +128,8 @@ def find_nodes(layout: Layout) -> Nodes:
     face, point = face[wanted], point[wanted]
     low = point.min(axis=0, initial=0)
     span = point.max(axis=0, initial=0) - low + 1
+    if len(layout.corners) * int(span[0]) * int(span[1]) >= MOST_KEYS:
+        raise PatternError(UNCLEAR)
     keys = _key(face, point, low, span)
     order = np.argsort(keys, kind="stable")
     face, point, keys = face[order], point[order], keys[order]
@@ -153,6 +163,8 @@ def _turns(own: Ints, first: Ints, second: Ints, shift: Ints, size: int) -> Ints
     known[own] = True
     while not known.all():
         new = known[first] & ~known[second]
+        if not new.any():  # "the same place" was not symmetric: the layout is finer than its rounding
+            raise PatternError(UNCLEAR)
         turns[second[new]] = turns[first[new]] + shift[new]
         known[second[new]] = True
     return turns

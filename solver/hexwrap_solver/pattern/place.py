@@ -12,7 +12,14 @@ from hexwrap_solver.pattern.align import Straightening, place_by_sides, turn_bet
 from hexwrap_solver.pattern.cone import place_on_cone, place_on_flat_ring
 from hexwrap_solver.pattern.cylinder import place_on_cylinder
 from hexwrap_solver.pattern.lattice import Lattice
-from hexwrap_solver.pattern.placement import Placement, edge_angle, is_straight, quantum_turns
+from hexwrap_solver.pattern.placement import (
+    Placement,
+    check_phase,
+    edge_angle,
+    is_straight,
+    quantized,
+    quantum_turns,
+)
 from hexwrap_solver.pattern.sides import has_corners, is_polygon
 from hexwrap_solver.pattern.types import PatternSettings
 
@@ -41,6 +48,8 @@ class Placing:
 
     @classmethod
     def of(cls, cmap: ConformalMap, lattice: Lattice, settings: PatternSettings) -> Placing:
+        check_phase(settings)
+        cmap = quantized(cmap, lattice)
         loops, notes = loops_to_align(cmap, lattice, settings)
         return cls(cmap, lattice, settings, quantum_turns(cmap, lattice), loops, notes)
 
@@ -58,6 +67,12 @@ class Placing:
     @cached_property
     def _straightening(self) -> Straightening:
         return Straightening.of(self.cmap, self.lattice, self.shape, self.turns, self.loops)
+
+    @cached_property
+    def _single_straightenings(self) -> list[Straightening]:
+        """Of each of two loops alone."""
+        loops = self.loops if len(self.loops) == 2 else []
+        return [Straightening.of(self.cmap, self.lattice, self.shape, self.turns, [loop]) for loop in loops]
 
     def _freely(self, settings: PatternSettings) -> Placement:
         """Aligned nowhere."""
@@ -83,10 +98,7 @@ class Placing:
         turned = abs(np.rad2deg(turn_between_loops(cmap, lattice, loops)))
         if turned > 1:
             told += f" The sides of the two loops stand at {turned:.1f}° to each other about the apex."
-        single = [
-            Straightening.of(cmap, lattice, settings, self.turns, [loop]) for loop in loops if len(loops) == 2
-        ]
-        fewer = [place_by_sides(straightening, settings) for straightening in single]
+        fewer = [place_by_sides(single, settings) for single in self._single_straightenings]
         best = min(fewer, key=lambda placement: placement.distortion, default=tried)
         if best.distortion > BEARABLE:
             best = self._freely(settings)

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from hexwrap_solver.arrays import Complexes
-from hexwrap_solver.conformal.types import ConformalMap
-from hexwrap_solver.errors import NotAdaptedError
+from hexwrap_solver.conformal.types import ConformalMap, Deck
+from hexwrap_solver.errors import NotAdaptedError, PatternError
 from hexwrap_solver.pattern.lattice import Lattice, Motion
 from hexwrap_solver.pattern.types import PatternSettings
 
 #: Largest |k| of a cone angle k·π/3 or k·π/2.
 MAX_TURNS = 12
+#: Largest phase, cells.
+MAX_PHASE = 1e6
+#: A cone angle this near to such a multiple counts as one (angles typed with seven digits).
+NEARLY = 1e-6
+#: Nearer than this, a multiple needs no correction (see Deck).
+EXACT = 1e-9
 
 
 @dataclass(frozen=True)
@@ -35,18 +41,37 @@ def quantum_turns(cmap: ConformalMap, lattice: Lattice) -> int:
     """k of the cone angle K = k · quantum. Raises NotAdaptedError (paper, definition 2)."""
     quantum, K = lattice.quantum, cmap.deck.angle
     k = round(K / quantum)
-    if abs(K - k * quantum) <= 1e-6 and abs(k) <= MAX_TURNS:
+    if abs(K - k * quantum) <= NEARLY and abs(k) <= MAX_TURNS:
         return k
     part = "π/3" if lattice.order == 6 else "π/2"
     low = int(np.clip(np.floor(K / quantum), -MAX_TURNS, MAX_TURNS - 1))
     nearest = [low * quantum, (low + 1) * quantum]
     raise NotAdaptedError(
-        f"The cone angle is {K:.6f} rad, but a {lattice.kind} pattern closes up only where it is a multiple "
-        f"of {part}, up to {MAX_TURNS} of them; the nearest are {low}·{part} = {nearest[0]:.6f} and "
-        f"{low + 1}·{part} = {nearest[1]:.6f} rad: choose boundary angles that add up to one of them, or "
+        f"The cone angle is {K:.8f} rad, but a {lattice.kind} pattern closes up only where it is a multiple "
+        f"of {part}, up to {MAX_TURNS} of them; the nearest are {low}·{part} = {nearest[0]:.8f} and "
+        f"{low + 1}·{part} = {nearest[1]:.8f} rad: choose boundary angles that add up to one of them, or "
         f"boundary.quantum {part}.",
         data={"cone_angle": K, "quantum": quantum, "nearest": nearest},
     )
+
+
+def quantized(cmap: ConformalMap, lattice: Lattice) -> ConformalMap:
+    """The map with exactly the multiple as its cone angle. Near a multiple of 2π even the last of seven
+    digits would put an apex, far away, where there is only a translation."""
+    exact = quantum_turns(cmap, lattice) * lattice.quantum
+    if abs(cmap.deck.angle - exact) <= EXACT:
+        return cmap
+    return replace(cmap, deck=Deck(exact, cmap.deck.translation))
+
+
+def check_phase(settings: PatternSettings) -> None:
+    """Raises PatternError where a phase has no digits left behind the point."""
+    if not all(abs(part) <= MAX_PHASE for part in settings.phase):
+        raise PatternError(
+            f"The phase is {settings.phase[0]:.6g}, {settings.phase[1]:.6g} cells, but at most "
+            f"{MAX_PHASE:,.0f} are understood.",
+            field=("pattern", "phase"),
+        )
 
 
 def anchor_vertex(cmap: ConformalMap) -> int:

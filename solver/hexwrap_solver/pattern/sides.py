@@ -79,14 +79,10 @@ def sides_of(cmap: ConformalMap, lattice: Lattice, loops: list[int]) -> Sides:
 
 def _sheets_gained(cmap: ConformalMap) -> Ints:
     """Sheets gained along each boundary edge, by its tail."""
-    faces = cmap.surface.faces
-    n = len(cmap.uv)
-    tail, head = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     gained = (np.roll(cmap.sheet, -1, axis=1) - cmap.sheet).ravel()
-    rim = np.concatenate([loop * n + np.roll(loop, -1) for loop in cmap.surface.loops])
-    on_rim = np.isin(tail * n + head, rim)
-    by_tail = np.zeros(n, dtype=np.int64)
-    by_tail[tail[on_rim]] = gained[on_rim]
+    rim = np.flatnonzero(cmap.surface.twin < 0)
+    by_tail = np.zeros(len(cmap.uv), dtype=np.int64)
+    by_tail[cmap.surface.faces.ravel()[rim]] = gained[rim]
     return by_tail
 
 

@@ -59,13 +59,16 @@ class Strain:
         change lessens ``mean``."""
         moved = moved.copy()
         own = period * period * np.diag(self.squares)[:sides]
+        product = self.squares[:sides] @ moved
         for _ in range(4 * sides):
-            slope = 2 * period * (self.squares @ moved)[:sides]
+            slope = 2 * period * product
             gain = own - np.abs(slope)
             k = int(np.argmin(gain))
             if gain[k] >= -1e-12 * own[k]:
                 break
-            moved[k] -= period * np.sign(slope[k])
+            change = -period * np.sign(slope[k])
+            moved[k] += change
+            product += change * self.squares[:sides, k]
         return moved
 
 

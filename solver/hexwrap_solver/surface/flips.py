@@ -62,9 +62,7 @@ def flip_to_delaunay(vertices: Floats, faces: Ints) -> Ints:
         twin = twins(faces, n)
         h = np.arange(len(twin))
         h = h[(twin > h)]
-        c, d = diagonal(faces, h, twin)
-        start, end = half_edges(faces)
-        angle = _angle_at(vertices, c, start[h], end[h]) + _angle_at(vertices, d, start[h], end[h])
+        angle = angle_sums_opposite(vertices, faces, h, twin[h])
         order = np.argsort(-angle, kind="stable")
         h = h[order[: int((angle > np.pi + SLACK).sum())]]
         h = independent(h[_stays_unfolded(vertices, faces, h, twin)], twin, len(faces))
@@ -75,9 +73,16 @@ def flip_to_delaunay(vertices: Floats, faces: Ints) -> Ints:
     return faces
 
 
-def _angle_at(vertices: Floats, apex: Ints, a: Ints, b: Ints) -> Floats:
-    u, v = vertices[a] - vertices[apex], vertices[b] - vertices[apex]
-    return np.asarray(np.arctan2(np.linalg.norm(np.cross(u, v), axis=1), np.einsum("ij,ij->i", u, v)))
+def angle_sums_opposite(points: Floats, faces: Ints, one: Ints, other: Ints) -> Floats:
+    """(k,) the two angles that edges are seen under from their faces, from both half-edges."""
+    return np.asarray(_seen_under(points, faces, one) + _seen_under(points, faces, other))
+
+
+def _seen_under(points: Floats, faces: Ints, h: Ints) -> Floats:
+    tail, head = half_edges(faces)
+    apex = points[faces.ravel()[next_half_edge(next_half_edge(h))]]
+    a, b = points[tail[h]] - apex, points[head[h]] - apex
+    return np.asarray(np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.einsum("kd,kd->k", a, b)))
 
 
 def _stays_unfolded(vertices: Floats, faces: Ints, h: Ints, twin: Ints) -> Bools:

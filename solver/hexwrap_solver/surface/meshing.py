@@ -8,7 +8,7 @@ edges are flipped to Delaunay. There is no seam: the first vertex of a row follo
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -37,6 +37,9 @@ GRADE = 0.12
 PLACES = 2.0**32
 #: Sizes are planned a little below what was asked, and reduced again while the finished mesh exceeds it.
 MARGIN, TRIES = 0.97, 6
+#: Sizes beyond these, relative to the control net, ask for no more than these do: below rounding, or a mesh
+#: of the fewest vertices. Squares of such as reach the ends of doubles would not be numbers.
+LEAST_SIZE, GREATEST_SIZE = 1e-15, 1e3
 
 
 def surface_from_nurbs(nurbs: NurbsSurface, settings: MeshSettings | None = None) -> Surface:
@@ -49,6 +52,7 @@ def surface_from_nurbs(nurbs: NurbsSurface, settings: MeshSettings | None = None
     settings = settings or MeshSettings()
     _check_settings(settings)
     nurbs, repairs = checked(nurbs)
+    settings = _bounded(settings, nurbs)
     sample = _sample(nurbs)
     shrink = MARGIN if settings.max_edge or settings.tolerance else _default_size(nurbs, sample)
     for _ in range(TRIES):
@@ -78,6 +82,15 @@ def _check_settings(settings: MeshSettings) -> None:
             raise NurbsDataError(
                 f"mesh.{name} is {value}: it must be positive.", field=("surface", "mesh", name)
             )
+
+
+def _bounded(settings: MeshSettings, nurbs: NurbsSurface) -> MeshSettings:
+    """The same sizes where they mean something (see LEAST_SIZE)."""
+    diagonal = float(np.linalg.norm(np.ptp(nurbs.control_points[..., :3].reshape(-1, 3), axis=0)))
+    low, high = LEAST_SIZE * diagonal, GREATEST_SIZE * diagonal
+    asked = settings.max_edge, settings.tolerance
+    edge, height = (None if size is None else min(max(size, low), high) for size in asked)
+    return replace(settings, max_edge=edge, tolerance=height)
 
 
 @dataclass(frozen=True)
@@ -191,6 +204,7 @@ def _mesh(
     heights, spacing = _rows(sample, h)
     fractions = _around(nurbs, sample, heights, spacing)
     counts = np.array([len(row) for row in fractions])
+    _allow(int(counts.sum()), settings.max_vertices)
     faces = _join(counts, np.concatenate(fractions))
     low, high = sample.s[0], sample.s[-1]
     s = low + (high - low) * np.concatenate(fractions)
@@ -203,7 +217,10 @@ def _mesh(
 
 def _check_number(sample: _Sample, h: Floats, most: int) -> None:
     density = sample.speed * sample.rise / (ROW * h**2)
-    number = float(np.trapezoid(np.trapezoid(density, sample.s, axis=1), sample.t))
+    _allow(float(np.trapezoid(np.trapezoid(density, sample.s, axis=1), sample.t)), most)
+
+
+def _allow(number: float, most: int) -> None:
     if number > most:
         raise TooFineError(
             f"The mesh would have about {number:.3g} vertices, more than the {most} allowed: ask for longer "
@@ -252,8 +269,9 @@ def _around(nurbs: NurbsSurface, sample: _Sample, heights: Floats, spacing: Floa
 def _numbers(needed: Floats) -> list[int]:
     """Whole numbers of vertices, at least 3, in few different steps; divisible by 12 or 6 where that costs
     little, so that symmetric surfaces have symmetric boundaries."""
-    level = np.ceil(np.log(np.maximum(needed, 3) / needed.max()) / np.log(STEP) - 1e-9)
-    numbers = np.ceil(np.maximum(needed.max(), 3) * STEP**level - 1e-9)
+    most = max(float(needed.max()), 3.0)
+    level = np.ceil(np.log(np.maximum(needed, 3) / most) / np.log(STEP) - 1e-9)
+    numbers = np.ceil(most * STEP**level - 1e-9)
     unit = np.select([numbers >= 72, numbers >= 36], [12, 6], 1)
     numbers = unit * np.ceil(numbers / unit)
     return [int(x) for x in np.maximum(numbers, 3)]

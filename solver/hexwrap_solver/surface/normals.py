@@ -1,4 +1,4 @@
-"""Sent vertex normals, where they can be used."""
+"""Normals beside those of the faces: sent ones, where they can be used, and those of a NURBS surface."""
 
 from __future__ import annotations
 
@@ -6,6 +6,13 @@ import numpy as np
 
 from hexwrap_solver.arrays import Floats, Ints
 from hexwrap_solver.surface.topology import sum_rows, unit
+
+
+def with_tangents(exact: Floats, interpolated: Floats) -> Floats:
+    """(k, 3) unit normals: those of the NURBS surface's tangents on the mesh normals' side. Where the
+    parameterization is singular, the cross product of the tangents vanishes and the mesh's stand in."""
+    side = np.sign(np.einsum("kd,kd->k", exact, interpolated))[:, None]
+    return unit(np.where(side == 0, interpolated, side * exact))
 
 
 def sent_normals(own: Floats, sent: Floats, stand: Ints) -> tuple[Floats, list[str]]:

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from hexwrap_solver.arrays import Floats
+from hexwrap_solver.arrays import Floats, Ragged
 from hexwrap_solver.conformal import boundary, conformal_map
 from hexwrap_solver.conformal.types import BoundaryCondition
 from hexwrap_solver.errors import BoundaryError
-from tests.solver.conformal.annuli import bump, grid, revolution
+from hexwrap_solver.surface import SentMesh, surface_from_mesh
+from tests.solver.conformal.annuli import bump, grid, revolution, uneven
 
 TOWER = bump(24, 8)
 angles = st.lists(st.floats(0.02, 6.0), min_size=3, max_size=40).map(lambda x: np.array(x, dtype=float))
@@ -73,9 +76,26 @@ def test_every_target_satisfies_gauss_bonnet() -> None:
 def test_optimal_spreading_keeps_u_constant_on_each_loop() -> None:
     cmap = conformal_map(TOWER, BoundaryCondition("isometric", quantum=np.pi / 3, spread="optimal"))
     first, second = (cmap.log_scale[loop] for loop in TOWER.loops)
-    assert not first.any()
-    assert np.ptp(second) == 0
-    assert second[0] != 0
+    assert np.ptp(first) == np.ptp(second) == 0
+    assert second[0] != first[0]
+
+
+@pytest.mark.parametrize("spread", ["even", "optimal"])
+def test_no_loop_is_preferred(spread: Literal["even", "optimal"]) -> None:
+    """Numbered the other way round, the surface has the same map; boundary lengths are kept on average."""
+    wide = grid(40, 12, lambda phi, s: uneven(phi, 1.5 * s))
+    n = len(wide.vertices)
+    condition = BoundaryCondition("isometric", quantum=np.pi / 3, spread=spread)
+    scales = []
+    for vertices, faces in ((wide.vertices, wide.faces), (wide.vertices[::-1], n - 1 - wide.faces)):
+        surface = surface_from_mesh(SentMesh(vertices, Ragged.from_table(faces)))
+        cmap = conformal_map(surface, condition)
+        scales.append(cmap.log_scale[surface.vertex_of_input])
+        rim = [(loop, np.roll(loop, -1)) for loop in surface.loops]
+        length = [np.linalg.norm(surface.vertices[b] - surface.vertices[a], axis=1) for a, b in rim]
+        mean = [(cmap.log_scale[a] + cmap.log_scale[b]) / 2 for a, b in rim]
+        assert np.concatenate(length) @ np.concatenate(mean) == pytest.approx(0, abs=1e-10)
+    np.testing.assert_allclose(scales[1][::-1], scales[0], atol=1e-9)
 
 
 def test_even_spreading_keeps_boundary_lengths_on_average() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from hexwrap_solver.arrays import Floats
 from hexwrap_solver.conformal import conformal_map
 from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap
 from tests.solver.conformal.annuli import bump, catenoid, flat_cone, grid, revolution
@@ -125,3 +126,27 @@ def test_a_long_tube_on_a_cone_has_a_map() -> None:
     assert faults(cone) == []
     assert np.ptp(cone.log_scale) == pytest.approx(np.pi / 3 * 160, rel=0.03)
     assert_honest(conformal_map(tube, BoundaryCondition()))
+
+
+def ring_with_corners(off: float) -> ConformalMap:
+    """A ring, wider on one side than on the other, between two hexagons; its cone angle is 2π + off, in
+    absolute value."""
+
+    def place(phi: Floats, s: Floats) -> Floats:
+        r = 1 + s
+        x, y = r * np.cos(phi) + 0.3 * s, r * np.sin(phi) * (1 + 0.3 * s)
+        return np.stack([x, y, 0.4 * np.sin(2 * phi) * s], axis=1)
+
+    surface = grid(72, 12, place)
+    inner, outer = surface.loops
+    vertices = np.concatenate([outer[::12], inner[::12]])
+    angles = np.repeat([2 * np.pi / 3 - off / 6, 4 * np.pi / 3 + off / 6], 6)
+    return conformal_map(surface, BoundaryCondition("angles", vertices=vertices, angles=angles))
+
+
+@pytest.mark.parametrize("off", [1e-8, -1e-6, 1e-4, 1e-2])
+def test_the_circumference_is_continuous_where_the_apex_goes_away(off: float) -> None:
+    exact, near = ring_with_corners(0.0), ring_with_corners(off)
+    assert exact.deck.apex is None
+    assert near.deck.apex is not None
+    assert near.circumference == pytest.approx(exact.circumference, rel=2 * abs(off) + 1e-6)

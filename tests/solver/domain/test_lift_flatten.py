@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hexwrap_solver.domain import flatten, lift
+from hexwrap_solver.domain.locate import TriangleIndex
 from tests.solver.pattern import annuli
 
 CATENOID = annuli.revolution(np.cosh, np.linspace(-1, 1.5, 25), 40, cut=9, turn=1.7 * np.exp(0.4j))
@@ -49,6 +50,23 @@ def test_vertices_lift_to_themselves_with_their_normals():
     up = lift(CATENOID, CATENOID.uv)
     np.testing.assert_allclose(up.points, CATENOID.surface.vertices, atol=1e-9)
     np.testing.assert_allclose(up.normals, CATENOID.surface.normals, atol=1e-7)
+
+
+@pytest.mark.parametrize("angle", [2e-3, 1e-3, -1e-3, 1e-6, 2e-9])
+def test_all_turns_of_a_cone_that_is_nearly_a_cylinder_lead_to_the_same_points(angle, monkeypatch):
+    """Also the thousandth, without trying the thousands before, and so for places outside."""
+    cone = annuli.flat_cone(angle, 1 / abs(angle), 1 / abs(angle) + 0.5, 40, 8, cut=7)
+    z = places_in(cone, np.random.default_rng(3), 100)
+    first = lift(cone, z)
+    assert first.inside.all()
+    searches = []
+    find = TriangleIndex.find
+    monkeypatch.setattr(TriangleIndex, "find", lambda self, at: (searches.append(at), find(self, at))[1])
+    for sheet in (-1, 1, 5, 1000, -1200):
+        again = lift(cone, cone.deck.apply(z, sheet))
+        np.testing.assert_allclose(again.points, first.points, atol=1e-5)
+    assert not lift(cone, cone.deck.apply(z, 3) * (1 + 2 * abs(angle))).inside.any()
+    assert len(searches) < 6 * 140
 
 
 def test_places_outside_are_told():

@@ -13,6 +13,8 @@ from hexwrap_solver.panels.energy.residuals import jacobian, residuals, surface_
 from hexwrap_solver.panels.energy.single import minimise_singly
 from hexwrap_solver.panels.regular import corners, nearest_regular
 from hexwrap_solver.panels.types import PanelSettings, Weights
+from hexwrap_solver.pattern import lay_pattern
+from hexwrap_solver.pattern.types import PatternSettings
 from tests.solver.panels.cells import (
     catenoid,
     grid_map,
@@ -22,6 +24,7 @@ from tests.solver.panels.cells import (
     torus,
     triangle_pattern,
 )
+from tests.solver.pattern import annuli
 
 WEIGHTS = Weights(planarity=2.0, angle=0.5, edge=3.0)
 
@@ -150,3 +153,64 @@ def test_quads_of_a_surface_of_revolution_are_flat_already():
     wanted = PanelSettings(mode="watertight", weights=Weights(angle=0.0, edge=0.0))
     quality = measure(cmap, pattern, rationalize(cmap, pattern, wanted))
     assert quality.movement < 1e-9
+
+
+def moved_by(pattern, cmap, offset):
+    """The same pattern and map elsewhere."""
+    surface = cmap.surface
+    there = replace(surface, vertices=surface.vertices + offset)
+    return replace(pattern, vertices=pattern.vertices + offset), replace(cmap, surface=there)
+
+
+@pytest.mark.parametrize("mode", ["split", "watertight"])
+def test_a_tower_far_away_has_the_same_panels(mode):
+    """Metres in a national grid. Corners lie on the surface but for rounding, which has no direction."""
+    pattern, cmap = hex_pattern(torus, 24, 6), grid_map(torus, 96, 60, -0.1, 1.2)
+    on_mesh = cmap.surface.tree.nearest(pattern.vertices)
+    corners = cmap.surface.vertices[cmap.surface.faces[on_mesh.face]]
+    pattern = replace(pattern, vertices=np.einsum("kc,kcd->kd", on_mesh.barycentric, corners))
+    offset = np.array([4e5, 5.8e6, 50.0])
+    wanted = PanelSettings(mode=mode, method="energy", weights=Weights(surface=1.0))
+    here = rationalize(cmap, pattern, wanted)
+    far_pattern, far_map = moved_by(pattern, cmap, offset)
+    there = rationalize(far_map, far_pattern, wanted)
+    assert there.polygons.values.shape == here.polygons.values.shape
+    away = np.abs(there.polygons.values - offset - here.polygons.values).max()
+    assert away < 1e-3 * pattern.edge_length
+    assert not [note for note in there.notes if "No step" in note]
+
+
+@pytest.mark.parametrize("which", ["planarity", "angle", "edge", "surface"])
+@pytest.mark.parametrize("mode", ["split", "watertight"])
+def test_weights_of_any_size_are_weights(which, mode):
+    chart = inverted(catenoid, (0.3, 0.2, 4.0))
+    pattern, cmap = hex_pattern(chart, 16, 4, -0.6), grid_map(chart, 40, 24, -0.7, 1.8)
+    for size in (1e6, 1e12, 1e100, 1e300):
+        wanted = PanelSettings(mode=mode, method="energy", weights=Weights(**{which: size}))
+        panels = rationalize(cmap, pattern, wanted)
+        assert np.isfinite(panels.polygons.values).all()
+        assert (panels.energy >= 0).all()
+
+
+def test_of_large_weights_only_the_ratios_matter():
+    """The energy is as many times as large."""
+    pattern, cmap = hex_pattern(torus, 24, 6), grid_map(torus, 96, 60, -0.1, 1.2)
+    cells = pattern.vertices[pattern.faces.values].reshape(-1, 6, 3)
+    length = np.linalg.norm(np.roll(cells, -1, axis=1) - cells, axis=2).mean(axis=1)
+    (one, low), (other, high) = (
+        minimise_singly(cells, length, Weights(k, k, k, 10 * k), cmap.surface.tree) for k in (10.0, 1e7)
+    )
+    np.testing.assert_allclose(other, one, atol=1e-9)
+    np.testing.assert_allclose(high, 1e6 * low, rtol=1e-9)
+
+
+@pytest.mark.parametrize("method", ["exact", "energy"])
+@pytest.mark.parametrize("target", ["inscribed", "best", "shortest", "mean"])
+def test_a_band_too_low_for_a_whole_cell_has_no_whole_panel(method, target):
+    """All cells are cut at the boundary."""
+    band = annuli.revolution(np.ones_like, np.linspace(0, 0.06, 3), 60)
+    pattern = lay_pattern(band, PatternSettings(around=48, boundary="trim"))
+    assert not pattern.whole.any()
+    panels = rationalize(band, pattern, PanelSettings(method=method, target=target))
+    assert np.isfinite(panels.polygons.values).all()
+    assert measure(band, pattern, panels).overlaps == 0

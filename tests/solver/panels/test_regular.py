@@ -10,6 +10,7 @@ from hypothesis.extra.numpy import arrays
 from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
+from hexwrap_solver.panels.limits import inscribed, reach
 from hexwrap_solver.panels.regular import corners, nearest_regular, nearest_regular_in_plane
 
 noise = arrays(np.float64, (6, 3), elements=st.floats(-0.3, 0.3))
@@ -64,3 +65,15 @@ def test_in_a_given_plane_no_other_rotation_is_nearer():
     for angle in np.linspace(-0.5, 0.5, 21)[[i for i in range(21) if i != 10]]:
         turned = Rotation.from_rotvec(angle * normal[0]).apply(shape(poses, 6)[0] - poses.center[0])
         assert ((turned + poses.center[0] - cell) ** 2).sum() > best
+
+
+def test_planes_that_bound_no_panel_leave_a_finite_one():
+    """All on one side: however large, a panel could move away from them."""
+    cells = np.concatenate([corners(6), np.zeros((6, 1))], axis=1)[None]
+    poses = nearest_regular(cells)
+    direction = np.tile([1.0, 0.0, 0.0], (1, 6, 1))
+    offset = np.full((1, 6), 0.5)
+    length, center = inscribed(poses, direction, offset)
+    assert np.isfinite(length).all()
+    assert np.isfinite(center).all()
+    assert (center[:, 0] + length * reach(poses, direction)[:, 0] <= 0.5 + 1e-12).all()

@@ -10,7 +10,8 @@ import pytest
 from hexwrap_solver.conformal import conformal_map
 from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap
 from hexwrap_solver.errors import PatternError
-from hexwrap_solver.pattern import lay_pattern
+from hexwrap_solver.pattern import lay_pattern, place
+from hexwrap_solver.pattern.align import Straightening
 from hexwrap_solver.pattern.deform import distortion_of
 from hexwrap_solver.pattern.lattice import LATTICES
 from hexwrap_solver.pattern.place import Placing, loops_to_align, place_lattice
@@ -146,7 +147,7 @@ def test_another_number_around_than_asked_for_is_told() -> None:
         cmap = MAPS[name]
         for align in ("both", "none"):
             kind = "quad" if name == "quads" else "hex"
-            request = PatternSettings(kind=kind, around=around, align=align, phase=(0.0, 0.9))
+            request = PatternSettings(kind=kind, around=around, align=align, phase=(0.0, 0.45))
             pattern = lay_pattern(cmap, request)
             told = any(f"{pattern.around} cells around instead of {around}" in note for note in pattern.notes)
             assert told == (pattern.around != around)
@@ -179,3 +180,15 @@ def test_a_mesh_of_corners_alone_has_nothing_to_deform():
     pattern = lay_pattern(cmap, PatternSettings(around=24))
     check_closed(pattern)
     assert np.isfinite(pattern.distortion)
+
+
+def test_of_one_pattern_every_loop_is_straightened_once(monkeypatch):
+    """However many sizes are tried, and though no alignment is bearable here."""
+    made = []
+    of = Straightening.of.__func__
+    monkeypatch.setattr(Straightening, "of", lambda *a: (made.append(a[-1]), of(Straightening, *a))[1])
+    monkeypatch.setattr(place, "BEARABLE", 0.0)
+    placing = Placing.of(MAPS["entrance"], LATTICES["hex"], PatternSettings(around=60))
+    for around in (60, 72, 96):
+        placing.at(PatternSettings(around=around))
+    assert made == [[0, 1], [0], [1]]

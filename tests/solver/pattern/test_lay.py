@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.spatial import KDTree
 
+from hexwrap_solver.arrays import Ragged
 from hexwrap_solver.errors import NotAdaptedError, PatternError
 from hexwrap_solver.pattern import lay_pattern
+from hexwrap_solver.pattern.lattice import LATTICES
+from hexwrap_solver.pattern.lay import mean_edge
+from hexwrap_solver.pattern.place import place_lattice
+from hexwrap_solver.pattern.size import width_per_cell
 from hexwrap_solver.pattern.types import Pattern, PatternSettings
+from tests.solver.conformal.test_conformal_map import ring_with_corners
 from tests.solver.pattern import annuli
 
 DEGREE = {"hex": 3, "triangle": 6, "quad": 4}
@@ -103,3 +112,65 @@ def test_cells_that_shared_vertices_cannot_tell_apart_are_refused(kind, around, 
     cmap = annuli.revolution(np.cosh, np.linspace(-1, 1.5, 25), 40)
     with pytest.raises(PatternError, match="more cells around"):
         lay_pattern(cmap, PatternSettings(kind=kind, around=around, boundary=boundary))
+
+
+@pytest.mark.parametrize("align", ["none", "both"])
+def test_corner_angles_of_seven_digits_make_the_same_pattern(align):
+    exact, typed = (ring_with_corners(off) for off in (0.0, 6 * 4e-8))
+    one, other = (lay_pattern(cmap, PatternSettings(around=48, align=align)) for cmap in (exact, typed))
+    assert one.n_cells == other.n_cells
+    assert one.around == other.around
+    assert KDTree(one.vertices).query(other.vertices)[0].max() < 1e-4 * one.edge_length
+
+
+CYLINDER = annuli.revolution(np.cosh, np.linspace(-1, 1.5, 25), 40)
+PHASED = {
+    "cylinder": CYLINDER,
+    "cone": annuli.flat_cone(np.pi, 1.0, 2.0, 60, 12),
+    "flat ring": ring_with_corners(0.0),
+}
+
+
+@pytest.mark.parametrize("name", PHASED)
+@pytest.mark.parametrize("kind", ["hex", "triangle"])
+def test_whole_phases_change_nothing_however_many(name, kind):
+    """Translations of the tiling, and turns by which it is symmetric; places stay near the origin."""
+    cmap, lattice = PHASED[name], LATTICES[kind]
+    plain = PatternSettings(kind=kind, around=60, align="none")
+    one = complex(lattice.position(lattice.basis[0]))
+    phase = {
+        "cylinder": (2.0, 0.0),  # cells of a ring along their edges stand in zigzag
+        "cone": (60 * QUANTUM[kind] / np.pi, 1.0),
+        "flat ring": (one.real / lattice.edge / width_per_cell(lattice, 0.0), one.imag / lattice.edge),
+    }[name]
+    for times in (1, -40_000):
+        moved = replace(plain, phase=(times * phase[0], times * phase[1]))
+        here, there = (place_lattice(cmap, LATTICES[kind], asked).place for asked in (plain, moved))
+        assert abs(there).max() < abs(here).max() + 3
+        first, second = lay_pattern(cmap, plain), lay_pattern(cmap, moved)
+        assert second.n_cells == first.n_cells
+        assert KDTree(first.vertices).query(second.vertices)[0].max() < 1e-6 * first.edge_length
+
+
+@pytest.mark.parametrize("align", ["none", "both"])
+def test_whole_phases_keep_aligned_rows(align):
+    one, other = (
+        lay_pattern(CYLINDER, PatternSettings(around=24, align=align, phase=phase))
+        for phase in ((0.25, 0.0), (1e5 + 0.25, 0.0))
+    )
+    assert KDTree(one.vertices).query(other.vertices)[0].max() < 1e-8 * one.edge_length
+
+
+@pytest.mark.parametrize("phase", [(1.1e6, 0.0), (0.0, -1e13), (1e300, 0.0), (np.nan, 0.0)])
+def test_phases_without_digits_behind_the_point_are_refused(phase):
+    with pytest.raises(PatternError, match="phase"):
+        lay_pattern(CYLINDER, PatternSettings(around=24, phase=phase))
+
+
+def test_the_mean_edge_is_that_of_the_cells_wherever_they_stand():
+    """Of two squares with edges 1 and 3: weighted with their areas, 2.8."""
+    square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    vertices = np.concatenate([square, 3 * square + [5, 0, 0]])
+    faces = Ragged(np.arange(8), np.array([0, 4, 8]))
+    for offset in (0.0, 1e6, 1e10):
+        assert mean_edge(vertices + offset, faces) == pytest.approx(2.8, rel=1e-12)

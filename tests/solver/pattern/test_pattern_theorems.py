@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from hexwrap_solver.conformal.types import ConformalMap, Deck
 from hexwrap_solver.domain import lift
 from hexwrap_solver.errors import PatternError
-from hexwrap_solver.pattern import edge_polylines, lay_pattern, pattern_edges
+from hexwrap_solver.pattern import lay_pattern
 from hexwrap_solver.pattern.types import Pattern, PatternSettings
 from tests.solver.pattern import annuli
 from tests.solver.pattern.test_lay import QUANTUM, SIDES, check_closed
@@ -205,21 +205,6 @@ def test_places_run_the_same_way_round_in_every_ring():
         step = np.angle(np.exp(1j * np.diff(angle, append=angle[0])))
         assert (step > 0).all()
         assert step.sum() == pytest.approx(2 * np.pi)
-
-
-def test_edges_come_once_and_lift_to_curves_between_their_ends():
-    cmap = annuli.revolution(wavy, HEIGHTS, 37, cut=11)
-    pattern = lay_pattern(cmap, PatternSettings(kind="triangle", around=40))
-    edges = pattern_edges(pattern)
-    assert len(pattern.vertices) - len(edges.ends) + pattern.n_cells == 0
-    assert len(np.unique(np.sort(edges.ends, axis=1), axis=0)) == len(edges.ends)
-    curves = edge_polylines(cmap, pattern, 4)
-    assert curves.shape == (len(edges.ends), 5, 3)
-    chord = np.linalg.norm(curves[:, -1] - curves[:, 0], axis=1)
-    length = np.linalg.norm(np.diff(curves, axis=1), axis=2).sum(axis=1)
-    assert (length >= chord * (1 - 1e-12)).all()
-    assert (length < 1.1 * chord).all()
-    np.testing.assert_array_equal(curves[:, 0], pattern.vertices[edges.ends[:, 0]])
 
 
 def test_directions_of_a_nurbs_surface_are_refused_for_meshes():

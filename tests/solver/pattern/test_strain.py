@@ -82,8 +82,7 @@ def test_entrances_keep_the_number_around_at_a_bearable_distortion(case, rotatio
 
 def test_the_tip_of_an_entrance_stands_where_the_lattice_mirrors_it():
     frame, _, _, _, trials = prepared("entrance")
-    tip = int(np.argmax(frame.sides.vertex == MAPS["entrance"].surface.loops[0][0]))
-    assert tip >= 0
+    assert MAPS["entrance"].surface.loops[0][0] in frame.sides.vertex
     extras = sorted(trial.extra for trial in trials)
     assert extras[0] < extras[-1]
     costs = {}

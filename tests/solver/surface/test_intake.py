@@ -178,8 +178,6 @@ def test_edges_without_length_are_welded() -> None:
     split = faces.copy()
     above = [f for f in fan if (faces[f] >= 12).any()]
     split[above] = np.where(faces[above] == 8, 24, faces[above])
-    rim = [v for v in (7, 9) if (faces[above] == v).any()]
-    assert rim == [7, 9] or len(rim) == 1
     sides = {tuple(e) for f in split.tolist() for e in zip(f, [*f[1:], f[0]], strict=True)}
     gaps = [(b, a) for a, b in sides if (b, a) not in sides and (a in (8, 24) or b in (8, 24))]
     start = dict(gaps)

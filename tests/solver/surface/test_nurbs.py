@@ -10,6 +10,7 @@ from scipy.interpolate import BSpline
 
 from hexwrap_solver.arrays import Floats
 from hexwrap_solver.surface import NurbsSurface, surface_from_nurbs
+from hexwrap_solver.surface.normals import with_tangents
 from hexwrap_solver.surface.nurbs import basis, domain, evaluate, evaluate_points, wrap
 from hexwrap_solver.surface.projection import project, start_parameters
 from tests.solver.surface.nurbs_shapes import cylinder, random_parameters, sample, swapped, torus_part
@@ -139,3 +140,11 @@ def test_start_parameters_need_a_nurbs_surface() -> None:
         start_parameters(
             replace(surface_from_nurbs(cylinder()), nurbs=None), np.array([0]), np.ones((1, 3)) / 3
         )
+
+
+def test_where_tangents_vanish_the_mesh_normal_stands_in():
+    """Everywhere else it only tells the side; all are of length one."""
+    exact = np.array([[0.0, 0, 1], [0, 0, -1], [0, 0, 0], [1, 0, 0]])
+    mesh = np.array([[0.0, 0.6, 0.8], [0, 0.6, 0.8], [0, 0, 2], [0, 0, 2]])
+    expected = [[0, 0, 1], [0, 0, 1], [0, 0, 1], [0, 0, 1]]
+    np.testing.assert_array_equal(with_tangents(exact, mesh), expected)

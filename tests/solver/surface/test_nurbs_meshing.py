@@ -219,3 +219,29 @@ def test_bad_sizes_are_refused(name: str, value: float) -> None:
 @pytest.mark.parametrize("settings", [MeshSettings(max_edge=1e-6), MeshSettings(tolerance=1e-12)])
 def test_too_fine_meshes_are_refused_before_they_are_made(settings: MeshSettings) -> None:
     assert "vertices" in refused(cylinder(), TooFineError, settings).detail
+
+
+@pytest.mark.parametrize("name", ["cylinder", "tower"])
+def test_longer_edges_never_make_more_vertices(name: str) -> None:
+    numbers = [
+        len(surface_from_nurbs(SURFACES[name], MeshSettings(max_edge=edge)).vertices)
+        for edge in (1.0, 4.0, 16.0, 64.0, 1e3, 1e4, 1e6, 1e300)
+    ]
+    assert (np.diff(numbers) <= 0).all()
+    assert numbers[-1] == numbers[-2] == 9  # three rows of three
+
+
+def test_no_mesh_has_more_vertices_than_allowed() -> None:
+    for edge in (0.5, 1.0, 2.0, 1e3):
+        number = len(surface_from_nurbs(cylinder(), MeshSettings(max_edge=edge)).vertices)
+        surface_from_nurbs(cylinder(), MeshSettings(max_edge=edge, max_vertices=number))
+        refused(cylinder(), TooFineError, MeshSettings(max_edge=edge, max_vertices=number - 1))
+
+
+@pytest.mark.parametrize("size", [5e-324, 1e-200, 1e-30])
+@pytest.mark.parametrize("name", ["max_edge", "tolerance"])
+def test_sizes_at_the_ends_of_doubles_are_refused_or_kept(name: str, size: float) -> None:
+    """None of them makes a warning, which would be an error here."""
+    refused(cylinder(), TooFineError, MeshSettings(**{name: size}))
+    coarse = surface_from_nurbs(cylinder(), MeshSettings(**{name: 1 / max(size, 1e-308)}))
+    assert len(coarse.vertices) < 1000

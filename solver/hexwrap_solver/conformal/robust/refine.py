@@ -11,8 +11,9 @@ import numpy as np
 
 from hexwrap_solver.arrays import Bools, Floats, Ints
 from hexwrap_solver.conformal.energy import corner_angles, opposite_lengths
-from hexwrap_solver.conformal.robust.retriangulate import angle_sums_opposite, flatten_out
+from hexwrap_solver.conformal.robust.retriangulate import flatten_out
 from hexwrap_solver.conformal.types import Targets
+from hexwrap_solver.surface.flips import angle_sums_opposite
 from hexwrap_solver.surface.topology import half_edges
 from hexwrap_solver.surface.types import Surface
 

@@ -23,8 +23,19 @@ from hexwrap_solver.surface.closest import TriangleTree
 #: sliding along the surface, too little to be seen in what the energies ask for.
 ANCHOR = 1e-2
 
+#: Weights above this are brought down to it, all in the same ratio: beyond, rounding of what they weigh would
+#: drown the damping that keeps free directions in place.
+MOST_WEIGHT = 100.0
+
 #: Real corners, or complex ones where derivatives are taken by a complex step.
 Points = NDArray[Any]
+
+
+def bounded(weights: Weights) -> tuple[Weights, float]:
+    """Weights in the same ratios, none above MOST_WEIGHT, and the factor by which they are smaller."""
+    parts = (weights.planarity, weights.angle, weights.edge, weights.surface)
+    factor = max(1.0, max(parts) / MOST_WEIGHT)
+    return Weights(*(part / factor for part in parts)), factor
 
 
 def residuals(points: Points, length: Floats, weights: Weights, *, angles: bool = True) -> Points:
@@ -54,15 +65,17 @@ def surface_residuals(points: Floats, length: Floats, tree: TriangleTree) -> tup
     / ℓ.
 
     On the surface itself, where the distance has a kink, the derivative is that along the face's normal.
+    Differences of coordinates come first: far from the origin their digits are all there is.
     """
     nearest = tree.nearest(points)
     corners = tree.corners[nearest.face]
-    spoke = points - np.einsum("kc,kcd->kd", nearest.barycentric, corners)
+    spoke = np.einsum("kc,kcd->kd", nearest.barycentric, points[:, None] - corners)
+    distance = np.linalg.norm(spoke, axis=1)
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    touching = nearest.distance <= 1e-12 * length
+    touching = distance <= 1e-12 * length + 4 * np.finfo(float).eps * np.abs(points).max(axis=1)
     direction = np.where(touching[:, None], normal, spoke)
     direction /= np.linalg.norm(direction, axis=1)[:, None]
-    return nearest.distance / length, direction / length[:, None]
+    return distance / length, direction / length[:, None]
 
 
 def plane_distances(points: Floats, length: Floats) -> Floats:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hexwrap_solver.arrays import Floats, Progress, no_progress
-from hexwrap_solver.panels.energy.residuals import ANCHOR, jacobian, residuals, surface_residuals
+from hexwrap_solver.panels.energy.residuals import ANCHOR, bounded, jacobian, residuals, surface_residuals
 from hexwrap_solver.panels.regular import nearest_regular
 from hexwrap_solver.panels.types import Weights
 from hexwrap_solver.surface.closest import TriangleTree
@@ -36,6 +36,9 @@ def minimise_singly(
     returned; with it panels could still slide along it, and are anchored weakly. Returns the polygons (q,
     p, 3) and the total energy after each step.
     """
+    if not len(cells):
+        return cells.copy(), np.zeros(1)
+    weights, factor = bounded(weights)
     points, energy, curve = _descend(cells, cells, length, weights, surface, progress)
     # Badly bent cells can end in a local minimum; those start again from the nearest regular polygon.
     stuck = np.flatnonzero(energy > STUCK)
@@ -46,7 +49,7 @@ def minimise_singly(
         better = reached < energy[stuck]
         points[stuck[better]], energy[stuck[better]] = tried[better], reached[better]
         curve.append(float(energy.sum()))
-    return (points if surface is not None else _aligned(points, cells)), np.array(curve)
+    return (points if surface is not None else _aligned(points, cells)), factor * np.array(curve)
 
 
 def _descend(

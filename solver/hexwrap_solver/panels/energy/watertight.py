@@ -9,6 +9,7 @@ import numpy as np
 from hexwrap_solver.arrays import Floats, Ints, Progress, Ragged, no_progress
 from hexwrap_solver.panels.energy.cell_matrix import CellMatrix
 from hexwrap_solver.panels.energy.residuals import (
+    bounded,
     jacobian,
     plane_distances,
     plane_slopes,
@@ -92,6 +93,7 @@ def minimise_watertight(
     anchor. Where planarity has a weight, the distances from the faces' planes are added, weighing more
     from stage to stage, until faces are flat.
     """
+    weights, factor = bounded(weights)
     problem = _Problem(pattern, length, weights, surface)
     flat = weights.planarity > 0
     state = problem.at(pattern.vertices, 0.0)
@@ -122,7 +124,7 @@ def minimise_watertight(
     if flat:
         state = _flattened(problem, state, flatness)
         curve.append(state.asked)
-    return state.points, np.array(curve)
+    return state.points, factor * np.array(curve)
 
 
 def _search(problem: _Problem, state: _State, flatness: float) -> tuple[_State, float]:
