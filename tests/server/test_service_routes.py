@@ -10,6 +10,8 @@ import numpy as np
 import orjson
 import pytest
 from ezdxf.entities import LWPolyline
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from hexwrap_server import quick, routes
 from tests.server.bodies import request, tube
@@ -267,3 +269,38 @@ def test_points_outside_are_told(client: Live, done: str) -> None:
         assert client.post(f"/v1/jobs/{done}/{route}", json={"points": []}).status_code == 200
     wrong = client.post(f"/v1/jobs/{done}/lift", json={"points": [[0, 1, 2]]})
     assert (wrong.status_code, wrong.json()["errors"][0]["pointer"]) == (422, "/points/0")
+
+
+@pytest.mark.parametrize(
+    "boundary",
+    [
+        {"mode": "straight"},
+        {
+            "mode": "angles",
+            "angle_unit": "deg",
+            "quantum": "none",
+            "angles": [{"vertex": 0, "angle": 120}, {"vertex": 239, "angle": 240}],
+        },
+    ],
+    ids=("cylinder", "cone"),
+)
+def test_points_anywhere_are_answered(client: Live, boundary: dict[str, object]) -> None:
+    """Any finite numbers, the largest ones too: a place, or that there is none."""
+    id = client.post("/v1/jobs", json=request(boundary=boundary, pattern=None)).json()["id"]
+    assert finished(client, id)["status"] == "done"
+    numbers = st.floats(allow_nan=False, allow_infinity=False) | st.integers(-(10**40), 10**40)
+
+    @settings(max_examples=60, deadline=None, derandomize=True)
+    @given(st.lists(st.tuples(numbers, numbers, numbers), max_size=8))
+    def answered(points: list[tuple[float, float, float]]) -> None:
+        flat = client.post(f"/v1/jobs/{id}/flatten", json={"points": points})
+        assert flat.status_code == 200, flat.text
+        assert np.isfinite(np.array(flat.json()["uv"])).all()
+        assert len(flat.json()["distance"]) == len(points)
+        assert all(isinstance(distance, float) for distance in flat.json()["distance"])
+        lifted = client.post(f"/v1/jobs/{id}/lift", json={"points": [point[:2] for point in points]})
+        assert lifted.status_code == 200, lifted.text
+        for inside, place in zip(lifted.json()["inside"], lifted.json()["points"], strict=True):
+            assert (place == [None] * 3) is not inside
+
+    answered()
