@@ -10,7 +10,7 @@ from typing import Any
 import python_multipart
 from python_multipart.exceptions import FormParserError
 
-from hexwrap_server.problems import FormError
+from hexwrap_server.problems import FormError, body_is_the_surface
 from hexwrap_server.reading import read_surface
 from hexwrap_server.requests import CacheSettings, Intake, SentSurface
 from hexwrap_server.work import checked
@@ -28,6 +28,7 @@ class TooManyVerticesError(FormError):
     title = "The surface has too many vertices"
 
 
+@body_is_the_surface(is_file=True)
 def read_upload(
     report: Report,
     body: bytes,

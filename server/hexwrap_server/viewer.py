@@ -16,7 +16,7 @@ from starlette.staticfiles import StaticFiles
 from hexwrap_server import describe, samples
 from hexwrap_server.answers import json_response, packed_response
 from hexwrap_server.bodies import read_body
-from hexwrap_server.problems import not_found
+from hexwrap_server.problems import body_is_the_surface, not_found
 from hexwrap_server.reading import read_surface
 from hexwrap_server.recall import request_document
 from hexwrap_server.routes import JobId, service_of
@@ -90,6 +90,7 @@ async def preview(
     return await packed_response(request, data)
 
 
+@body_is_the_surface(is_file=True)
 def read_preview(report: Report, body: bytes, content_type: str, name: str, max_vertices: int) -> bytes:
     """Vertices and faces of a file as JSON; runs in a worker. Raises UploadError, SurfaceError."""
     if content_type.lower().startswith("multipart/"):

@@ -10,9 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hexwrap_server.problems import FormError, problem
 from hexwrap_server.requests import Outcome, Wanted
 from hexwrap_server.store import Job, Store, Work
 from hexwrap_solver.conformal.types import BoundaryCondition
+from hexwrap_solver.errors import RequestError
 from tests.server.bodies import tube
 from tests.server.live import Live, running
 
@@ -109,3 +111,46 @@ def test_old_and_superfluous_results_are_forgotten(tmp_path: Path) -> None:
     assert store.prune_rows(days=0, result_bytes=1e9) == {}
     assert store.jobs(10) == []
     store.close()
+
+
+OPEN_DISK = {"vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "faces": [[0, 1, 2]]}
+
+
+@pytest.mark.parametrize(
+    ("surface", "pointer"),
+    [
+        (OPEN_DISK, ""),
+        (OPEN_DISK | {"faces": [[0, 1, 1.5]]}, "/faces/0/2"),
+        (
+            {
+                "nurbs": {
+                    "degree": [1, 1],
+                    "knots": [[0, 0, 1, 1], [0, 1, 0, 1]],
+                    "control_points": [[[0, 0, 0], [1, 0, 0]], [[0, 1, 0], [1, 1, 0]]],
+                }
+            },
+            "/nurbs/knots/1",
+        ),
+    ],
+)
+def test_pointers_lead_into_the_body_as_it_was_sent(
+    client: Live, surface: dict[str, object], pointer: str
+) -> None:
+    alone = client.post("/v1/surfaces", json=surface)
+    assert alone.status_code == 422
+    assert [error["pointer"] for error in alone.json()["errors"]] == [pointer]
+    inside = client.post("/v1/solve", json={"surface": surface}).json()
+    assert [error["pointer"] for error in inside["errors"]] == [f"/surface{pointer}"]
+    assert inside["type"] == alone.json()["type"]
+
+
+def test_of_a_file_the_whole_is_at_fault(client: Live) -> None:
+    data = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+    answer = client.post("/v1/surfaces", params={"name": "disk.obj"}, content=data)
+    assert answer.status_code == 422
+    assert [error["pointer"] for error in answer.json()["errors"]] == [""]
+
+
+def test_refusals_about_no_single_field_point_nowhere() -> None:
+    assert problem(RequestError("It cannot be."))["errors"] == []
+    assert problem(FormError("It cannot be."))["errors"] == []
