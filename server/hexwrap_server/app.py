@@ -15,11 +15,11 @@ import uvicorn
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
-from starlette.middleware.gzip import GZipMiddleware
 from starlette.responses import Response
 
 from hexwrap_server import __version__, garbage
-from hexwrap_server.answers import WORTH_PACKING, problem_response
+from hexwrap_server.answers import problem_response
+from hexwrap_server.compressed import Compressed
 from hexwrap_server.docs import add_docs
 from hexwrap_server.engine import Engine
 from hexwrap_server.head import Head
@@ -78,7 +78,7 @@ def create_app(settings: Settings | None = None, engine: Engine | None = None) -
     app.add_exception_handler(HTTPException, _on_http_exception)
     app.add_exception_handler(RequestValidationError, _on_parameters)
     app.add_exception_handler(Exception, _on_fault)
-    app.add_middleware(GZipMiddleware, minimum_size=WORTH_PACKING, compresslevel=1)
+    app.add_middleware(Compressed)
     app.add_middleware(Head)
     app.add_middleware(Doorkeeper, settings=settings)
     app.add_middleware(Observer, metrics=service.metrics)
