@@ -32,7 +32,6 @@ from hexwrap_server.security import Doorkeeper
 from hexwrap_server.service import Service
 from hexwrap_server.settings import Settings
 from hexwrap_server.viewer import add_viewer
-from hexwrap_server.worker import InternalError
 from hexwrap_solver.errors import HexwrapError
 
 #: Seconds that open connections get when the server stops.
@@ -77,7 +76,6 @@ def create_app(settings: Settings | None = None, engine: Engine | None = None) -
     app.add_exception_handler(HexwrapError, _on_error)
     app.add_exception_handler(HTTPException, _on_http_exception)
     app.add_exception_handler(RequestValidationError, _on_parameters)
-    app.add_exception_handler(Exception, _on_fault)
     app.add_middleware(Compressed)
     app.add_middleware(Head)
     app.add_middleware(Doorkeeper, settings=settings)
@@ -170,13 +168,4 @@ async def _on_parameters(request: Request, error: Exception) -> Response:
     detail = f"Parameter '{listed[0]['parameter']}': {listed[0]['detail']}."
     return problem_response(
         HttpError(422, "invalid-request", "The request does not have the right form", detail, errors=listed)
-    )
-
-
-async def _on_fault(request: Request, error: Exception) -> Response:
-    log.error("a fault while answering %s %s", request.method, request.url.path, exc_info=error)
-    return problem_response(
-        InternalError(
-            "The server could not answer because of a fault in hexwrap, not in the request; please report it."
-        )
     )
