@@ -154,9 +154,12 @@ def test_ids_open_no_paths(client: Live, id: str) -> None:
 def test_token_is_asked_of_everybody(tmp_path_factory: pytest.TempPathFactory) -> None:
     with running(tmp_path_factory.mktemp("data"), workers=1, token="secret") as client:
         assert client.get("/health").status_code == 200
-        for wrong in ({}, {"Authorization": "Bearer guess"}, {"Authorization": "Basic secret"}):
+        wrongs = [b"Bearer guess", b"Basic secret", b"Bearer", "Bearer secr\u00e9t".encode(), b"Bearer \xe9"]
+        for wrong in ({}, *({"Authorization": said} for said in wrongs)):
             answer = client.get("/v1/jobs", headers=wrong)
             assert (answer.status_code, answer.headers["www-authenticate"]) == (401, "Bearer")
         assert client.get("/v1/jobs", headers={"Authorization": "Bearer secret"}).status_code == 200
+        plain = {"Authorization": "bearer   secret"}
+        assert client.get("/v1/jobs", headers=plain).status_code == 200
         # the page must load to be able to ask for the token; it holds no secrets
         assert client.get("/").status_code == client.get("/static/app.js").status_code == 200
