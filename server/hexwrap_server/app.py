@@ -16,6 +16,8 @@ from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 from starlette.responses import Response
+from starlette.routing import BaseRoute, Match, Mount
+from starlette.types import Scope
 
 from hexwrap_server import __version__, garbage
 from hexwrap_server.answers import problem_response
@@ -25,7 +27,7 @@ from hexwrap_server.engine import Engine
 from hexwrap_server.head import Head
 from hexwrap_server.hops import hops_router
 from hexwrap_server.logs import set_up_logging
-from hexwrap_server.observe import Observer
+from hexwrap_server.observe import METHODS, Observer
 from hexwrap_server.problems import HttpError
 from hexwrap_server.routes import JobFailedError, router
 from hexwrap_server.security import Doorkeeper
@@ -155,7 +157,23 @@ async def _on_http_exception(request: Request, error: Exception) -> Response:
         405: ("Method not allowed", f"{request.method} is not possible at {request.url.path[:200]}."),
     }.get(error.status_code, (str(error.detail), str(error.detail)))
     slug = {404: "not-found", 405: "method-not-allowed"}.get(error.status_code, "http")
-    return problem_response(HttpError(error.status_code, slug, title, detail, dict(error.headers or {})))
+    headers = dict(error.headers or {})
+    if error.status_code == 405:
+        headers["Allow"] = ", ".join(_allowed(request))
+    return problem_response(HttpError(error.status_code, slug, title, detail, headers))
+
+
+def _allowed(request: Request) -> list[str]:
+    """Methods that this path answers to, by whichever route: the router itself names those of the first."""
+    asked = {"type": "http", "path": request.scope["path"], "root_path": "", "headers": []}
+    taken = {m for m in METHODS if any(_takes(route, asked | {"method": m}) for route in request.app.routes)}
+    return sorted(taken | {"HEAD"} if "GET" in taken else taken)
+
+
+def _takes(route: BaseRoute, asked: Scope) -> bool:
+    if isinstance(route, Mount) and asked["method"] != "GET":
+        return False  # a folder of files matches whatever the method
+    return route.matches(asked)[0] is Match.FULL
 
 
 async def _on_parameters(request: Request, error: Exception) -> Response:

@@ -106,6 +106,9 @@ def test_include_picks_parts(client: Live, done: str) -> None:
     full = client.get(f"/v1/jobs/{done}/result").json()
     some = client.get(f"/v1/jobs/{done}/result", params={"include": "sizes,map"}).json()
     assert some == {"map": full["map"], "sizes": full["sizes"]}
+    solved = client.post("/v1/solve", params={"include": "sizes,map"}, json=request(name="tower"))
+    assert solved.json() == some
+    assert client.get(solved.headers["content-location"]).json() == some
     wrong = client.get(f"/v1/jobs/{done}/result", params={"include": "sizes,mops"})
     assert wrong.status_code == 422
     assert wrong.json()["errors"][0]["parameter"] == "include"
@@ -115,6 +118,7 @@ def test_solve_answers_with_the_result_itself(client: Live, done: str) -> None:
     answer = client.post("/v1/solve", json=request(name="tower"))
     assert answer.status_code == 200
     assert answer.json() == client.get(f"/v1/jobs/{done}/result").json()
+    assert answer.json() == client.get(answer.headers["content-location"]).json()
 
 
 @pytest.mark.parametrize(
@@ -181,6 +185,27 @@ def test_refusals_are_problems(client: Live, method: str, path: str, status: int
     assert answer.headers["content-type"] == "application/problem+json"
     assert answer.json()["type"] == f"/problems/{slug}"
     assert answer.json()["status"] == status
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "allowed"),
+    [
+        ("PUT", "/v1/jobs", "GET, HEAD, POST"),
+        ("PUT", "/v1/jobs/x", "DELETE, GET, HEAD"),
+        ("INVENTED", "/v1/jobs/x/result", "GET, HEAD"),
+        ("GET", "/v1/solve", "POST"),
+        ("POST", "/docs", "GET, HEAD"),
+        ("POST", "/openapi.json", "GET, HEAD"),
+        ("POST", "/static/app.js", "GET, HEAD"),
+        ("DELETE", "/v1/surfaces/preview", "POST"),
+        ("GET", "/solve", "POST"),
+    ],
+)
+def test_allow_names_every_method_of_a_path(client: Live, method: str, path: str, allowed: str) -> None:
+    answer = client.request(method, path)
+    assert (answer.status_code, answer.headers["allow"]) == (405, allowed)
+    for other in allowed.split(", "):
+        assert client.request(other, path).status_code != 405
 
 
 def test_half_characters_are_told(client: Live) -> None:
