@@ -13,13 +13,13 @@ import pytest
 
 from hexwrap_server.security import host_name
 from tests.server.bodies import request, tube
-from tests.server.live import Live, running
+from tests.server.live import Live, finished, running
 
 
 @pytest.fixture(scope="module")
 def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Live]:
     data = tmp_path_factory.mktemp("data")
-    with running(data, workers=1, max_body_mib=0.5, max_vertices=500, max_points=10) as live:
+    with running(data, workers=1, max_body_mib=0.5, max_vertices=500, max_panels=2000, max_points=10) as live:
         yield live
 
 
@@ -141,12 +141,29 @@ def test_limits_of_counts_are_told(client: Live) -> None:
     answer = client.post("/v1/jobs", json={"surface": tube(40, 20)})
     assert answer.status_code == 422
     assert "at most 500" in answer.json()["detail"]
-    answer = client.post("/v1/jobs/x/lift", json={"points": [[0, 0]] * 11})
-    assert answer.status_code == 404
+    many = client.post("/v1/solve", json=request(pattern={"around": 100}))
+    assert (many.status_code, many.json()["limit"]) == (422, 2000)
 
 
-@pytest.mark.parametrize("id", ["../../etc/passwd", "a" * 64, "..", "0" * 63 + "/", "x.surface"])
+@pytest.mark.parametrize(("route", "point"), [("lift", [0, 0]), ("flatten", [0, 0, 0])])
+def test_limit_of_points_is_told(client: Live, route: str, point: list[float]) -> None:
+    id = client.post("/v1/jobs", json=request()).json()["id"]
+    assert finished(client, id)["status"] == "done"
+    most = client.post(f"/v1/jobs/{id}/{route}", json={"points": [point] * 10})
+    assert most.status_code == 200
+    more = client.post(f"/v1/jobs/{id}/{route}", json={"points": [point] * 11})
+    assert (more.status_code, more.json()["errors"][0]["pointer"]) == (422, "/points")
+    assert "at most 10" in more.json()["detail"]
+
+
+@pytest.mark.parametrize(
+    "id",
+    ["../../etc/passwd", "a" * 64, "..", "0" * 63 + "/", "x.surface", "../evil", "evil", "../surfaces/evil"],
+)
 def test_ids_open_no_paths(client: Live, id: str) -> None:
+    surfaces = client.service.store.surfaces
+    for folder in (surfaces, surfaces.parent):  # they would be found if only the path were looked at
+        (folder / "evil.surface").write_bytes(b"")
     answer = client.post("/v1/jobs", json={"surface": {"id": id}})
     assert (answer.status_code, answer.json()["errors"][0]["pointer"]) == (422, "/surface/id")
 
