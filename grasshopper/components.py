@@ -19,7 +19,6 @@ INCLUDE = re.compile(r"^# include: (.+)$", re.MULTILINE)
 GHPYTHON = UUID("410755b1-224a-4c1e-a407-bf32fb45ea7e")
 INPUT_ID = UUID("84fa917c-1ed8-4db3-8be1-7bdc4a6495a2")
 OUTPUT_ID = UUID("8ec86459-bf01-4409-baee-174d0d2b13d0")
-ACCESS = ("item", "list", "tree")
 
 
 @dataclass(frozen=True)

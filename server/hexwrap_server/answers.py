@@ -48,9 +48,21 @@ async def packed_response(
 
 
 def takes_gzip(headers: Headers) -> bool:
-    """Whether Accept-Encoding names gzip with a quality above 0."""
-    for entry in headers.get("accept-encoding", "").split(","):
+    """Whether Accept-Encoding gives gzip a quality above 0; gzip by name goes before ``*``."""
+    qualities: dict[str, float] = {}
+    for entry in ",".join(headers.getlist("accept-encoding")).split(","):
         name, *parameters = (word.strip().lower() for word in entry.split(";"))
-        if name in ("gzip", "*"):
-            return not any(p.replace(" ", "") in ("q=0", "q=0.0", "q=0.00", "q=0.000") for p in parameters)
-    return False
+        qualities[name] = _quality(parameters)
+    return qualities.get("gzip", qualities.get("*", 0.0)) > 0
+
+
+def _quality(parameters: list[str]) -> float:
+    """1 where there is none; one that is no number means nothing that could be relied on."""
+    for parameter in parameters:
+        name, _, value = parameter.partition("=")
+        if name.strip() == "q":
+            try:
+                return float(value)
+            except ValueError:
+                return 0.0
+    return 1.0

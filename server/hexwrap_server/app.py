@@ -15,25 +15,25 @@ import uvicorn
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
-from starlette.middleware.gzip import GZipMiddleware
 from starlette.responses import Response
+from starlette.routing import BaseRoute, Match, Mount
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from hexwrap_server import __version__, garbage
-from hexwrap_server.answers import WORTH_PACKING, problem_response
+from hexwrap_server.answers import problem_response
+from hexwrap_server.compressed import Compressed
 from hexwrap_server.docs import add_docs
 from hexwrap_server.engine import Engine
 from hexwrap_server.head import Head
 from hexwrap_server.hops import hops_router
 from hexwrap_server.logs import set_up_logging
-from hexwrap_server.observe import Observer
+from hexwrap_server.observe import METHODS, Observer
 from hexwrap_server.problems import HttpError
 from hexwrap_server.routes import JobFailedError, router
 from hexwrap_server.security import Doorkeeper
 from hexwrap_server.service import Service
 from hexwrap_server.settings import Settings
 from hexwrap_server.viewer import add_viewer
-from hexwrap_server.worker import InternalError
 from hexwrap_solver.errors import HexwrapError
 
 #: Seconds that open connections get when the server stops.
@@ -84,8 +84,7 @@ def create_app(settings: Settings | None = None, engine: Engine | None = None) -
     app.add_exception_handler(HexwrapError, _on_error)
     app.add_exception_handler(HTTPException, _on_http_exception)
     app.add_exception_handler(RequestValidationError, _on_parameters)
-    app.add_exception_handler(Exception, _on_fault)
-    app.add_middleware(GZipMiddleware, minimum_size=WORTH_PACKING, compresslevel=1)
+    app.add_middleware(Compressed)
     app.add_middleware(Head)
     app.add_middleware(Doorkeeper, settings=settings)
     app.add_middleware(Observer, metrics=service.metrics)
@@ -191,7 +190,23 @@ async def _on_http_exception(request: Request, error: Exception) -> Response:
         405: ("Method not allowed", f"{request.method} is not possible at {request.url.path[:200]}."),
     }.get(error.status_code, (str(error.detail), str(error.detail)))
     slug = {404: "not-found", 405: "method-not-allowed"}.get(error.status_code, "http")
-    return problem_response(HttpError(error.status_code, slug, title, detail, dict(error.headers or {})))
+    headers = dict(error.headers or {})
+    if error.status_code == 405:
+        headers["Allow"] = ", ".join(_allowed(request))
+    return problem_response(HttpError(error.status_code, slug, title, detail, headers))
+
+
+def _allowed(request: Request) -> list[str]:
+    """Methods that this path answers to, by whichever route: the router itself names those of the first."""
+    asked = {"type": "http", "path": request.scope["path"], "root_path": "", "headers": []}
+    taken = {m for m in METHODS if any(_takes(route, asked | {"method": m}) for route in request.app.routes)}
+    return sorted(taken | {"HEAD"} if "GET" in taken else taken)
+
+
+def _takes(route: BaseRoute, asked: Scope) -> bool:
+    if isinstance(route, Mount) and asked["method"] != "GET":
+        return False  # a folder of files matches whatever the method
+    return route.matches(asked)[0] is Match.FULL
 
 
 async def _on_parameters(request: Request, error: Exception) -> Response:
@@ -204,13 +219,4 @@ async def _on_parameters(request: Request, error: Exception) -> Response:
     detail = f"Parameter '{listed[0]['parameter']}': {listed[0]['detail']}."
     return problem_response(
         HttpError(422, "invalid-request", "The request does not have the right form", detail, errors=listed)
-    )
-
-
-async def _on_fault(request: Request, error: Exception) -> Response:
-    log.error("a fault while answering %s %s", request.method, request.url.path, exc_info=error)
-    return problem_response(
-        InternalError(
-            "The server could not answer because of a fault in hexwrap, not in the request; please report it."
-        )
     )

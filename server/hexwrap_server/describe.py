@@ -4,50 +4,33 @@ from __future__ import annotations
 
 from typing import Any
 
+from hexwrap_server.describe_result import RESULT as _RESULT
+from hexwrap_server.schema_words import NUMBER, PLANE, POINT, listed, nullable, record
 from hexwrap_server.schemas import Body, Meshing
 
-_NUMBER = {"type": "number"}
-
-
-def _list(items: dict[str, Any], length: int | None = None) -> dict[str, Any]:
-    sized = {"minItems": length, "maxItems": length} if length is not None else {}
-    return {"type": "array", "items": items} | sized
-
-
-def _object(required: tuple[str, ...] = (), more: bool = True, **properties: Any) -> dict[str, Any]:
-    closed = {} if more else {"additionalProperties": False}
-    return {"type": "object", "properties": properties, "required": list(required)} | closed
-
-
-def _nullable(schema: dict[str, Any]) -> dict[str, Any]:
-    return {"anyOf": [schema, {"type": "null"}]}
-
-
-_POINT = _list(_NUMBER, 3)
-_PLANE = _list(_NUMBER, 2)
-_MESH = _object(
+_MESH = record(
     ("vertices", "faces"),
     more=False,
-    vertices=_list(_POINT),
-    faces=_list(_list({"type": "integer", "minimum": 0}) | {"minItems": 3, "maxItems": 4}),
-    normals=_nullable(_list(_POINT)),
+    vertices=listed(POINT),
+    faces=listed(listed({"type": "integer", "minimum": 0}) | {"minItems": 3, "maxItems": 4}),
+    normals=nullable(listed(POINT)),
 )
-_NURBS = _object(
+_NURBS = record(
     ("nurbs",),
     more=False,
-    nurbs=_object(
+    nurbs=record(
         ("degree", "knots", "control_points"),
         more=False,
-        degree=_list({"type": "integer", "minimum": 1, "maximum": 25}, 2),
-        knots=_list(_list(_NUMBER), 2),
-        control_points=_list(_list(_list(_NUMBER) | {"minItems": 3, "maxItems": 4})),
-        closed=_list({"type": "boolean"}, 2),
+        degree=listed({"type": "integer", "minimum": 1, "maximum": 25}, 2),
+        knots=listed(listed(NUMBER), 2),
+        control_points=listed(listed(listed(NUMBER) | {"minItems": 3, "maxItems": 4})),
+        closed=listed({"type": "boolean"}, 2),
     ),
-    mesh=_nullable(Meshing.model_json_schema()),
+    mesh=nullable(Meshing.model_json_schema()),
 )
-_SURFACE = {"anyOf": [_MESH, _NURBS, _object(("id",), more=False, id={"type": "string"})]}
+_SURFACE = {"anyOf": [_MESH, _NURBS, record(("id",), more=False, id={"type": "string"})]}
 
-_JOB = _object(
+_JOB = record(
     ("id", "name", "status", "stage", "progress", "created", "started", "finished", "timings", "problem"),
     id={"type": "string"},
     name={"type": "string"},
@@ -55,23 +38,22 @@ _JOB = _object(
     stage={"type": "string"},
     progress={"type": "number", "minimum": 0, "maximum": 1},
     created={"type": "string", "format": "date-time"},
-    started=_nullable({"type": "string", "format": "date-time"}),
-    finished=_nullable({"type": "string", "format": "date-time"}),
-    timings={"type": "object", "additionalProperties": _NUMBER},
+    started=nullable({"type": "string", "format": "date-time"}),
+    finished=nullable({"type": "string", "format": "date-time"}),
+    timings={"type": "object", "additionalProperties": NUMBER},
     found={"type": "object", "additionalProperties": {"type": "string"}},
-    problem=_nullable({"type": "object"}),
-    queue_position=_nullable({"type": "integer"}),
+    problem=nullable({"type": "object"}),
+    queue_position=nullable({"type": "integer"}),
 )
-_PROBLEM = _object(
+_PROBLEM = record(
     ("type", "title", "status", "detail", "errors"),
     type={"type": "string"},
     title={"type": "string"},
     status={"type": "integer"},
     detail={"type": "string"},
-    errors=_list(_object(("pointer", "detail"), pointer={"type": "string"}, detail={"type": "string"})),
+    errors=listed(record(("pointer", "detail"), pointer={"type": "string"}, detail={"type": "string"})),
 )
-_RESULT = _object()
-_HEALTH = _object(("status", "version", "workers", "queued", "running"), status={"const": "ok"})
+_HEALTH = record(("status", "version", "workers", "queued", "running"), status={"const": "ok"})
 
 
 def _answers(media: dict[str, Any], status: int = 200, *problems: int) -> dict[str, Any]:
@@ -113,14 +95,14 @@ def _inlined(schema: dict[str, Any]) -> dict[str, Any]:
 
 
 _BODY_FAULTS = (400, 413, 415)
-_FILE = {"multipart/form-data": {"schema": _object(("file",), file={"type": "string", "format": "binary"})}}
-_POINTS = _object(("points",), more=False, points=_list(_PLANE))
-_PLACES = _object(("points",), more=False, points=_list(_POINT))
+_FILE = {"multipart/form-data": {"schema": record(("file",), file={"type": "string", "format": "binary"})}}
+_POINTS = record(("points",), more=False, points=listed(PLANE))
+_PLACES = record(("points",), more=False, points=listed(POINT))
 
 HEALTH = _route(_answers(_json(_HEALTH)))
 READY = _route(_answers(_json(_HEALTH), 200, 503))
 METRICS = _route(_answers({"text/plain": {"schema": {"type": "string"}}}))
-JOBS = _route(_answers(_json(_object(("jobs",), jobs=_list(_JOB)))))
+JOBS = _route(_answers(_json(record(("jobs",), jobs=listed(_JOB)))))
 JOB = _route(_answers(_json(_JOB), 200, 404))
 EVENTS = _route(_answers({"text/event-stream": {"schema": {"type": "string"}}}, 200, 404))
 RESULT = _route(_answers(_json(_RESULT), 200, 404, 409, 410, 500, 503))
@@ -128,20 +110,20 @@ DELETE_JOB = _route(_answers({}, 204, 404))
 POST_JOB = _route(_answers(_json(_JOB), 202, *_BODY_FAULTS, 503), _json(_request_schema()))
 SOLVE = _route(_answers(_json(_RESULT), 200, *_BODY_FAULTS, 409, 410, 500, 503), _json(_request_schema()))
 SURFACES = _route(
-    _answers(_json(_object(("id", "vertices", "faces", "loops", "repairs"))), 201, *_BODY_FAULTS, 500, 503),
+    _answers(_json(record(("id", "vertices", "faces", "loops", "repairs"))), 201, *_BODY_FAULTS, 500, 503),
     _json({"anyOf": [_MESH, _NURBS]}) | _FILE,
 )
 LIFT = _route(
-    _answers(_json(_object(("points", "normals", "inside"))), 200, *_BODY_FAULTS, 404, 409, 410, 503),
+    _answers(_json(record(("points", "normals", "inside"))), 200, *_BODY_FAULTS, 404, 409, 410, 503),
     _json(_POINTS),
 )
 FLATTEN = _route(
-    _answers(_json(_object(("uv", "distance"))), 200, *_BODY_FAULTS, 404, 409, 410, 503), _json(_PLACES)
+    _answers(_json(record(("uv", "distance"))), 200, *_BODY_FAULTS, 404, 409, 410, 503), _json(_PLACES)
 )
 FILES = _route(
     _answers({"application/octet-stream": {"schema": {"type": "string"}}}, 200, 404, 409, 410, 500, 503)
 )
-SAMPLES = _route(_answers(_json(_object(("samples",), samples=_list(_object(("name",)))))))
-SAMPLE = _route(_answers(_json(_object(("surface",))), 200, 404))
-REQUEST = _route(_answers(_json(_object(("surface", "boundary", "pattern", "panels"))), 200, 404))
-PREVIEW = _route(_answers(_json(_object(("vertices", "faces"))), 200, *_BODY_FAULTS, 500, 503), _FILE)
+SAMPLES = _route(_answers(_json(record(("samples",), samples=listed(record(("name",)))))))
+SAMPLE = _route(_answers(_json(record(("surface",))), 200, 404))
+REQUEST = _route(_answers(_json(record(("surface", "boundary", "pattern", "panels"))), 200, 404))
+PREVIEW = _route(_answers(_json(record(("vertices", "faces"))), 200, *_BODY_FAULTS, 500, 503), _FILE)

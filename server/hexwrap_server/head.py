@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-#: Where the scope says that nobody wants the body.
+#: Where the scope says that nobody wants the body; in the scope further out, where the GET that was made of
+#: it stands, with its route.
 MARK = "hexwrap.head"
 
 
@@ -24,4 +25,5 @@ class Head:
                 message = {**message, "body": b""}
             await send(message)
 
-        await self._app({**scope, "method": "GET", MARK: True}, receive, without_body)
+        scope[MARK] = {**scope, "method": "GET", MARK: True}
+        await self._app(scope[MARK], receive, without_body)

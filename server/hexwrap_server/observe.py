@@ -1,4 +1,4 @@
-"""Request counts, and the headers that every answer carries."""
+"""Request counts, the headers that every answer carries, and the answer where there would be none."""
 
 from __future__ import annotations
 
@@ -8,14 +8,19 @@ import time
 from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from hexwrap_server import __version__
+from hexwrap_server import __version__, head
+from hexwrap_server.answers import problem_response
 from hexwrap_server.metrics import Metrics
+from hexwrap_server.worker import InternalError
 
+#: Methods that are told apart; a client may make up others without end, and each would be counted for ever.
+METHODS = frozenset({"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"})
+FAULT = "The server could not answer because of a fault in hexwrap, not in the request; please report it."
 log = logging.getLogger("hexwrap.http")
 
 
 class Observer:
-    """ASGI middleware, outermost: counts, logs, and signs every answer."""
+    """ASGI middleware, outermost: counts, logs, and signs every answer, those to faults of its own too."""
 
     def __init__(self, app: ASGIApp, metrics: Metrics) -> None:
         self._app = app
@@ -26,9 +31,12 @@ class Observer:
             await self._app(scope, receive, send)
             return
         start = time.perf_counter()
+        has_begun = False
 
         async def signed(message: Message) -> None:
+            nonlocal has_begun
             if message["type"] == "http.response.start":
+                has_begun = True
                 headers = MutableHeaders(scope=message)
                 headers["Server"] = f"hexwrap/{__version__}"
                 headers["X-Content-Type-Options"] = "nosniff"
@@ -36,11 +44,19 @@ class Observer:
                 self._note(scope, message["status"], time.perf_counter() - start)
             await send(message)
 
-        await self._app(scope, receive, signed)
+        try:
+            await self._app(scope, receive, signed)
+        except Exception as error:
+            if has_begun:
+                raise
+            log.error("a fault while answering %s %s", scope["method"], scope["path"], exc_info=error)
+            await problem_response(InternalError(FAULT))(scope, receive, signed)
 
     def _note(self, scope: Scope, status: int, seconds: float) -> None:
-        route = getattr(scope.get("route"), "path", "other")
-        self._metrics.requests.labels(scope["method"], route, str(status)).inc()
+        routed = scope.get(head.MARK, scope)
+        route = getattr(routed.get("route"), "path", "other")
+        method = scope["method"] if scope["method"] in METHODS else "other"
+        self._metrics.requests.labels(method, route, str(status)).inc()
         self._metrics.latency.labels(route).observe(seconds)
         extra = {
             "method": scope["method"],
@@ -48,4 +64,4 @@ class Observer:
             "status": status,
             "seconds": round(seconds, 4),
         }
-        log.debug("answered", extra=extra | {"job": scope.get("path_params", {}).get("id")})
+        log.debug("answered", extra=extra | {"job": routed.get("path_params", {}).get("id")})

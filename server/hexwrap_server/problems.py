@@ -9,7 +9,8 @@ HexwrapError            (hexwrap_solver.errors) refused by the solver: 422
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any, ClassVar
 
 import orjson
@@ -82,13 +83,27 @@ def problem(error: HexwrapError) -> dict[str, Any]:
         return _document(error.own_slug, error.own_title, error.status, error.detail, error.errors)
     faults = error.faults if isinstance(error, FormError) else []
     errors = [{"pointer": pointer, "detail": detail} for pointer, detail in faults]
-    if not errors and error.field:
+    if not errors and error.field is not None:
         errors = [{"pointer": "".join(f"/{step}" for step in error.field), "detail": error.detail}]
     data: dict[str, Any] = dict(error.data)
     for name in ("vertices", "faces", "edges"):
         if getattr(error, name):
             data[name] = getattr(error, name)
     return _document(error.slug, error.title, STATUS.get(error.slug, 422), error.detail, errors) | data
+
+
+@contextmanager
+def body_is_the_surface(is_file: bool = False) -> Iterator[None]:
+    """Faults raised inside name places in a body that is the surface itself, not a request with a surface.
+
+    is_file: the body has no fields to point at; the whole of it is meant.
+    """
+    try:
+        yield
+    except HexwrapError as error:
+        if error.field is not None and error.field[:1] == ("surface",):
+            error.field = () if is_file else error.field[1:]
+        raise
 
 
 def _document(

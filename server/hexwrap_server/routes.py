@@ -261,7 +261,9 @@ async def _result(request: Request, job: Job, include: list[str] | None) -> Resp
         return problem_response(job.problem)
     _finished(job)
     packed, work = await manager_of(request).result(job)
-    headers = {"Content-Location": f"/v1/jobs/{job.id}/result", "Vary": "Accept-Encoding"} | _timing(job)
+    picked = "" if include is None else f"?include={','.join(include)}"
+    location = f"/v1/jobs/{job.id}/result{picked}"
+    headers = {"Content-Location": location, "Vary": "Accept-Encoding"} | _timing(job)
     if include is None and takes_gzip(request.headers):
         return Response(packed, headers=headers | {"Content-Encoding": "gzip"}, media_type=JSON)
     text = await asyncio.to_thread(unpacked, packed, work, include)

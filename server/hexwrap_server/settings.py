@@ -102,6 +102,8 @@ class Settings:
             raise ValueError(
                 f"--host {self.host} would open the service to the network; give a --token with it."
             )
+        if not all("!" <= letter <= "~" for letter in self.token):  # clients differ in how they send others
+            raise ValueError("--token may hold only letters, digits and signs of ASCII, and no spaces.")
         if self.engine not in ("process", "dask"):
             raise ValueError(f"--engine must be 'process' or 'dask', not '{self.engine}'.")
         if self.engine == "dask" and not self.scheduler:

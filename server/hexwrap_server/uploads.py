@@ -10,12 +10,12 @@ from typing import Any
 import python_multipart
 from python_multipart.exceptions import FormParserError
 
-from hexwrap_server.problems import FormError
+from hexwrap_server.problems import FormError, body_is_the_surface
 from hexwrap_server.reading import read_surface
 from hexwrap_server.requests import CacheSettings, Intake, SentSurface
 from hexwrap_server.work import checked
 from hexwrap_server.worker import Report
-from hexwrap_solver.surface.types import MeshSettings, NurbsSurface
+from hexwrap_solver.surface.types import MeshSettings, NurbsSurface, SentMesh
 
 
 class UploadError(FormError):
@@ -28,6 +28,7 @@ class TooManyVerticesError(FormError):
     title = "The surface has too many vertices"
 
 
+@body_is_the_surface(is_file=True)
 def read_upload(
     report: Report,
     body: bytes,
@@ -38,20 +39,27 @@ def read_upload(
     caching: CacheSettings,
 ) -> Intake:
     """A file sent raw (with its name) or in a form → checked surface. Raises UploadError, SurfaceError."""
+    read = sent_file(body, content_type, name, max_vertices, max_bytes)
+    if isinstance(read, NurbsSurface):
+        meshing = MeshSettings(max_vertices=max_vertices)
+        return checked(report, SentSurface(nurbs=read, meshing=meshing), caching)
+    return checked(report, SentSurface(mesh=read), caching)
+
+
+def sent_file(
+    body: bytes, content_type: str, name: str, max_vertices: int, max_bytes: int
+) -> SentMesh | NurbsSurface:
+    """What a file, sent raw or in a form, holds, within the limits. Raises UploadError, SurfaceError."""
     if content_type.lower().startswith("multipart/"):
         name, body = only_file(body, content_type)
     _no_bomb(body, max_bytes)
     read = read_surface(body, name)
-    if isinstance(read, NurbsSurface):
-        return checked(
-            report, SentSurface(nurbs=read, meshing=MeshSettings(max_vertices=max_vertices)), caching
-        )
-    if len(read.vertices) > max_vertices:
+    if not isinstance(read, NurbsSurface) and len(read.vertices) > max_vertices:
         raise TooManyVerticesError(
             f"The file holds {len(read.vertices)} vertices, this server takes at most {max_vertices}; send a "
             "coarser mesh, or start the server with a larger --max-vertices."
         )
-    return checked(report, SentSurface(mesh=read), caching)
+    return read
 
 
 def _no_bomb(body: bytes, max_bytes: int) -> None:

@@ -16,11 +16,11 @@ from starlette.staticfiles import StaticFiles
 from hexwrap_server import describe, samples
 from hexwrap_server.answers import json_response, packed_response
 from hexwrap_server.bodies import read_body
-from hexwrap_server.problems import not_found
-from hexwrap_server.reading import read_surface
+from hexwrap_server.problems import body_is_the_surface, not_found
 from hexwrap_server.recall import request_document
 from hexwrap_server.routes import JobId, service_of
-from hexwrap_server.uploads import only_file
+from hexwrap_server.settings import MIB
+from hexwrap_server.uploads import sent_file
 from hexwrap_server.worker import Report
 from hexwrap_solver.surface import surface_from_nurbs
 from hexwrap_solver.surface.types import MeshSettings, NurbsSurface
@@ -84,17 +84,17 @@ async def preview(
     service = service_of(request)
     body = await read_body(request, service.settings.max_body_mib)
     kind = request.headers.get("content-type", "")
-    data = await service.reading(
-        "hexwrap_server.viewer:read_preview", body, kind, name or "", service.settings.max_vertices
-    )
+    limits = (service.settings.max_vertices, int(service.settings.max_body_mib * MIB))
+    data = await service.reading("hexwrap_server.viewer:read_preview", body, kind, name or "", *limits)
     return await packed_response(request, data)
 
 
-def read_preview(report: Report, body: bytes, content_type: str, name: str, max_vertices: int) -> bytes:
+@body_is_the_surface(is_file=True)
+def read_preview(
+    report: Report, body: bytes, content_type: str, name: str, max_vertices: int, max_bytes: int
+) -> bytes:
     """Vertices and faces of a file as JSON; runs in a worker. Raises UploadError, SurfaceError."""
-    if content_type.lower().startswith("multipart/"):
-        name, body = only_file(body, content_type)
-    read = read_surface(body, name)
+    read = sent_file(body, content_type, name, max_vertices, max_bytes)
     if isinstance(read, NurbsSurface):
         meshed = surface_from_nurbs(read, MeshSettings(max_vertices=max_vertices))
         vertices, faces = meshed.vertices, meshed.faces.tolist()

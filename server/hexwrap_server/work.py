@@ -13,7 +13,7 @@ from hexwrap_server.cache import CachingRunner, StageCache
 from hexwrap_server.disk import read_whole, write_whole
 from hexwrap_server.files import WRITERS, Meta
 from hexwrap_server.parsing import loads
-from hexwrap_server.problems import FormError
+from hexwrap_server.problems import FormError, body_is_the_surface
 from hexwrap_server.requests import CacheSettings, Intake, Order, Outcome, SentSurface, Wanted
 from hexwrap_server.schemas import parse_surface
 from hexwrap_server.scribe import Scribe, There
@@ -103,6 +103,7 @@ def take_in(sent: SentSurface) -> Surface:
     return surface_from_nurbs(sent.nurbs, sent.meshing)
 
 
+@body_is_the_surface()
 def read_surface(report: Report, text: bytes, max_vertices: int, caching: CacheSettings) -> Intake:
     """JSON → checked surface. Raises FormError, SurfaceError."""
     sent = parse_surface(loads(text), max_vertices, root="")

@@ -25,13 +25,14 @@ class HexwrapError(Exception):
     """A refusal that a person can act on.
 
     detail: one sentence. vertices, faces: indices into the sent mesh; edges: pairs of sent vertices.
-    field: path of the request's field at fault, such as ``("boundary", "angles", 2, "angle")``.
+    field: path of the request's field at fault, such as ``("boundary", "angles", 2, "angle")``; None: no
+    single one is.
     data: further figures for a client, JSON-like.
     """
 
     slug: ClassVar[str] = "error"
     title: ClassVar[str] = "The request cannot be carried out"
-    default_field: ClassVar[tuple[str | int, ...]] = ()
+    default_field: ClassVar[tuple[str | int, ...] | None] = None
 
     def __init__(
         self,
@@ -64,7 +65,7 @@ def _rebuild(kind: type[HexwrapError], detail: str, state: dict[str, object]) ->
 class SurfaceError(HexwrapError):
     slug = "surface"
     title = "The surface cannot be used"
-    default_field: ClassVar[tuple[str | int, ...]] = ("surface",)
+    default_field: ClassVar[tuple[str | int, ...] | None] = ("surface",)
 
 
 class RequestError(HexwrapError):

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 import xml.etree.ElementTree as ET
 from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 
 import ezdxf
 import numpy as np
@@ -15,6 +17,7 @@ import rhino3dm
 import trimesh
 from matplotlib.image import imread
 
+from hexwrap_server import cli, routes
 from hexwrap_server.files import WRITERS, Meta, NotMadeError, SheetError, scene, write
 from hexwrap_server.files.dxf import object_coordinates
 from hexwrap_server.files.flat import lay_flat, pack
@@ -36,6 +39,15 @@ def solution() -> Solution:
 def small_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     for name, value in {"HEIGHT": 400, "WIDTH": 420, "MARGIN": 20, "FINE": 1, "SUN_MAP": 300}.items():
         monkeypatch.setattr(scene, name, value)
+
+
+def test_server_page_and_command_line_know_the_same_files() -> None:
+    assert list(routes.FILES) == list(WRITERS)
+    source = Path(__file__).parents[2] / "server" / "viewer" / "src" / "api.ts"
+    listed = re.search(r"export const FILES = \[(.*?)\]", source.read_text(encoding="utf-8"), re.DOTALL)
+    assert listed
+    assert re.findall(r'"([^"]+)"', listed[1]) == list(WRITERS)
+    assert {cli.file_kind(f"x{kind}") for kind in cli._kinds()} == WRITERS.keys()
 
 
 def panels_of(solution: Solution) -> np.ndarray:

@@ -29,7 +29,7 @@ def test_fifty_clients_at_once(tmp_path: Path) -> None:
     ):
 
         def one(i: int) -> tuple[int, dict[str, Any]]:
-            body = {"surface": tube(height=10 + i % 10), "pattern": {"around": 10}}
+            body = {"name": f"{i % 10}", "surface": tube(height=10 + i % 10), "pattern": {"around": 10}}
             answer = client.post("/v1/solve", json=body)
             return answer.status_code, answer.json()
 
@@ -42,5 +42,12 @@ def test_fifty_clients_at_once(tmp_path: Path) -> None:
         assert len(jobs) == 2 * CLIENTS
         counted = client.get("/metrics").text
         assert 'hexwrap_jobs_total{status="done"}' in counted
-        works = sum("computed" in job["found"].values() for job in jobs)
-        assert works >= 10
+        assert [runs(jobs, f"{name}") for name in range(10)] == [1] * 10
+
+
+def runs(jobs: list[dict[str, Any]], name: str) -> int:
+    """How often the work of the jobs of this name was done: jobs that share a run share its times."""
+    alike = [job for job in jobs if job["name"] == name]
+    assert len(alike) == 2 * CLIENTS / 10
+    own = [job for job in alike if "result" not in job["found"].values()]  # not taken from a finished one
+    return len({tuple(sorted(job["timings"].items())) for job in own})

@@ -12,6 +12,7 @@ import schemathesis
 from fastapi import FastAPI
 from hypothesis import HealthCheck, given, settings
 from schemathesis.checks import not_a_server_error
+from schemathesis.core.failures import Failure, FailureGroup
 from schemathesis.specs.openapi.checks import (
     content_type_conformance,
     response_schema_conformance,
@@ -20,6 +21,7 @@ from schemathesis.specs.openapi.checks import (
 
 from hexwrap_server.routes import router
 from hexwrap_server.viewer import router as viewer
+from tests.server.bodies import request
 from tests.server.live import Live, running
 
 CHECKS = [
@@ -65,6 +67,57 @@ def test_documentation_is_served(client: Live) -> None:
     assert page.status_code == 200
     assert "/v1/solve" in page.text
     assert "//" not in page.text
+
+
+def described(client: Live, path: str, method: str) -> Any:
+    """The operation in the document, which can tell whether an answer is one of those announced."""
+    return schemathesis.openapi.from_dict(client.get("/openapi.json").json())[path][method]
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"panels": {"mode": "watertight"}},
+        {"panels": {"components": {"depth": 0.1}}, "support": True},
+        {"pattern": {"kind": "quad", "around": 12, "boundary": "trim"}},
+        {"pattern": {"kind": "triangle", "around": 12}, "boundary": {"mode": "isometric"}},
+        {"pattern": None},
+    ],
+)
+@pytest.mark.parametrize("include", [None, "quality", "mesh,map,sizes"])
+def test_results_are_as_described(client: Live, changes: dict[str, Any], include: str | None) -> None:
+    answer = client.post("/v1/solve", json=request(**changes), params={"include": include} if include else {})
+    assert answer.status_code == 200
+    described(client, "/v1/solve", "POST").validate_response(answer)
+
+
+@pytest.mark.parametrize(
+    ("part", "name", "value"),
+    [
+        ("mesh", "faces", [[0, 1]]),
+        ("mesh", "vertices", [[0, 0, None]]),
+        ("map", "kind", "sphere"),
+        ("map", "deck", None),
+        ("pattern", "whole", [1]),
+        ("pattern", "neighbours", [[-2]]),
+        ("panels", "label", None),
+        ("panels", "center", [[0, 0]]),
+        ("quality", "gap", {"tangential": {}}),
+        ("quality", "notes", "none"),
+    ],
+)
+def test_other_results_are_not_as_described(client: Live, part: str, name: str, value: object) -> None:
+    operation = described(client, "/v1/solve", "POST")
+    answer = client.post("/v1/solve", json=request())
+    headers = {"Content-Type": "application/json"}
+    for change in ({name: value}, None):  # another value, and none at all
+        result = answer.json()
+        result[part] = {k: v for k, v in result[part].items() if k != name} | (change or {})
+        wrong = httpx.Response(200, headers=headers, json=result, request=answer.request)
+        wrong.elapsed = answer.elapsed
+        with pytest.raises((Failure, FailureGroup)):
+            operation.validate_response(wrong)
 
 
 def attack(client: Live, operation: Any, how: settings) -> None:

@@ -13,6 +13,8 @@ import numpy as np
 import orjson
 import pytest
 from ezdxf.entities import LWPolyline
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from hexwrap_server import quick, routes
 from hexwrap_server.service import Service
@@ -109,6 +111,9 @@ def test_include_picks_parts(client: Live, done: str) -> None:
     full = client.get(f"/v1/jobs/{done}/result").json()
     some = client.get(f"/v1/jobs/{done}/result", params={"include": "sizes,map"}).json()
     assert some == {"map": full["map"], "sizes": full["sizes"]}
+    solved = client.post("/v1/solve", params={"include": "sizes,map"}, json=request(name="tower"))
+    assert solved.json() == some
+    assert client.get(solved.headers["content-location"]).json() == some
     wrong = client.get(f"/v1/jobs/{done}/result", params={"include": "sizes,mops"})
     assert wrong.status_code == 422
     assert wrong.json()["errors"][0]["parameter"] == "include"
@@ -118,6 +123,7 @@ def test_solve_answers_with_the_result_itself(client: Live, done: str) -> None:
     answer = client.post("/v1/solve", json=request(name="tower"))
     assert answer.status_code == 200
     assert answer.json() == client.get(f"/v1/jobs/{done}/result").json()
+    assert answer.json() == client.get(answer.headers["content-location"]).json()
 
 
 @pytest.mark.parametrize(
@@ -184,6 +190,27 @@ def test_refusals_are_problems(client: Live, method: str, path: str, status: int
     assert answer.headers["content-type"] == "application/problem+json"
     assert answer.json()["type"] == f"/problems/{slug}"
     assert answer.json()["status"] == status
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "allowed"),
+    [
+        ("PUT", "/v1/jobs", "GET, HEAD, POST"),
+        ("PUT", "/v1/jobs/x", "DELETE, GET, HEAD"),
+        ("INVENTED", "/v1/jobs/x/result", "GET, HEAD"),
+        ("GET", "/v1/solve", "POST"),
+        ("POST", "/docs", "GET, HEAD"),
+        ("POST", "/openapi.json", "GET, HEAD"),
+        ("POST", "/static/app.js", "GET, HEAD"),
+        ("DELETE", "/v1/surfaces/preview", "POST"),
+        ("GET", "/solve", "POST"),
+    ],
+)
+def test_allow_names_every_method_of_a_path(client: Live, method: str, path: str, allowed: str) -> None:
+    answer = client.request(method, path)
+    assert (answer.status_code, answer.headers["allow"]) == (405, allowed)
+    for other in allowed.split(", "):
+        assert client.request(other, path).status_code != 405
 
 
 def test_half_characters_are_told(client: Live) -> None:
@@ -312,3 +339,38 @@ def test_points_outside_are_told(client: Live, done: str) -> None:
         assert client.post(f"/v1/jobs/{done}/{route}", json={"points": []}).status_code == 200
     wrong = client.post(f"/v1/jobs/{done}/lift", json={"points": [[0, 1, 2]]})
     assert (wrong.status_code, wrong.json()["errors"][0]["pointer"]) == (422, "/points/0")
+
+
+@pytest.mark.parametrize(
+    "boundary",
+    [
+        {"mode": "straight"},
+        {
+            "mode": "angles",
+            "angle_unit": "deg",
+            "quantum": "none",
+            "angles": [{"vertex": 0, "angle": 120}, {"vertex": 239, "angle": 240}],
+        },
+    ],
+    ids=("cylinder", "cone"),
+)
+def test_points_anywhere_are_answered(client: Live, boundary: dict[str, object]) -> None:
+    """Any finite numbers, the largest ones too: a place, or that there is none."""
+    id = client.post("/v1/jobs", json=request(boundary=boundary, pattern=None)).json()["id"]
+    assert finished(client, id)["status"] == "done"
+    numbers = st.floats(allow_nan=False, allow_infinity=False) | st.integers(-(10**40), 10**40)
+
+    @settings(max_examples=60, deadline=None, derandomize=True)
+    @given(st.lists(st.tuples(numbers, numbers, numbers), max_size=8))
+    def answered(points: list[tuple[float, float, float]]) -> None:
+        flat = client.post(f"/v1/jobs/{id}/flatten", json={"points": points})
+        assert flat.status_code == 200, flat.text
+        assert np.isfinite(np.array(flat.json()["uv"])).all()
+        assert len(flat.json()["distance"]) == len(points)
+        assert all(isinstance(distance, float) for distance in flat.json()["distance"])
+        lifted = client.post(f"/v1/jobs/{id}/lift", json={"points": [point[:2] for point in points]})
+        assert lifted.status_code == 200, lifted.text
+        for inside, place in zip(lifted.json()["inside"], lifted.json()["points"], strict=True):
+            assert (place == [None] * 3) is not inside
+
+    answered()

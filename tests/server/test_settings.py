@@ -55,6 +55,9 @@ def test_flags_go_before_variables_before_defaults() -> None:
         (("--job-seconds", "-1"), "--job-seconds"),
         (("--job-mib", "nan"), "--job-mib"),
         (("--log-level", "loud"), "--log-level"),
+        (("--token", "geheimnisträger"), "--token"),
+        (("--token", "open sesame"), "--token"),
+        (("--token", "sesame\n"), "--token"),
     ],
 )
 def test_settings_that_make_no_sense_are_refused(words: tuple[str, ...], complaint: str) -> None:

@@ -11,9 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hexwrap_server.problems import FormError, problem
 from hexwrap_server.requests import Outcome, Wanted
 from hexwrap_server.store import Job, Store, Work
 from hexwrap_solver.conformal.types import BoundaryCondition
+from hexwrap_solver.errors import RequestError
 from tests.server.bodies import tube
 from tests.server.live import Live, running
 
@@ -78,18 +80,20 @@ def test_forms_hold_exactly_one_file(client: Live) -> None:
     assert broken.status_code == 422
 
 
-def test_zip_bombs_are_refused(client: Live) -> None:
+@pytest.mark.parametrize("path", ["/v1/surfaces", "/v1/surfaces/preview"])
+def test_zip_bombs_are_refused(client: Live, path: str) -> None:
     bomb = npz(vertices=np.zeros((2_000_000, 3)))
     assert len(bomb) < 1_000_000
-    answer = client.post("/v1/surfaces", params={"name": "bomb.npz"}, content=bomb)
+    answer = client.post(path, params={"name": "bomb.npz"}, content=bomb)
     assert (answer.status_code, answer.json()["type"]) == (422, "/problems/upload")
     assert "unpack" in answer.json()["detail"]
 
 
-def test_files_with_too_many_vertices_are_refused(client: Live) -> None:
+@pytest.mark.parametrize("path", ["/v1/surfaces", "/v1/surfaces/preview"])
+def test_files_with_too_many_vertices_are_refused(client: Live, path: str) -> None:
     large = tube(100, 60)
     data = npz(vertices=np.array(large["vertices"]), faces=np.array(large["faces"]))
-    answer = client.post("/v1/surfaces", files={"file": ("large.npz", data)})
+    answer = client.post(path, files={"file": ("large.npz", data)})
     assert (answer.status_code, answer.json()["type"]) == (422, "/problems/too-many-vertices")
 
 
@@ -172,3 +176,46 @@ def test_surface_that_a_job_asks_for_while_it_is_pruned_stays(tmp_path: Path) ->
     assert store.has_surface(surface)
     assert not store.use_surface("f" * 64)
     store.close()
+
+
+OPEN_DISK = {"vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "faces": [[0, 1, 2]]}
+
+
+@pytest.mark.parametrize(
+    ("surface", "pointer"),
+    [
+        (OPEN_DISK, ""),
+        (OPEN_DISK | {"faces": [[0, 1, 1.5]]}, "/faces/0/2"),
+        (
+            {
+                "nurbs": {
+                    "degree": [1, 1],
+                    "knots": [[0, 0, 1, 1], [0, 1, 0, 1]],
+                    "control_points": [[[0, 0, 0], [1, 0, 0]], [[0, 1, 0], [1, 1, 0]]],
+                }
+            },
+            "/nurbs/knots/1",
+        ),
+    ],
+)
+def test_pointers_lead_into_the_body_as_it_was_sent(
+    client: Live, surface: dict[str, object], pointer: str
+) -> None:
+    alone = client.post("/v1/surfaces", json=surface)
+    assert alone.status_code == 422
+    assert [error["pointer"] for error in alone.json()["errors"]] == [pointer]
+    inside = client.post("/v1/solve", json={"surface": surface}).json()
+    assert [error["pointer"] for error in inside["errors"]] == [f"/surface{pointer}"]
+    assert inside["type"] == alone.json()["type"]
+
+
+def test_of_a_file_the_whole_is_at_fault(client: Live) -> None:
+    data = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+    answer = client.post("/v1/surfaces", params={"name": "disk.obj"}, content=data)
+    assert answer.status_code == 422
+    assert [error["pointer"] for error in answer.json()["errors"]] == [""]
+
+
+def test_refusals_about_no_single_field_point_nowhere() -> None:
+    assert problem(RequestError("It cannot be."))["errors"] == []
+    assert problem(FormError("It cannot be."))["errors"] == []

@@ -112,7 +112,7 @@ def forget_job(server, name):
 
 def wait_for_job(server, name, token, give_up_at=None):
     """The Job once it has ended. Raises Refusal, or Superseded when the token is."""
-    silent = 0.0
+    heard = time.time()
     while True:
         token.check()
         if give_up_at is not None and time.time() > give_up_at:
@@ -121,8 +121,7 @@ def wait_for_job(server, name, token, give_up_at=None):
         try:
             job = call_json(server, "GET", "/v1/jobs/%s?wait=%r" % (name, HOLD), timeout=HOLD + QUICK)
         except Offline:
-            silent += 1.0
-            if silent > PATIENCE:
+            if time.time() - heard > PATIENCE:  # by the clock: a question may be left open for seconds
                 raise Refusal(
                     "The server at %s stopped answering while it worked. Start it again: it remembers its "
                     "jobs." % server
@@ -130,7 +129,7 @@ def wait_for_job(server, name, token, give_up_at=None):
             token.say("no answer, trying again")
             token.pause(1.0)
             continue
-        silent = 0.0
+        heard = time.time()
         if job["status"] in ("done", "failed", "cancelled"):
             return job
         token.say(progress_text(job))

@@ -11,6 +11,9 @@ from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.domain.interpolate import surface_weights
 from hexwrap_solver.domain.locate import find_places
 
+#: No domain reaches so far; larger coordinates would overflow on the way.
+BEYOND = 1e300
+
 
 @dataclass(frozen=True)
 class Lifted:
@@ -31,10 +34,10 @@ def lift(cmap: ConformalMap, places: Complexes) -> Lifted:
     meant. Never raises: what lies outside is told in ``inside``.
     """
     places = np.asarray(places, dtype=complex).ravel()
-    finite = np.isfinite(places)
+    known = (np.abs(places.real) <= BEYOND) & (np.abs(places.imag) <= BEYOND)  # NaN is not
     face = np.full(len(places), -1, dtype=np.int64)
     weights = np.zeros((len(places), 3))
-    face[finite], weights[finite] = find_places(cmap, places[finite])
+    face[known], weights[known] = find_places(cmap, places[known])
     inside = face >= 0
     on_surface = np.full((len(places), 3), np.nan)
     on_surface[inside] = surface_weights(cmap, face[inside], weights[inside])

@@ -17,6 +17,11 @@ CHUNK, MOST_PAIRS, COMPARED = 65536, 1 << 22, 1 << 18
 #: points that lie further apart than triangles meets too many of these.
 LARGEST_GROUP = 8
 
+#: A point further away than so many sizes of the mesh is moved straight towards it, to this distance, for the
+#: search. From there rays to the mesh differ from parallel ones by the inverse part of its size; much further
+#: away the digits that tell triangles apart are lost, and squares overflow in the end.
+FAR = 1e6
+
 #: Bits per coordinate of the Morton code that sorts the triangles.
 MORTON_BITS = 20
 #: Moves the bits of a coordinate three places apart: shift, then keep what these masks leave.
@@ -71,7 +76,30 @@ class TriangleTree:
         return cls(corners, KDTree(centroid), order, lows[::-1], highs[::-1])
 
     def nearest(self, points: Floats) -> Nearest:
-        """points: (k, 3)."""
+        """points: (k, 3), finite.
+
+        Of a point beyond FAR sizes of the mesh the nearest point is exact to 1/FAR of the mesh's size; a
+        distance that no number can hold is given as the largest number.
+        """
+        far, near = self._moved_near(points)
+        found = self._nearest_of_all(near)
+        gap = points[far] - np.einsum("kc,kcd->kd", found.barycentric[far], self.corners[found.face[far]])
+        found.distance[far] = _length(gap)
+        return found
+
+    def _moved_near(self, points: Floats) -> tuple[Ints, Floats]:
+        """Which points are too far away to search for them as they are, and all points, those moved."""
+        low, high = self.low[0][:, 0], self.high[0][:, 0]
+        middle, limit = (low + high) / 2, FAR * np.linalg.norm(high - low)
+        offset = points - middle
+        largest = np.abs(offset).max(axis=1)  # not the length, whose squares may overflow
+        far = np.flatnonzero(largest > limit)
+        direction = offset[far] / largest[far, None]
+        near = points.copy()
+        near[far] = middle + limit * direction / np.linalg.norm(direction, axis=1)[:, None]
+        return far, near
+
+    def _nearest_of_all(self, points: Floats) -> Nearest:
         face = np.zeros(len(points), dtype=np.int64)
         barycentric = np.zeros((len(points), 3))
         distance = np.zeros(len(points))
@@ -184,6 +212,14 @@ def _morton(points: Floats) -> Ints:
             spread = (spread | spread << shift) & mask
         code |= spread << axis
     return code
+
+
+def _length(gap: Floats) -> Floats:
+    """Lengths (k,) of (k, 3) however long, at most the largest number."""
+    largest = np.maximum(np.abs(gap).max(axis=1), np.finfo(float).tiny)
+    with np.errstate(over="ignore"):
+        length = largest * np.linalg.norm(gap / largest[:, None], axis=1)
+    return np.asarray(np.minimum(length, np.finfo(float).max))
 
 
 def _dot(a: Floats, b: Floats) -> Floats:

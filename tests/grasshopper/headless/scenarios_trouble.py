@@ -6,6 +6,7 @@ import json
 import os
 import shutil
 import signal
+import socket
 import stat
 import sys
 import tempfile
@@ -35,6 +36,19 @@ def server_down():
     pump(others, lambda: all(made.solved == 2 for made in others))
     for made in others:
         assert len(made.said("error")) == 1 and "stopped answering" in made.said("error")[0]
+
+
+def server_hangs():
+    """It takes questions and answers none of them."""
+    listener = socket.socket()
+    listener.bind(("127.0.0.1", 0))
+    listener.listen(50)
+    collect = Component("Collect").set(Job="http://127.0.0.1:%d/v1/jobs/x" % listener.getsockname()[1])
+    start = time.time()
+    settle(collect, 2)
+    assert time.time() - start < 12, time.time() - start
+    assert len(collect.said("error")) == 1 and "stopped answering" in collect.said("error")[0]
+    listener.close()
 
 
 def server_dies_in_mid_job():
@@ -153,6 +167,7 @@ def servers_are_started_through_dotnet():
 try:
     world.run([
         server_down,
+        server_hangs,
         server_dies_in_mid_job,
         tokens_are_handed_on,
         running_servers_are_found,

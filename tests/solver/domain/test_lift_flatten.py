@@ -81,3 +81,11 @@ def test_places_outside_are_told():
 @pytest.mark.parametrize("k", CONES)
 def test_places_at_any_distance_are_outside(k):
     assert not lift(CONES[k], np.array([1e30, 1e30j, -1e300, complex(0, np.inf)])).inside.any()
+
+
+@pytest.mark.parametrize("cmap", [CATENOID, *CONES.values()])
+def test_places_beyond_all_domains_are_outside(cmap):
+    largest = np.finfo(float).max
+    far = [complex(x, y) for x in (largest, 0, -1e301) for y in (largest, -largest, 1e155)]
+    up = lift(cmap, np.array([*far, cmap.uv[5]]))
+    assert up.inside.tolist() == [False] * len(far) + [True]

@@ -71,3 +71,40 @@ def test_the_result_does_not_depend_on_how_many_pairs_are_looked_at_together(mon
         parts = tree.nearest(points)
         np.testing.assert_array_equal(parts.face, whole.face)
         np.testing.assert_array_equal(parts.distance, whole.distance)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 10**6), st.floats(6.1, 307.5), st.sampled_from([1.0, 1e-3, 1e3]))
+def test_points_however_far_away_find_the_foremost_point_of_the_mesh(seed, exponent, size):
+    """Seen from infinity, the nearest point is the one that lies foremost in that direction."""
+    rng = np.random.default_rng(seed)
+    vertices = size * rng.normal(size=(30, 3))
+    faces = rng.integers(0, 30, (40, 3))
+    direction = rng.normal(size=(20, 3))
+    direction /= np.linalg.norm(direction, axis=1)[:, None]
+    far = direction * 10.0**exponent * max(size, 1)
+    points = np.concatenate([far, vertices[faces[:5, 0]]])  # ordinary points among them
+    found = TriangleTree.build(vertices, faces).nearest(points)
+    place = np.einsum("kc,kcd->kd", found.barycentric, vertices[faces[found.face]])
+    foremost = (direction @ vertices[np.unique(faces)].T).max(axis=1)
+    extent = np.linalg.norm(np.ptp(vertices, axis=0))
+    assert ((place[:20] * direction).sum(axis=1) > foremost - 2e-6 * extent).all()
+    distance = np.hypot(np.hypot(far[:, 0], far[:, 1]), far[:, 2]) - foremost
+    np.testing.assert_allclose(found.distance[:20], distance, rtol=1e-9)
+    np.testing.assert_allclose(found.distance[20:], 0, atol=1e-9 * size)
+
+
+def test_distances_beyond_all_numbers_are_the_largest_number():
+    vertices = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    tree = TriangleTree.build(vertices, np.array([[0, 1, 2]]))
+    largest = np.finfo(float).max
+    found = tree.nearest(np.array([[-largest] * 3, [largest, 0, 0], [5e-324] * 3]))
+    assert found.distance.tolist() == [largest, largest, pytest.approx(0, abs=1e-300)]
+    assert found.barycentric[0].tolist() == [1, 0, 0]
+    assert tree.nearest(np.zeros((0, 3))).face.tolist() == []
+
+
+def test_points_far_from_a_mesh_without_extent_are_measured():
+    tree = TriangleTree.build(np.ones((3, 3)), np.array([[0, 1, 2]]))
+    found = tree.nearest(np.array([[1.0, 1, 3], [1, 1, 1]]))
+    assert found.distance.tolist() == [2, 0]
