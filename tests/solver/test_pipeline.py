@@ -8,7 +8,8 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 from hexwrap_solver.arrays import Ragged
 from hexwrap_solver.conformal.types import BoundaryCondition
-from hexwrap_solver.panels.types import ComponentSettings, PanelSettings
+from hexwrap_solver.errors import HexwrapError
+from hexwrap_solver.panels.types import ComponentSettings, PanelSettings, Weights
 from hexwrap_solver.pattern.types import PatternSettings
 from hexwrap_solver.pipeline import PlainRunner, solve
 from hexwrap_solver.surface import surface_from_mesh
@@ -82,3 +83,60 @@ def test_stages_run_with_one_blas_thread_and_leave_the_callers_setting_alone():
         solve(take_in, BoundaryCondition(), None, None, Runner())
         assert threads() == before
     assert seen == [{1} if before else set()] * 3  # Accelerate on macOS has no threads to set
+
+
+def drawn_surface(random: np.random.Generator) -> SentMesh:
+    """A coarse tube, ring or funnel with noise, at a drawn scale and distance from the origin."""
+    around, rows = int(random.choice([3, 5, 8, 12])), int(random.choice([1, 2, 4]))
+    phi, s = (
+        x.ravel() for x in np.meshgrid(2 * np.pi * np.arange(around) / around, np.arange(rows + 1) / rows)
+    )
+    wide, tall = random.choice([[0, 2], [1, 0], [2, 3]])
+    points = np.stack([(1 + wide * s) * np.cos(phi), (1 + wide * s) * np.sin(phi), tall * s], axis=1)
+    points += random.choice([0, 0.05, 0.3]) * random.standard_normal(points.shape)
+    i, j = (x.ravel() for x in np.meshgrid(np.arange(around), np.arange(rows)))
+    a, b = j * around + i, j * around + (i + 1) % around
+    quads = np.stack([a, b, b + around, a + around], axis=1)
+    return SentMesh(
+        10.0 ** random.choice([-3, 0, 9]) * (points + random.choice([0.0, 1e3])), Ragged.from_table(quads)
+    )
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_whatever_is_asked_of_whatever_surface_is_done_or_refused(seed):
+    """No warning (an error here), no other exception, no overlap, no irregular whole panel."""
+    random = np.random.default_rng(seed)
+
+    def one_of(*options):
+        return options[random.integers(len(options))]
+
+    sent = drawn_surface(random)
+    quantum = one_of(None, np.pi / 3, np.pi / 2)
+    condition = BoundaryCondition(
+        one_of("straight", "isometric"), quantum=quantum, spread=one_of("even", "optimal")
+    )
+    pattern = PatternSettings(
+        kind=one_of("hex", "triangle", "quad"),
+        around=one_of(1, 3, 8, 17, 24),
+        rotation=one_of("edge", "vertex", 7.3),
+        align=one_of("none", "first", "both"),
+        boundary=one_of("whole", "trim"),
+        phase=(one_of(0.0, 0.3), one_of(0.0, -2.7)),
+    )
+    panels = PanelSettings(
+        mode=one_of("split", "split", "watertight"),
+        sizes=one_of(None, 1, 3),
+        target=one_of("shortest", "inscribed", "best"),
+        orientation=one_of("fit", "tangent"),
+        method=one_of("exact", "energy"),
+        weights=Weights(surface=one_of(0.0, 1.0)),
+    )
+    try:
+        found = solve(lambda: surface_from_mesh(sent), condition, pattern, panels, PlainRunner())
+    except HexwrapError:
+        return
+    if panels.mode == "split":
+        whole = found.panels.whole
+        assert found.quality.overlaps == 0
+        assert found.quality.planarity[whole].max(initial=0.0) < 1e-9
+        assert found.quality.edge_deviation[whole].max(initial=0.0) < 1e-9

@@ -76,7 +76,7 @@ class _Point:
 
     @property
     def residual(self) -> float:
-        return _largest(self.gradient)
+        return largest(self.gradient)
 
 
 def minimise(energy: Energy, start: Floats | None = None, progress: Progress = no_progress) -> Minimum:
@@ -88,7 +88,7 @@ def minimise(energy: Energy, start: Floats | None = None, progress: Progress = n
     """
     factorisation = Factorisation(energy.points, energy.rows, energy.columns)
     point = _Point.at(energy, np.zeros(energy.n_dof) if start is None else energy.unknowns_of(start))
-    tolerance = max(ROUNDING, np.finfo(float).eps * _largest(energy.target))
+    tolerance = max(ROUNDING, np.finfo(float).eps * largest(energy.target))
     iterations, factorisations, chord = 0, 0, False
     while point.residual > tolerance and iterations < MAX_STEPS:
         progress(
@@ -127,7 +127,8 @@ def _stays_broken(corners: Corners, iterations: int, settled: bool) -> bool:
     return count > 0 and (settled or (iterations >= PATIENCE and count > BROKEN))
 
 
-def _largest(gradient: Floats) -> float:
+def largest(gradient: Floats) -> float:
+    """Maximum norm, 0 of nothing."""
     return float(np.abs(gradient).max(initial=0.0))
 
 
@@ -178,7 +179,7 @@ def _line_search(energy: Energy, point: _Point, direction: Floats) -> tuple[_Poi
     """The first acceptable step and its length: φ'(t) at most a little above zero. Overshoots are cut by
     bisection guarded secants on φ'. None where no step is left."""
     slope = float(point.gradient @ direction)
-    t = min(1.0, MAX_CHANGE / max(_largest(direction), 1e-300))
+    t = min(1.0, MAX_CHANGE / max(largest(direction), 1e-300))
     for _ in range(MAX_TRIALS):
         trial = _Point.at(energy, point.x + t * direction)
         new_slope = float(trial.gradient @ direction)

@@ -16,6 +16,7 @@ from hexwrap_solver.domain.interpolate import surface_weights
 from hexwrap_solver.domain.lift import points_at
 from hexwrap_solver.domain.locate import barycentric
 from hexwrap_solver.errors import PatternError
+from hexwrap_solver.pattern.arrangement import Points
 from hexwrap_solver.pattern.cells import is_simple, largest_part, manifold_corners, only_whole_cells
 from hexwrap_solver.pattern.lattice import LATTICES, Lattice
 from hexwrap_solver.pattern.links import link_nodes
@@ -25,7 +26,7 @@ from hexwrap_solver.pattern.placement import Placement, anchor_vertex
 from hexwrap_solver.pattern.rings import places, rows_from, turns_around, winding
 from hexwrap_solver.pattern.rotation import with_rotation
 from hexwrap_solver.pattern.size import ASKED
-from hexwrap_solver.pattern.trim import Points, TooCoarse, Trimmed, trim
+from hexwrap_solver.pattern.trim import TooCoarse, Trimmed, trim
 from hexwrap_solver.pattern.types import Pattern, PatternSettings
 from hexwrap_solver.surface.normals import with_tangents
 from hexwrap_solver.surface.projection import project, start_parameters

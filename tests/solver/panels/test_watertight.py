@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hexwrap_solver.panels import fit_panels
+from hexwrap_solver.panels import fit, fit_panels
 from hexwrap_solver.panels.energy.cell_matrix import CellMatrix
 from hexwrap_solver.panels.energy.residuals import plane_distances, plane_slopes
 from hexwrap_solver.panels.energy.watertight import minimise_watertight
@@ -72,3 +72,11 @@ def test_flatness_is_not_bought_with_more_than_it_costs(make):
     _, curve = minimise_watertight(pattern, length, Weights(planarity=0.0), None)
     assert len(curve) > 1
     assert (np.diff(curve) < 0).all()
+
+
+def test_a_mesh_that_no_step_improves_is_told(monkeypatch):
+    pattern, cmap = hex_pattern(torus, 16, 4), grid_map(torus, 40, 24, -0.1, 1.2)
+    for curve, told in (([1.0, 1.0], True), ([1.0, 0.5, 0.4], False), ([0.0, 0.0], False)):
+        monkeypatch.setattr(fit, "minimise_watertight", lambda *_, c=curve: (pattern.vertices, np.array(c)))
+        notes = fit_panels(cmap, pattern, PanelSettings(mode="watertight")).notes
+        assert any("No step" in note for note in notes) == told

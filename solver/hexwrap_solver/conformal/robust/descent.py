@@ -22,6 +22,7 @@ from hexwrap_solver.conformal.newton import (
     ROUNDING,
     STAGNATION,
     chords_left,
+    largest,
 )
 from hexwrap_solver.conformal.robust.metric import Metric, angle_sums, edge_weights, measure_delaunay
 from hexwrap_solver.conformal.robust.mirror import MirrorMesh
@@ -91,7 +92,7 @@ class FlipEnergy:
     def change(self, direction: Floats) -> float:
         """The greatest change of u along an edge of the current triangulation."""
         u = self.plain.scale_of(direction)
-        return _largest(u[self.mesh.origin[::2]] - u[self.mesh.origin[1::2]])
+        return largest(u[self.mesh.origin[::2]] - u[self.mesh.origin[1::2]])
 
 
 class _Laplacian:
@@ -173,11 +174,11 @@ def descend(energy: FlipEnergy, start: Floats, span: float, progress: Progress) 
     """
     x = energy.plain.unknowns_of(start)
     metric, gradient = energy.at(x)
-    tolerance = max(ROUNDING, float(np.finfo(float).eps) * _largest(energy.plain.target))
+    tolerance = max(ROUNDING, float(np.finfo(float).eps) * largest(energy.plain.target))
     x, metric, gradient, _ = _relaxed(energy, x, metric, gradient)
     iterations, stalls, chord = 0, 0, False
-    while iterations < MAX_STEPS and _largest(gradient) > tolerance:
-        residual = _largest(gradient)
+    while iterations < MAX_STEPS and largest(gradient) > tolerance:
+        residual = largest(gradient)
         progress(
             min(0.9, iterations / 20), f"Newton step {iterations + 1} with flips, residual {residual:.1e}"
         )
@@ -190,7 +191,7 @@ def descend(energy: FlipEnergy, start: Floats, span: float, progress: Progress) 
             metric, gradient = energy.at(x)
             break
         iterations += 1
-        gain = _largest(step.gradient) / residual
+        gain = largest(step.gradient) / residual
         if gain < 1 or residual > ACCEPTED:
             x, metric, gradient = step.x, step.metric, step.gradient
         else:
@@ -200,16 +201,12 @@ def descend(energy: FlipEnergy, start: Floats, span: float, progress: Progress) 
             break  # nothing but rounding is left
         if np.ptp(x) > RUNAWAY * span:
             break  # no use to follow it further
-        chord = step.full and chords_left(_largest(gradient), gain, tolerance) <= CHORDS
-    return Descent(energy.plain.scale_of(x), metric, _largest(gradient), iterations, energy.flips)
+        chord = step.full and chords_left(largest(gradient), gain, tolerance) <= CHORDS
+    return Descent(energy.plain.scale_of(x), metric, largest(gradient), iterations, energy.flips)
 
 
 def _sums(index: Ints, weights: Floats, n: int) -> Floats:
     return np.bincount(index, weights=weights, minlength=n).astype(np.float64)
-
-
-def _largest(gradient: Floats) -> float:
-    return float(np.abs(gradient).max(initial=0.0))
 
 
 class _Step(NamedTuple):
@@ -225,8 +222,8 @@ def _chord(energy: FlipEnergy, x: Floats, gradient: Floats) -> _Step | None:
     """A step with the Hessian of an earlier one; None where that is not good enough."""
     x = x + energy.chord_direction(gradient)
     metric, new = energy.at(x)
-    residual = _largest(gradient)
-    enough = residual <= LAST_ROUNDINGS or _largest(new) <= CHORD_GAIN * residual
+    residual = largest(gradient)
+    enough = residual <= LAST_ROUNDINGS or largest(new) <= CHORD_GAIN * residual
     return _Step(x, metric, new, True) if enough else None
 
 
@@ -242,7 +239,7 @@ def _line_search(energy: FlipEnergy, x: Floats, direction: Floats, gradient: Flo
         trial = x + t * direction
         metric, new = energy.at(trial)
         new_slope = float(new @ direction)
-        if new_slope <= OVERSHOOT * abs(slope) or _largest(new) <= 0.5 * _largest(gradient):
+        if new_slope <= OVERSHOOT * abs(slope) or largest(new) <= 0.5 * largest(gradient):
             return _Step(trial, metric, new, t == 1.0)
         secant = low + (t - low) * low_slope / (low_slope - new_slope)
         t = min(max(secant, low + 0.1 * (t - low)), low + 0.7 * (t - low))

@@ -1,10 +1,10 @@
 """Residuals of the paper's functionals and their exact derivatives, dimensionless.
 
 For a polygon with corners v_k, target length ℓ_P and E = ½ Σ r²:
-    planarity   det(v_{k+1} − v_k, v_{k+2} − v_k, v_{k+3} − v_k) / ℓ_P³    volumes of successive tetrahedra
-    angles      α_k − (p−2)π/p
-    edges       ‖v_{k+1} − v_k‖ / ℓ_P − 1
-    surface     distance(v_k, reference surface) / ℓ_P
+    planarity   E_pl   det(v_{k+1} − v_k, v_{k+2} − v_k, v_{k+3} − v_k) / ℓ_P³   (tetrahedra)
+    angles      E_α    α_k − (p−2)π/p
+    edges       E_ℓ    ‖v_{k+1} − v_k‖ / ℓ_P − 1
+    surface            distance(v_k, reference surface) / ℓ_P
 Divided by ℓ_P, weights mean the same at every scale. All polygons of a call have the same number of corners.
 """
 
