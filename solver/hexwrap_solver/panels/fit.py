@@ -25,7 +25,7 @@ from hexwrap_solver.surface.types import Surface
 #: Corners of a whole cell of each kind.
 CORNERS = {"hex": 6, "quad": 4, "triangle": 3}
 
-#: A trimmed cell that would have to shrink below this fraction of itself gets no panel.
+#: A trimmed cell of whose size (root of the area) less than this fraction is left gets no panel.
 LEAST_TRIMMED = 0.05
 
 #: An edge shorter than this fraction of its panel's mean edge has collapsed.
@@ -115,7 +115,7 @@ def _fit_split(
         whole=pattern.whole[face],
         cell_area=fan_areas(cells)[face],
         energy=energy,
-        notes=notes + _joint_note(settings) + _dropped_note(int((~regular & ~cut).sum())),
+        notes=notes + _joint_note(settings) + _dropped_note(int((~regular & ~cut).sum()), settings.joint),
         spare_limit=spare and _merge(kept, spare[0][roomy], cut, mean_edges(shapes))[face],
         spare_center=spare and _merge(kept, spare[1][roomy], cut, shape_center)[face],
     )
@@ -242,11 +242,10 @@ def _trimmed(
 ) -> tuple[Ragged, Floats, Bools]:
     """Flat polygons for the chosen cells, their centres, and which cells (of all) keep a panel."""
     shapes, at = take_rows(cells, np.flatnonzero(chosen))
-    inner = edges.twin[at] >= 0
-    flat, center, factor = flatten_and_clear(
-        shapes, normal[chosen], planes.direction[at], planes.offset[at], inner
+    flat, center, size = flatten_and_clear(
+        shapes, normal[chosen], planes.direction[at], planes.offset[at], edges.across[at]
     )
-    enough = factor >= LEAST_TRIMMED
+    enough = size >= LEAST_TRIMMED
     kept = np.zeros(len(chosen), dtype=bool)
     kept[np.flatnonzero(chosen)[enough]] = True
     return take_rows(flat, np.flatnonzero(enough))[0], center[enough], kept
@@ -267,7 +266,11 @@ def _merge(first: Bools, a: Floats, second: Bools, b: Floats) -> Floats:
     return merged
 
 
-def _dropped_note(dropped: int) -> tuple[str, ...]:
+def _dropped_note(dropped: int, joint: float) -> tuple[str, ...]:
     if not dropped:
         return ()
-    return (f"{dropped} trimmed cells at the boundary are too thin to carry a panel and were left open.",)
+    beside = f"joints of {joint:g}" if joint > 0 else "their neighbours"
+    return (
+        f"{dropped} trimmed cells at the boundary have no room for a flat panel beside {beside} and were"
+        " left open.",
+    )
