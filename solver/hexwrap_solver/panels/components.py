@@ -7,7 +7,8 @@ import shapely
 
 from hexwrap_solver.arrays import Floats, Ints, Ragged
 from hexwrap_solver.errors import PanelsError
-from hexwrap_solver.panels.polygons import edge_vectors, interior_angles, row_maxima, row_minima
+from hexwrap_solver.panels.planar import in_planes, outlines, plane_axes
+from hexwrap_solver.panels.polygons import edge_vectors, interior_angles, row_maxima, row_minima, take_rows
 from hexwrap_solver.panels.types import Components, ComponentSettings, Panels
 
 #: Interior angles above this are reflex; a straight corner's is π to rounding.
@@ -63,8 +64,9 @@ def _inset(panels: Panels, inset: float) -> Ragged:
 
 def _in_plane(panels: Panels, which: Ints) -> shapely.Geometry:
     """(k,) the given panels as polygons in their own planes, about their centres, without self-crossings."""
-    corners = [(panels.polygons[i] - panels.center[i]) @ _axes(panels.normal[i]).T for i in which]
-    return shapely.make_valid(np.array([shapely.Polygon(corner) for corner in corners], dtype=object))
+    some, _ = take_rows(panels.polygons, which)
+    corner = in_planes(some, panels.center[which], plane_axes(panels.normal[which]))
+    return shapely.make_valid(outlines(corner, some.row)) if len(which) else np.zeros(0, dtype=object)
 
 
 def _room(flat: shapely.Geometry, inset: float) -> Floats:
@@ -87,22 +89,14 @@ def _moved(flat: shapely.Geometry, width: Floats | float) -> shapely.Geometry:
 def _offset(panels: Panels, which: Ints, flat: shapely.Geometry, width: Floats) -> list[Floats]:
     """Corners in space of the outlines moved inwards; of those that fall apart the largest piece."""
     rows = []
-    for i, shape in zip(which, _moved(flat, width), strict=True):
+    axes = plane_axes(panels.normal[which])
+    for i, shape, plane in zip(which, _moved(flat, width), axes, strict=True):
         piece = max(shapely.get_parts(shape), key=shapely.area)
         ring = shapely.get_exterior_ring(piece)
         corners = shapely.get_coordinates(ring)[:-1]
         corners = corners if shapely.is_ccw(ring) else corners[::-1]
-        rows.append(panels.center[i] + corners @ _axes(panels.normal[i]))
+        rows.append(panels.center[i] + corners @ plane)
     return rows
-
-
-def _axes(normal: Floats) -> Floats:
-    """(2, 3) right-handed in the plane."""
-    least = np.zeros(3)
-    least[np.abs(normal).argmin()] = 1.0
-    x = np.cross(normal, least)
-    x /= np.linalg.norm(x)
-    return np.stack([x, np.cross(normal, x)])
 
 
 def _with_rows(table: Ragged, rows: Ints, found: list[Floats]) -> Ragged:

@@ -13,7 +13,8 @@ from hexwrap_solver.panels import limits
 from hexwrap_solver.panels.best import jointly_largest
 from hexwrap_solver.panels.energy import minimise_watertight
 from hexwrap_solver.panels.halfedges import HalfEdges, half_edges
-from hexwrap_solver.panels.polygons import edge_lengths, fan_areas, mean_edges, means, row_minima
+from hexwrap_solver.panels.planar import crossing_themselves
+from hexwrap_solver.panels.polygons import edge_lengths, fan_areas, mean_edges, means, row_minima, take_rows
 from hexwrap_solver.panels.poses import fit_poses, target_lengths
 from hexwrap_solver.panels.regular import Poses
 from hexwrap_solver.panels.separation import Separation, separating_planes
@@ -27,6 +28,9 @@ CORNERS = {"hex": 6, "quad": 4, "triangle": 3}
 
 #: A trimmed cell of whose size (root of the area) less than this fraction is left gets no panel.
 LEAST_TRIMMED = 0.05
+
+#: Corners farther from the surface than this fraction of the mean edge are worth a note.
+FAR = 0.1
 
 #: An edge shorter than this fraction of its panel's mean edge has collapsed.
 LEAST_EDGE = 0.01
@@ -129,19 +133,25 @@ def _fit_watertight(
     tree = surface.tree if settings.weights.surface > 0 else None
     moved, energy = minimise_watertight(pattern, target, settings.weights, tree, progress)
     shapes = Ragged(moved[pattern.faces.values.astype(np.int64)], pattern.faces.offsets)
+    center, normal = means(shapes), plane_normals(shapes)
+    notes = (
+        *collapsed_note(shapes),
+        *_crossing_note(crossing_themselves(shapes, center, normal)),
+        *_far_note(surface.tree.nearest(moved).distance / mean_edges(shapes).mean()),
+    )
     return FittedPanels(
         mode="watertight",
         face=np.arange(pattern.n_cells),
         regular=np.zeros(pattern.n_cells, dtype=bool),
         spokes=np.zeros((0, CORNERS[pattern.kind], 3)),
         shapes=shapes,
-        center=means(shapes),
-        normal=plane_normals(shapes),
+        center=center,
+        normal=normal,
         limit=mean_edges(shapes),
         whole=pattern.whole,
         cell_area=fan_areas(_corner_points(pattern)),
         energy=energy,
-        notes=WATERTIGHT_NOTES + collapsed_note(shapes),
+        notes=WATERTIGHT_NOTES + notes,
     )
 
 
@@ -155,6 +165,27 @@ def collapsed_note(shapes: Ragged) -> tuple[str, ...]:
     return (
         f"Watertight panels with an edge shorter than {LEAST_EDGE:.0%} of their mean edge: {count}; flatness"
         " took a corner away there: give planarity less weight, or angle and edge more, or ask for split.",
+    )
+
+
+def _crossing_note(crossing: Bools) -> tuple[str, ...]:
+    count = int(crossing.sum())
+    if not count:
+        return ()
+    return (
+        f"Watertight panels whose outline crosses itself: {count}; ask for quads with little weight on"
+        " surface, which seldom do, or for split panels, which cannot.",
+    )
+
+
+def _far_note(away: Floats) -> tuple[str, ...]:
+    """away: (p,) distances of the corners from the surface / mean edge."""
+    if away.max(initial=0.0) <= FAR:
+        return ()
+    return (
+        f"Watertight panels leave the surface by up to {away.max():.0%} of their mean edge,"
+        f" {away.mean():.0%} on average; a weight of 100 on surface holds them nearer, at the cost of less"
+        " even shapes, and split panels stay beside it.",
     )
 
 
@@ -249,14 +280,6 @@ def _trimmed(
     kept = np.zeros(len(chosen), dtype=bool)
     kept[np.flatnonzero(chosen)[enough]] = True
     return take_rows(flat, np.flatnonzero(enough))[0], center[enough], kept
-
-
-def take_rows(table: Ragged, rows: Ints) -> tuple[Ragged, Ints]:
-    """The given rows, and the positions of their values in the table."""
-    count = table.lengths[rows]
-    offsets = np.concatenate([[0], np.cumsum(count)]).astype(np.int64)
-    at = np.arange(offsets[-1]) + np.repeat(table.offsets[rows] - offsets[:-1], count)
-    return Ragged(table.values[at], offsets), at
 
 
 def _merge(first: Bools, a: Floats, second: Bools, b: Floats) -> Floats:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged
+from hexwrap_solver.panels.planar import in_planes, plane_axes
 from hexwrap_solver.panels.polygons import area_vectors, means, row_maxima, row_sums
 
 #: Lines that meet under an angle with a smaller sine do not fix a corner.
@@ -81,12 +82,8 @@ class _Outlines:
         cls, polygons: Ragged, normal: Floats, direction: Floats, offset: Floats, across: Ints
     ) -> _Outlines:
         row, origin = polygons.row, means(polygons)
-        least = np.zeros_like(normal)
-        least[np.arange(len(normal)), np.abs(normal).argmin(axis=1)] = 1.0
-        x = np.cross(normal, least)
-        x /= np.linalg.norm(x, axis=1)[:, None]
-        axes = np.stack([x, np.cross(normal, x)], axis=1)
-        corner = np.einsum("hed,hd->he", axes[row], polygons.values - origin[row])
+        axes = plane_axes(normal)
+        corner = in_planes(polygons, origin, axes)
         side = np.einsum("hed,hd->he", axes[row], direction)
         length = np.maximum(np.linalg.norm(side, axis=1), ROUNDING)
         reach = (offset - np.einsum("hd,hd->h", direction, origin[row])) / length
