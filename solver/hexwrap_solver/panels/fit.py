@@ -32,6 +32,9 @@ LEAST_TRIMMED = 0.05
 #: Corners farther from the surface than this fraction of the mean edge are worth a note.
 FAR = 0.1
 
+#: Weight of the surface that halves such distances, with few panels that collapse or cross themselves.
+HOLD = 50.0
+
 #: An edge shorter than this fraction of its panel's mean edge has collapsed.
 LEAST_EDGE = 0.01
 
@@ -137,7 +140,9 @@ def _fit_watertight(
     notes = (
         *collapsed_note(shapes),
         *_crossing_note(crossing_themselves(shapes, center, normal)),
-        *_far_note(surface.tree.nearest(moved).distance / mean_edges(shapes).mean()),
+        *_far_note(
+            surface.tree.nearest(moved).distance / mean_edges(shapes).mean(), settings.weights.surface
+        ),
     )
     return FittedPanels(
         mode="watertight",
@@ -178,14 +183,14 @@ def _crossing_note(crossing: Bools) -> tuple[str, ...]:
     )
 
 
-def _far_note(away: Floats) -> tuple[str, ...]:
-    """away: (p,) distances of the corners from the surface / mean edge."""
+def _far_note(away: Floats, weight: float) -> tuple[str, ...]:
+    """away: (p,) distances of the corners from the surface / mean edge; weight: of surface."""
     if away.max(initial=0.0) <= FAR:
         return ()
+    nearer = f"a weight of {HOLD:g} on surface holds them nearer, at the cost of less even shapes, and "
     return (
         f"Watertight panels leave the surface by up to {away.max():.0%} of their mean edge,"
-        f" {away.mean():.0%} on average; a weight of 100 on surface holds them nearer, at the cost of less"
-        " even shapes, and split panels stay beside it.",
+        f" {away.mean():.0%} on average; {nearer if weight < HOLD else ''}split panels stay beside it.",
     )
 
 
