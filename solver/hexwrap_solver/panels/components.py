@@ -7,8 +7,15 @@ import shapely
 
 from hexwrap_solver.arrays import Floats, Ints, Ragged
 from hexwrap_solver.errors import PanelsError
-from hexwrap_solver.panels.planar import in_planes, outlines, plane_axes
-from hexwrap_solver.panels.polygons import edge_vectors, interior_angles, row_maxima, row_minima, take_rows
+from hexwrap_solver.panels.planar import cross, in_planes, outlines, plane_axes
+from hexwrap_solver.panels.polygons import (
+    edge_vectors,
+    interior_angles,
+    means,
+    row_maxima,
+    row_minima,
+    take_rows,
+)
 from hexwrap_solver.panels.types import Components, ComponentSettings, Panels
 
 #: Interior angles above this are reflex; a straight corner's is π to rounding.
@@ -134,16 +141,51 @@ def _solids(outline: Ragged, normal: Floats, thickness: float) -> tuple[Ragged, 
     sides = np.stack([local, following, following + n, local, following + n, local + n], axis=1).reshape(
         -1, 2, 3
     )
-    apex = _fan_corner(outline, normal)[outline.row]
-    inner = (local != apex) & (following != apex)
-    lower = np.stack([apex, following, local], axis=1)[inner]
-    upper = np.stack([apex + n, local + n, following + n], axis=1)[inner]
-    row = outline.row
-    owner = np.concatenate([np.repeat(row, 2), row[inner], row[inner]])
+    corners = _triangles(outline, normal)
+    row, inner = outline.row, np.repeat(np.arange(outline.n_rows), count - 2)
+    lower, upper = corners[:, ::-1], corners + count[inner][:, None]
+    owner = np.concatenate([np.repeat(row, 2), inner, inner])
     triangles = np.concatenate([sides.reshape(-1, 3), lower, upper])
     order = np.argsort(owner, kind="stable")
     face_offsets = np.concatenate([[0], np.cumsum(3 * (4 * count - 4))]).astype(np.int64)
     return Ragged(vertices, 2 * offsets), Ragged(triangles[order].ravel(), face_offsets)
+
+
+def _triangles(outline: Ragged, normal: Floats) -> Ints:
+    """(·, 3) each outline cut into n − 2 triangles, row by row, by numbers of its corners.
+
+    Fans from the corner with the greatest interior angle; outlines with several reflex corners, which no fan
+    may fill, by clipping ears (Meisters 1975).
+    """
+    row = outline.row
+    local = np.arange(len(row)) - outline.offsets[:-1][row]
+    following = np.where(local + 1 < outline.lengths[row], local + 1, 0)
+    apex = _fan_corner(outline, normal)[row]
+    inner = (local != apex) & (following != apex)
+    triangles = np.stack([apex, local, following], axis=1)[inner]
+    corner = in_planes(outline, means(outline), plane_axes(normal))
+    a, b, c = np.moveaxis(corner[outline.offsets[:-1][row[inner]][:, None] + triangles], 1, 0)
+    for i in np.unique(row[inner][cross(b - a, c - a) < 0]):
+        triangles[row[inner] == i] = _ears(corner[outline.offsets[i] : outline.offsets[i + 1]])
+    return np.asarray(triangles)
+
+
+def _ears(corner: Floats) -> Ints:
+    """(n − 2, 3) a polygon's corners (n, 2) cut into triangles, counter-clockwise."""
+    left, triangles = np.arange(len(corner)), []
+    while len(left) > 2:
+        a, b, c = corner[np.roll(left, 1)], corner[left], corner[np.roll(left, -1)]
+        bulge = cross(b - a, c - a)
+        covered = np.ones((len(left), len(left)), dtype=bool)
+        for p, q in ((a, b), (b, c), (c, a)):
+            covered &= cross((q - p)[:, None], corner[left] - p[:, None]) >= 0
+        own = np.eye(len(left), dtype=bool)
+        covered &= ~(own | np.roll(own, 1, axis=1) | np.roll(own, -1, axis=1))
+        # Where rounding leaves no ear, whatever bulges most.
+        k = int(np.argmax(np.where(covered.any(axis=1) | (bulge <= 0), -np.inf, bulge)))
+        triangles.append([left[k - 1], left[k], left[(k + 1) % len(left)]])
+        left = np.delete(left, k)
+    return np.array(triangles)
 
 
 def _fan_corner(outline: Ragged, normal: Floats) -> Ints:

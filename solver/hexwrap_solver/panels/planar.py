@@ -34,3 +34,8 @@ def crossing_themselves(polygons: Ragged, center: Floats, normal: Floats) -> Boo
         return np.zeros(0, dtype=bool)
     corner = in_planes(polygons, center, plane_axes(normal))
     return np.asarray(~shapely.is_valid(outlines(corner, polygons.row)))
+
+
+def cross(a: Floats, b: Floats) -> Floats:
+    """Of vectors (…, 2): positive where b lies to the left of a."""
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged
-from hexwrap_solver.panels.planar import in_planes, plane_axes
+from hexwrap_solver.panels.planar import cross, in_planes, plane_axes
 from hexwrap_solver.panels.polygons import area_vectors, means, row_maxima, row_sums
 
 #: Lines that meet under an angle with a smaller sine do not fix a corner.
@@ -106,7 +106,7 @@ class _Outlines:
     def areas(self) -> Floats:
         """(q,) signed."""
         a, b = self.corner, self.corner[self.next]
-        return row_sums(_cross(a, b) / 2, self.offsets)
+        return row_sums(cross(a, b) / 2, self.offsets)
 
     def sizes(self) -> Floats:
         """(q,) greatest distance of a corner from the origin."""
@@ -129,7 +129,7 @@ def _mitred(flat: _Outlines) -> _Outlines:
         flat.reach[k] - np.einsum("hd,hd->h", flat.side[k], flat.corner)
         for k in (before, np.arange(len(flat.row)))
     )
-    sine = _cross(u, v)
+    sine = cross(u, v)
     rim = (flat.across < 0) & (flat.across[before] < 0)
     sharp = (np.abs(sine) > SHALLOW) & ~rim
     meeting = (excess_v[:, None] * _turned(u) - excess_u[:, None] * _turned(v)) / np.where(sharp, sine, 1.0)[
@@ -160,7 +160,7 @@ def _wedges(flat: _Outlines) -> tuple[Ints, Bools]:
     several: edges to the same neighbour with a reflex corner between each and the next."""
     before = flat.after(-1)
     joins = (flat.across >= 0) & (flat.across == flat.across[before])
-    joins &= _cross(flat.side[before], flat.side) < 0
+    joins &= cross(flat.side[before], flat.side) < 0
     begun = np.cumsum(~joins)
     begun = begun - np.concatenate([[0], begun])[flat.offsets[:-1]][flat.row]
     runs = row_maxima(begun, flat.offsets)[flat.row]
@@ -197,8 +197,8 @@ def _clipped(flat: _Outlines, binding: Bools) -> _Outlines:
             for inside, way in ((first[0], 1), (last[0], -1))
         )
         rank, run = first[1], first[1] + last[1] - 1
-        lost_at_a = np.abs(_cross(b - a, corner[last[0]] - a))
-        lost_at_b = np.abs(_cross(b - a, corner[first[0]] - a))
+        lost_at_a = np.abs(cross(b - a, corner[last[0]] - a))
+        lost_at_b = np.abs(cross(b - a, corner[first[0]] - a))
         even = np.where(run > 1, (rank - 1) / np.maximum(run - 1, 1), lost_at_a > lost_at_b)
         # The edge on the line takes nearly all of it, where both its ends are here.
         place = (line[at] - first[0]) % count[flat.row[at]]
@@ -257,10 +257,6 @@ def _enters(flat: _Outlines, wedge: Ints, multiple: Bools) -> Bools:
 def _any(values: Bools, offsets: Ints) -> Bools:
     """(q,) whether any value of each row is true; no row may be empty."""
     return np.asarray(np.logical_or.reduceat(values, offsets[:-1])) if len(offsets) > 1 else values[:0]
-
-
-def _cross(a: Floats, b: Floats) -> Floats:
-    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
 
 
 def _turned(a: Floats) -> Floats:

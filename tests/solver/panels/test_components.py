@@ -6,7 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import shapely
 
+from hexwrap_solver.arrays import Ragged
 from hexwrap_solver.errors import PanelsError
 from hexwrap_solver.panels import make_components, rationalize
 from hexwrap_solver.panels.polygons import area_vectors, interior_angles, row_maxima
@@ -98,6 +100,28 @@ def test_insets_too_wide_for_concave_panels_name_the_room():
     watertight = concave_panels()
     with pytest.raises(PanelsError, match="the smallest has room for 0"):
         make_components(watertight, ComponentSettings(inset=float(watertight.edge_length.max())))
+
+
+def test_covers_of_solids_fill_the_outline_once_however_many_corners_are_reflex(panels):
+    """A comb, of which no fan of triangles covers all."""
+    comb = [(0, 0), (7, 0), (7, 4), (6, 1), (5, 4), (4, 1), (3, 4), (2, 1), (1, 4)]
+    points = np.array([[x, y, 0.0] for x, y in comb])
+    one = replace(
+        panels,
+        polygons=Ragged.from_table(points[None]),
+        center=points.mean(axis=0)[None],
+        normal=np.array([[0.0, 0, 1]]),
+    )
+    made = make_components(one, ComponentSettings(thickness=0.5))
+    faces = made.solid_faces[0].reshape(-1, 3)
+    cover = points[:, :2][faces[(faces < len(comb)).all(axis=1)]]
+    size = [shapely.Polygon(triangle).area for triangle in cover]
+    whole = shapely.Polygon(comb)
+    assert len(cover) == len(comb) - 2
+    assert sum(size) == pytest.approx(whole.area)
+    assert shapely.union_all([shapely.Polygon(triangle) for triangle in cover]).area == pytest.approx(
+        whole.area
+    )
 
 
 def concave_panels():
