@@ -21,7 +21,7 @@ from hexwrap_server.carrying import flatten_curves, lift_curves
 from hexwrap_server.curves import READERS, read_curves, write_curves
 from hexwrap_server.curves import WRITERS as CURVE_WRITERS
 from hexwrap_server.demo import ALL, DemoError, run_demo
-from hexwrap_server.files import WRITERS, Meta, write
+from hexwrap_server.files import WRITERS, Meta, check_wanted, write
 from hexwrap_server.files.text import length
 from hexwrap_server.finished import map_in_result
 from hexwrap_server.local import Task, UsageError, only_map, solve_here, task
@@ -157,6 +157,8 @@ def _solve(asked: argparse.Namespace) -> int:
             f"--sheet {asked.sheet[0]:g} {asked.sheet[1]:g}: both sides must be finite and greater than 0."
         )
     todo = task(asked.input, asked)
+    for kind in kinds.values():
+        check_wanted(kind, todo.wanted)
     solution, timings = solve_with_progress(todo, asked.quiet)
     meta = Meta(todo.name or "hexwrap", timings, tuple(asked.sheet) if asked.sheet else None)
     console = Console(quiet=asked.quiet, soft_wrap=True)

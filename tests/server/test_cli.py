@@ -213,3 +213,23 @@ def test_a_file_of_a_stage_that_was_left_out_is_status_1(
     status, told = refusal(arguments, capsys)
     assert status == 1
     assert '"panels": null' in told
+
+
+@pytest.mark.parametrize(
+    ("option", "words"), [("--panels", '"panels": null'), ("--pattern", '"pattern": null')]
+)
+def test_a_file_that_cannot_come_of_the_request_is_refused_before_the_work(
+    tube: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    option: str,
+    words: str,
+) -> None:
+    monkeypatch.setattr(
+        "hexwrap_server.cli.solve_with_progress", lambda *_: pytest.fail("solved all the same")
+    )
+    arguments = ["solve", str(tube), "-q", "-o", str(tmp_path / "x.json"), "-o", str(tmp_path / "x.png")]
+    status, told = refusal([*arguments, option, "none"], capsys)
+    assert status == 1
+    assert f"panels.png shows panels, but the request has {words}" in told

@@ -9,12 +9,13 @@ from hexwrap_server.files.domain_dxf import domain_dxf
 from hexwrap_server.files.domain_svg import domain_svg
 from hexwrap_server.files.dxf import panels_dxf
 from hexwrap_server.files.flat import flat_dxf
-from hexwrap_server.files.meta import Meta, NotMadeError, SheetError
+from hexwrap_server.files.meta import Meta, NotMadeError, SheetError, check_stages
 from hexwrap_server.files.obj import panels_obj
 from hexwrap_server.files.picture import panels_png
 from hexwrap_server.files.result import result_json
 from hexwrap_server.files.rhino import panels_3dm
 from hexwrap_server.files.table import panels_csv
+from hexwrap_server.requests import Wanted
 from hexwrap_solver.pipeline import Solution
 
 #: File name → writer; the names of the contract's ``/files/{name}``.
@@ -31,10 +32,19 @@ WRITERS: dict[str, Callable[[Solution, Meta], bytes]] = {
     "result.npz": result_npz,
 }
 
+#: Files that do without panels.
+WITHOUT_PANELS = {"domain.svg", "domain.dxf", "result.json", "result.npz"}
+
 
 def write(name: str, solution: Solution, meta: Meta) -> bytes:
     """The file of that name. Raises KeyError for an unknown name, HexwrapError where it cannot be made."""
     return WRITERS[name](solution, meta)
 
 
-__all__ = ["WRITERS", "Meta", "NotMadeError", "SheetError", "write"]
+def check_wanted(name: str, wanted: Wanted) -> None:
+    """Before the work, whether it will lead to that file. Raises NotMadeError."""
+    if name not in WITHOUT_PANELS:
+        check_stages(name, pattern=wanted.pattern is not None, panels=wanted.panels is not None)
+
+
+__all__ = ["WRITERS", "Meta", "NotMadeError", "SheetError", "check_wanted", "write"]

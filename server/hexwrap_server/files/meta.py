@@ -41,15 +41,9 @@ class SheetError(HexwrapError):
 
 def panels_of(solution: Solution, name: str) -> tuple[Pattern, Panels]:
     """The pattern and its panels. Raises NotMadeError where the request stopped before them, or none fit."""
-    if solution.pattern is None:
-        raise NotMadeError(
-            f'{name} shows panels, but the request has "pattern": null; ask for a pattern and panels.',
-            field=("pattern",),
-        )
-    if solution.panels is None:
-        raise NotMadeError(
-            f'{name} shows panels, but the request has "panels": null; ask for panels.', field=("panels",)
-        )
+    check_stages(name, pattern=solution.pattern is not None, panels=solution.panels is not None)
+    assert solution.pattern is not None
+    assert solution.panels is not None
     if solution.panels.n_panels == 0:
         raise NotMadeError(
             f"{name} shows panels, but no cell of the pattern became one "
@@ -57,3 +51,16 @@ def panels_of(solution: Solution, name: str) -> tuple[Pattern, Panels]:
             field=("pattern",),
         )
     return solution.pattern, solution.panels
+
+
+def check_stages(name: str, *, pattern: bool, panels: bool) -> None:
+    """Raises NotMadeError where a stage that the file shows was not asked for."""
+    if not pattern:
+        raise NotMadeError(
+            f'{name} shows panels, but the request has "pattern": null; ask for a pattern and panels.',
+            field=("pattern",),
+        )
+    if not panels:
+        raise NotMadeError(
+            f'{name} shows panels, but the request has "panels": null; ask for panels.', field=("panels",)
+        )

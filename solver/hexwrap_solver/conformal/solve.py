@@ -21,6 +21,11 @@ from hexwrap_solver.surface.types import Surface
 #: Angle sums this near to their targets make u a start for the search with flips, radians.
 CLOSE = 0.5
 
+NO_ANGLES = (
+    "The boundary's mode is angles, but its list of angles is empty: every boundary angle is 180°, as with"
+    " straight."
+)
+
 
 def conformal_map(
     surface: Surface, condition: BoundaryCondition, progress: Progress = no_progress
@@ -34,9 +39,13 @@ def conformal_map(
     if condition.mode == "isometric":
         return _isometric(surface, condition, progress)
     targets = boundary.straight(surface)
+    notes: tuple[str, ...] = ()
     if condition.mode == "angles":
         targets = boundary.prescribed(surface, boundary_angles(surface, condition))
+        if condition.angles is None or not len(condition.angles):
+            notes = (NO_ANGLES,)
     found = _map(surface, targets, None, progress)
+    found = replace(found, notes=(*notes, *found.notes))
     return _scaled(found, -_mean_on_area(found.surface, found.log_scale))
 
 

@@ -3,11 +3,26 @@
 from __future__ import annotations
 
 import numpy as np
+import shapely
 
 from hexwrap_solver.arrays import Floats, Ints, Ragged
 from hexwrap_solver.errors import PanelsError
-from hexwrap_solver.panels.polygons import edge_vectors, interior_angles, row_minima
+from hexwrap_solver.panels.planar import cross, in_planes, outlines, plane_axes
+from hexwrap_solver.panels.polygons import (
+    edge_vectors,
+    interior_angles,
+    means,
+    row_maxima,
+    row_minima,
+    take_rows,
+)
 from hexwrap_solver.panels.types import Components, ComponentSettings, Panels
+
+#: Interior angles above this are reflex; a straight corner's is π to rounding.
+REFLEX = np.pi + 1e-6
+
+#: Halvings of the inset to find what room a panel too narrow for it has.
+HALVINGS = 20
 
 
 def make_components(panels: Panels, settings: ComponentSettings) -> Components:
@@ -15,7 +30,7 @@ def make_components(panels: Panels, settings: ComponentSettings) -> Components:
 
     Trimmed panels too thin for the inset get half of what they have room for.
     """
-    outline = _inset(panels, settings.inset)
+    outline = _inset(panels, settings.inset) if settings.inset > 0 else panels.polygons
     z_axis = panels.normal
     first = edge_vectors(panels.polygons)[panels.polygons.offsets[:-1]]
     x_axis = first - np.einsum("qd,qd->q", first, z_axis)[:, None] * z_axis
@@ -34,28 +49,80 @@ def _inset(panels: Panels, inset: float) -> Ragged:
     before = np.zeros_like(inward)
     before[polygons.next()] = inward
     room = row_minima(np.einsum("hd,hd->h", panels.center[row] - points, inward), polygons.offsets)
+    concave = np.flatnonzero(row_maxima(interior_angles(polygons, panels.normal), polygons.offsets) > REFLEX)
+    flat = _in_plane(panels, concave)
+    room[concave] = _room(flat, inset)  # the centre may lie behind edges
     thin = room <= inset
     _require_room(panels, thin, inset, room)
-    width = np.where(thin, np.maximum(room, 0.0) / 2, inset)[row, None]
+    width = np.where(thin, np.maximum(room, 0.0) / 2, inset)
     # The mitred corner lies at distance ``width`` from both edges' lines: the bisector, scaled.
     bend = 1 + np.einsum("hd,hd->h", before, inward)[:, None]
-    moved = points + width * (before + inward) / np.maximum(bend, 1e-9)
+    moved = points + width[row, None] * (before + inward) / np.maximum(bend, 1e-9)
     folded = row_minima(
         np.einsum("hd,hd->h", moved[polygons.next()] - moved, edge_vectors(polygons)), polygons.offsets
     )
     # Where a short edge would turn round, the outline shrinks about the centre instead.
-    factor = 1 - width / np.where(room > 0, room, np.inf)[row, None]
+    factor = 1 - (width / np.where(room > 0, room, np.inf))[row, None]
     center = panels.center[row]
     shrunk = center + factor * (points - center)
-    return Ragged(np.where((folded > 0)[row, None], moved, shrunk), polygons.offsets)
+    outline = Ragged(np.where((folded > 0)[row, None], moved, shrunk), polygons.offsets)
+    return _with_rows(outline, concave, _offset(panels, concave, flat, width[concave]))
+
+
+def _in_plane(panels: Panels, which: Ints) -> shapely.Geometry:
+    """(k,) the given panels as polygons in their own planes, about their centres, without self-crossings."""
+    some, _ = take_rows(panels.polygons, which)
+    corner = in_planes(some, panels.center[which], plane_axes(panels.normal[which]))
+    return shapely.make_valid(outlines(corner, some.row)) if len(which) else np.zeros(0, dtype=object)
+
+
+def _room(flat: shapely.Geometry, inset: float) -> Floats:
+    """(k,) how far the outlines can be moved inwards until nothing is left; ∞ where more than ``inset``."""
+    room = np.where(shapely.is_empty(_moved(flat, inset)), 0.0, np.inf)
+    few = np.flatnonzero(room == 0)
+    low, high = np.zeros(len(few)), np.full(len(few), inset)
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        nothing = shapely.is_empty(_moved(flat[few], middle))
+        low, high = np.where(nothing, low, middle), np.where(nothing, middle, high)
+    room[few] = low
+    return room
+
+
+def _moved(flat: shapely.Geometry, width: Floats | float) -> shapely.Geometry:
+    return shapely.buffer(flat, -width, join_style="mitre")
+
+
+def _offset(panels: Panels, which: Ints, flat: shapely.Geometry, width: Floats) -> list[Floats]:
+    """Corners in space of the outlines moved inwards; of those that fall apart the largest piece."""
+    rows = []
+    axes = plane_axes(panels.normal[which])
+    for i, shape, plane in zip(which, _moved(flat, width), axes, strict=True):
+        piece = max(shapely.get_parts(shape), key=shapely.area)
+        ring = shapely.get_exterior_ring(piece)
+        corners = shapely.get_coordinates(ring)[:-1]
+        corners = corners if shapely.is_ccw(ring) else corners[::-1]
+        rows.append(panels.center[i] + corners @ plane)
+    return rows
+
+
+def _with_rows(table: Ragged, rows: Ints, found: list[Floats]) -> Ragged:
+    """The table with some of its rows replaced."""
+    if not len(rows):
+        return table
+    every = [table[i] for i in range(table.n_rows)]
+    for i, row in zip(rows, found, strict=True):
+        every[i] = row
+    offsets = np.cumsum([0, *(len(row) for row in every)])
+    return Ragged(np.concatenate(every).astype(np.float64), offsets)
 
 
 def _require_room(panels: Panels, thin: np.ndarray, inset: float, room: Floats) -> None:
     empty = np.flatnonzero(thin & panels.whole)
     if len(empty):
         raise PanelsError(
-            f"An inset of {inset:g} leaves nothing of {len(empty)} panels (the smallest reaches"
-            f" {room[empty].min():g} from its centre); ask for a smaller inset.",
+            f"An inset of {inset:g} leaves nothing of {len(empty)} panels (the smallest has room for"
+            f" {room[empty].min():g}); ask for a smaller inset.",
             field=("panels", "components", "inset"),
             data={"panels": empty[:100].tolist()},
         )
@@ -74,16 +141,51 @@ def _solids(outline: Ragged, normal: Floats, thickness: float) -> tuple[Ragged, 
     sides = np.stack([local, following, following + n, local, following + n, local + n], axis=1).reshape(
         -1, 2, 3
     )
-    apex = _fan_corner(outline, normal)[outline.row]
-    inner = (local != apex) & (following != apex)
-    lower = np.stack([apex, following, local], axis=1)[inner]
-    upper = np.stack([apex + n, local + n, following + n], axis=1)[inner]
-    row = outline.row
-    owner = np.concatenate([np.repeat(row, 2), row[inner], row[inner]])
+    corners = _triangles(outline, normal)
+    row, inner = outline.row, np.repeat(np.arange(outline.n_rows), count - 2)
+    lower, upper = corners[:, ::-1], corners + count[inner][:, None]
+    owner = np.concatenate([np.repeat(row, 2), inner, inner])
     triangles = np.concatenate([sides.reshape(-1, 3), lower, upper])
     order = np.argsort(owner, kind="stable")
     face_offsets = np.concatenate([[0], np.cumsum(3 * (4 * count - 4))]).astype(np.int64)
     return Ragged(vertices, 2 * offsets), Ragged(triangles[order].ravel(), face_offsets)
+
+
+def _triangles(outline: Ragged, normal: Floats) -> Ints:
+    """(·, 3) each outline cut into n − 2 triangles, row by row, by numbers of its corners.
+
+    Fans from the corner with the greatest interior angle; outlines with several reflex corners, which no fan
+    may fill, by clipping ears (Meisters 1975).
+    """
+    row = outline.row
+    local = np.arange(len(row)) - outline.offsets[:-1][row]
+    following = np.where(local + 1 < outline.lengths[row], local + 1, 0)
+    apex = _fan_corner(outline, normal)[row]
+    inner = (local != apex) & (following != apex)
+    triangles = np.stack([apex, local, following], axis=1)[inner]
+    corner = in_planes(outline, means(outline), plane_axes(normal))
+    a, b, c = np.moveaxis(corner[outline.offsets[:-1][row[inner]][:, None] + triangles], 1, 0)
+    for i in np.unique(row[inner][cross(b - a, c - a) < 0]):
+        triangles[row[inner] == i] = _ears(corner[outline.offsets[i] : outline.offsets[i + 1]])
+    return np.asarray(triangles)
+
+
+def _ears(corner: Floats) -> Ints:
+    """(n − 2, 3) a polygon's corners (n, 2) cut into triangles, counter-clockwise."""
+    left, triangles = np.arange(len(corner)), []
+    while len(left) > 2:
+        a, b, c = corner[np.roll(left, 1)], corner[left], corner[np.roll(left, -1)]
+        bulge = cross(b - a, c - a)
+        covered = np.ones((len(left), len(left)), dtype=bool)
+        for p, q in ((a, b), (b, c), (c, a)):
+            covered &= cross((q - p)[:, None], corner[left] - p[:, None]) >= 0
+        own = np.eye(len(left), dtype=bool)
+        covered &= ~(own | np.roll(own, 1, axis=1) | np.roll(own, -1, axis=1))
+        # Where rounding leaves no ear, whatever bulges most.
+        k = int(np.argmax(np.where(covered.any(axis=1) | (bulge <= 0), -np.inf, bulge)))
+        triangles.append([left[k - 1], left[k], left[(k + 1) % len(left)]])
+        left = np.delete(left, k)
+    return np.array(triangles)
 
 
 def _fan_corner(outline: Ragged, normal: Floats) -> Ints:

@@ -13,7 +13,8 @@ from hexwrap_solver.panels import limits
 from hexwrap_solver.panels.best import jointly_largest
 from hexwrap_solver.panels.energy import minimise_watertight
 from hexwrap_solver.panels.halfedges import HalfEdges, half_edges
-from hexwrap_solver.panels.polygons import edge_lengths, fan_areas, mean_edges, means, row_minima
+from hexwrap_solver.panels.planar import crossing_themselves
+from hexwrap_solver.panels.polygons import edge_lengths, fan_areas, mean_edges, means, row_minima, take_rows
 from hexwrap_solver.panels.poses import fit_poses, target_lengths
 from hexwrap_solver.panels.regular import Poses
 from hexwrap_solver.panels.separation import Separation, separating_planes
@@ -25,8 +26,14 @@ from hexwrap_solver.surface.types import Surface
 #: Corners of a whole cell of each kind.
 CORNERS = {"hex": 6, "quad": 4, "triangle": 3}
 
-#: A trimmed cell that would have to shrink below this fraction of itself gets no panel.
+#: A trimmed cell of whose size (root of the area) less than this fraction is left gets no panel.
 LEAST_TRIMMED = 0.05
+
+#: Corners farther from the surface than this fraction of the mean edge are worth a note.
+FAR = 0.1
+
+#: Weight of the surface that halves such distances, with few panels that collapse or cross themselves.
+HOLD = 50.0
 
 #: An edge shorter than this fraction of its panel's mean edge has collapsed.
 LEAST_EDGE = 0.01
@@ -118,7 +125,7 @@ def _fit_split(
         whole=pattern.whole[face],
         cell_area=fan_areas(cells)[face],
         energy=energy,
-        notes=notes + _joint_note(settings) + _dropped_note(int((~regular & ~cut).sum())),
+        notes=notes + _joint_note(settings) + _dropped_note(int((~regular & ~cut).sum()), settings.joint),
         spare_limit=spare and _merge(kept, spare[0][roomy], cut, mean_edges(shapes))[face],
         spare_center=spare and _merge(kept, spare[1][roomy], cut, shape_center)[face],
     )
@@ -134,19 +141,28 @@ def _fit_watertight(
     shapes = Ragged(moved[pattern.faces.values.astype(np.int64)], pattern.faces.offsets)
     unmoved = 2 if settings.weights.planarity > 0 else 1  # energies: the beginning, and the end made flat
     stuck = len(energy) <= unmoved and energy[0] > MINIMAL
+    center, normal = means(shapes), plane_normals(shapes)
+    notes = (
+        *(STUCK_NOTE if stuck else ()),
+        *collapsed_note(shapes),
+        *_crossing_note(crossing_themselves(shapes, center, normal)),
+        *_far_note(
+            surface.tree.nearest(moved).distance / mean_edges(shapes).mean(), settings.weights.surface
+        ),
+    )
     return FittedPanels(
         mode="watertight",
         face=np.arange(pattern.n_cells),
         regular=np.zeros(pattern.n_cells, dtype=bool),
         spokes=np.zeros((0, CORNERS[pattern.kind], 3)),
         shapes=shapes,
-        center=means(shapes),
-        normal=plane_normals(shapes),
+        center=center,
+        normal=normal,
         limit=mean_edges(shapes),
         whole=pattern.whole,
         cell_area=fan_areas(_corner_points(pattern)),
         energy=energy,
-        notes=WATERTIGHT_NOTES + (STUCK_NOTE if stuck else ()) + collapsed_note(shapes),
+        notes=WATERTIGHT_NOTES + notes,
     )
 
 
@@ -160,6 +176,27 @@ def collapsed_note(shapes: Ragged) -> tuple[str, ...]:
     return (
         f"Watertight panels with an edge shorter than {LEAST_EDGE:.0%} of their mean edge: {count}; flatness"
         " took a corner away there: give planarity less weight, or angle and edge more, or ask for split.",
+    )
+
+
+def _crossing_note(crossing: Bools) -> tuple[str, ...]:
+    count = int(crossing.sum())
+    if not count:
+        return ()
+    return (
+        f"Watertight panels whose outline crosses itself: {count}; ask for quads with little weight on"
+        " surface, which seldom do, or for split panels, which cannot.",
+    )
+
+
+def _far_note(away: Floats, weight: float) -> tuple[str, ...]:
+    """away: (p,) distances of the corners from the surface / mean edge; weight: of surface."""
+    if away.max(initial=0.0) <= FAR:
+        return ()
+    nearer = f"a weight of {HOLD:g} on surface holds them nearer, at the cost of less even shapes, and "
+    return (
+        f"Watertight panels leave the surface by up to {away.max():.0%} of their mean edge,"
+        f" {away.mean():.0%} on average; {nearer if weight < HOLD else ''}split panels stay beside it.",
     )
 
 
@@ -247,22 +284,13 @@ def _trimmed(
 ) -> tuple[Ragged, Floats, Bools]:
     """Flat polygons for the chosen cells, their centres, and which cells (of all) keep a panel."""
     shapes, at = take_rows(cells, np.flatnonzero(chosen))
-    inner = edges.twin[at] >= 0
-    flat, center, factor = flatten_and_clear(
-        shapes, normal[chosen], planes.direction[at], planes.offset[at], inner
+    flat, center, size = flatten_and_clear(
+        shapes, normal[chosen], planes.direction[at], planes.offset[at], edges.across[at]
     )
-    enough = factor >= LEAST_TRIMMED
+    enough = size >= LEAST_TRIMMED
     kept = np.zeros(len(chosen), dtype=bool)
     kept[np.flatnonzero(chosen)[enough]] = True
     return take_rows(flat, np.flatnonzero(enough))[0], center[enough], kept
-
-
-def take_rows(table: Ragged, rows: Ints) -> tuple[Ragged, Ints]:
-    """The given rows, and the positions of their values in the table."""
-    count = table.lengths[rows]
-    offsets = np.concatenate([[0], np.cumsum(count)]).astype(np.int64)
-    at = np.arange(offsets[-1]) + np.repeat(table.offsets[rows] - offsets[:-1], count)
-    return Ragged(table.values[at], offsets), at
 
 
 def _merge(first: Bools, a: Floats, second: Bools, b: Floats) -> Floats:
@@ -272,7 +300,11 @@ def _merge(first: Bools, a: Floats, second: Bools, b: Floats) -> Floats:
     return merged
 
 
-def _dropped_note(dropped: int) -> tuple[str, ...]:
+def _dropped_note(dropped: int, joint: float) -> tuple[str, ...]:
     if not dropped:
         return ()
-    return (f"{dropped} trimmed cells at the boundary are too thin to carry a panel and were left open.",)
+    beside = f"joints of {joint:g}" if joint > 0 else "their neighbours"
+    return (
+        f"{dropped} trimmed cells at the boundary have no room for a flat panel beside {beside} and were"
+        " left open.",
+    )

@@ -77,3 +77,11 @@ def best_plane_distances(polygons: Ragged) -> Floats:
     moment = row_sums(np.einsum("hd,he->hde", spoke, spoke), polygons.offsets)
     _, axes = np.linalg.eigh(moment)
     return np.asarray(np.einsum("hd,hd->h", spoke, axes[:, :, 0][polygons.row]))
+
+
+def take_rows(table: Ragged, rows: Ints) -> tuple[Ragged, Ints]:
+    """The given rows, and the positions of their values in the table."""
+    count = table.lengths[rows]
+    offsets = np.concatenate([[0], np.cumsum(count)]).astype(np.int64)
+    at = np.arange(offsets[-1]) + np.repeat(table.offsets[rows] - offsets[:-1], count)
+    return Ragged(table.values[at], offsets), at

@@ -22,6 +22,7 @@ from hexwrap_solver.panels.polygons import (
 )
 from hexwrap_solver.panels.types import Panels, Quality
 from hexwrap_solver.pattern.types import Pattern
+from hexwrap_solver.surface.types import Surface
 
 
 def measure(
@@ -45,14 +46,14 @@ def measure(
     row, count, mean = polygons.row, polygons.lengths, mean_edges(polygons)
     ideal = (np.pi * (count - 2) / count)[row]
     progress(0.5, "distances to the surface")
-    away = cmap.surface.tree.nearest(np.asarray(polygons.values, dtype=np.float64)).distance
+    away = _surface_distances(cmap.surface, panels)
     progress(0.9, "looking for overlaps")
     return replace(
         quality,
         planarity=row_maxima(np.abs(best_plane_distances(polygons)), polygons.offsets) / mean,
         edge_deviation=row_maxima(np.abs(edge_lengths(polygons) - mean[row]), polygons.offsets) / mean,
         angle_deviation=row_maxima(np.abs(angle - ideal), polygons.offsets),
-        surface_distance=row_maxima(away, polygons.offsets),
+        surface_distance=away,
         gap_tangential=between.tangential,
         gap_normal=between.normal,
         kink=between.kink,
@@ -62,6 +63,14 @@ def measure(
         coverage=_coverage(pattern, panels),
         movement=_movement(pattern, panels),
     )
+
+
+def _surface_distances(surface: Surface, panels: Panels) -> Floats:
+    """(q,) of corners and centre: where a panel spans a ridge its middle stands farther off."""
+    points = np.concatenate([np.asarray(panels.polygons.values, dtype=np.float64), panels.center])
+    away = surface.tree.nearest(points).distance
+    corners, centers = np.split(away, [len(panels.polygons.values)])
+    return np.maximum(row_maxima(corners, panels.polygons.offsets), centers)
 
 
 def _count_overlaps(pattern: Pattern, edges: HalfEdges, panels: Panels) -> int:

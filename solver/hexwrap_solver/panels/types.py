@@ -132,7 +132,7 @@ class Quality:
 
     planarity, edge_deviation, angle_deviation (rad): relative to ℓ, per panel arrays.
     gap_tangential, gap_normal, kink (rad): aligned with the pattern's neighbours, NaN where there is none.
-    surface_distance: (q,) greatest distance of a panel's vertices to the input surface.
+    surface_distance: (q,) greatest distance of a panel's corners and its centre to the input surface.
     convex: (q,). congruence: (q,) class of congruent shapes (mirror images told apart).
     movement: greatest distance a shared vertex was moved (watertight), 0 otherwise.
     """

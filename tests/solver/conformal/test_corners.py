@@ -154,3 +154,12 @@ def test_a_loop_whose_vertices_are_all_listed_gives_way_to_the_quantum(all_of: t
     first, second = boundary_angles(surface, condition)
     assert (np.pi - first).sum() == pytest.approx(np.pi / 3, abs=1e-12)
     assert (np.pi - second).sum() == pytest.approx(-np.pi / 3, abs=1e-12)
+
+
+@pytest.mark.parametrize("angles", [None, np.zeros(0)])
+def test_a_list_without_angles_is_straight_and_says_so(angles) -> None:
+    empty = conformal_map(SURFACE, BoundaryCondition("angles", angles=angles))
+    straight = conformal_map(SURFACE, BoundaryCondition())
+    assert np.array_equal(empty.uv, straight.uv)
+    assert any("list of angles is empty" in note for note in empty.notes)
+    assert straight.notes == ()

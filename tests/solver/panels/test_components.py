@@ -6,12 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import shapely
 
+from hexwrap_solver.arrays import Ragged
 from hexwrap_solver.errors import PanelsError
 from hexwrap_solver.panels import make_components, rationalize
-from hexwrap_solver.panels.polygons import area_vectors
+from hexwrap_solver.panels.polygons import area_vectors, interior_angles, row_maxima
 from hexwrap_solver.panels.types import ComponentSettings, PanelSettings
-from tests.solver.panels.cells import grid_map, hex_pattern, inverted, torus
+from tests.solver.panels.cells import catenoid, grid_map, hex_pattern, inverted, torus
 
 
 @pytest.fixture(scope="module")
@@ -65,3 +67,63 @@ def test_an_inset_that_leaves_nothing_is_refused(panels):
     with pytest.raises(PanelsError, match="inset") as caught:
         make_components(panels, ComponentSettings(inset=1.0))
     assert caught.value.field == ("panels", "components", "inset")
+
+
+def test_without_an_inset_any_panel_is_its_own_outline():
+    """Watertight panels on a saddle are concave, some with their centre behind an edge."""
+    watertight = concave_panels()
+    made = make_components(watertight, ComponentSettings(thickness=0.01))
+    assert np.array_equal(made.outline.values, watertight.polygons.values)
+
+
+def test_concave_outlines_keep_the_inset_too():
+    watertight = concave_panels()
+    angle = interior_angles(watertight.polygons, watertight.normal)
+    concave = row_maxima(angle, watertight.polygons.offsets) > np.pi + 0.1
+    assert concave.sum() > 10
+    inset = 1e-3 * watertight.edge_length.min()
+    made = make_components(watertight, ComponentSettings(inset=inset))
+    for i in np.flatnonzero(concave):
+        before, after = watertight.polygons[i], made.outline[i]
+        z = watertight.normal[i]
+        along = np.roll(before, -1, axis=0) - before
+        length = np.linalg.norm(along, axis=1)
+        spoke = after[:, None] - before
+        t = np.clip(np.einsum("akd,kd->ak", spoke, along) / length**2, 0, 1)
+        away = spoke - t[..., None] * along
+        away -= np.einsum("akd,d->ak", away, z)[..., None] * z
+        assert np.linalg.norm(away, axis=2).min() > inset * (1 - 1e-6)
+        assert np.cross(after, np.roll(after, -1, axis=0)).sum(axis=0) @ z > 0
+
+
+def test_insets_too_wide_for_concave_panels_name_the_room():
+    watertight = concave_panels()
+    with pytest.raises(PanelsError, match="the smallest has room for 0"):
+        make_components(watertight, ComponentSettings(inset=float(watertight.edge_length.max())))
+
+
+def test_covers_of_solids_fill_the_outline_once_however_many_corners_are_reflex(panels):
+    """A comb, of which no fan of triangles covers all."""
+    comb = [(0, 0), (7, 0), (7, 4), (6, 1), (5, 4), (4, 1), (3, 4), (2, 1), (1, 4)]
+    points = np.array([[x, y, 0.0] for x, y in comb])
+    one = replace(
+        panels,
+        polygons=Ragged.from_table(points[None]),
+        center=points.mean(axis=0)[None],
+        normal=np.array([[0.0, 0, 1]]),
+    )
+    made = make_components(one, ComponentSettings(thickness=0.5))
+    faces = made.solid_faces[0].reshape(-1, 3)
+    cover = points[:, :2][faces[(faces < len(comb)).all(axis=1)]]
+    size = [shapely.Polygon(triangle).area for triangle in cover]
+    whole = shapely.Polygon(comb)
+    assert len(cover) == len(comb) - 2
+    assert sum(size) == pytest.approx(whole.area)
+    assert shapely.union_all([shapely.Polygon(triangle) for triangle in cover]).area == pytest.approx(
+        whole.area
+    )
+
+
+def concave_panels():
+    pattern = hex_pattern(catenoid, 20, 5, -0.6)
+    return rationalize(grid_map(catenoid, 60, 40, -0.7, 1.8), pattern, PanelSettings(mode="watertight"))

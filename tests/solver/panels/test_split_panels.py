@@ -204,6 +204,15 @@ def test_trade_off_falls_and_ends_where_nothing_more_is_gained():
     assert curve.uncovered[2] == pytest.approx(1 - quality.coverage, abs=1e-12)
 
 
+def test_distance_to_the_surface_is_that_of_corners_and_centres():
+    """On a sphere panels are chords: their centres lie deeper below it than their corners."""
+    _, panels, quality = panelize(sphere)
+    depth = 1 - np.linalg.norm(panels.center, axis=1)
+    assert (depth > 0).all()
+    assert np.allclose(quality.surface_distance, depth, atol=2e-3)
+    assert (quality.surface_distance > 0.9 * depth - 1e-3).all()
+
+
 def test_trimmed_cells_stay_flat_and_apart():
     """Cells cut at the boundary keep their own shape, one panel each, and no class."""
     chart = inverted(torus, (0.5, 0.1, 3.0))

@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hexwrap_solver.panels import fit, fit_panels
+from hexwrap_solver.arrays import Ragged
+from hexwrap_solver.panels import fit, fit_panels, rationalize
 from hexwrap_solver.panels.energy.cell_matrix import CellMatrix
 from hexwrap_solver.panels.energy.residuals import plane_distances, plane_slopes
 from hexwrap_solver.panels.energy.watertight import minimise_watertight
-from hexwrap_solver.panels.polygons import edge_lengths, mean_edges
+from hexwrap_solver.panels.planar import crossing_themselves
+from hexwrap_solver.panels.polygons import edge_lengths, mean_edges, means
 from hexwrap_solver.panels.regular import corners
 from hexwrap_solver.panels.types import PanelSettings, Weights
 from tests.solver.panels.cells import catenoid, grid_map, hex_pattern, inverted, quad_pattern, torus
@@ -80,3 +82,28 @@ def test_a_mesh_that_no_step_improves_is_told(monkeypatch):
         monkeypatch.setattr(fit, "minimise_watertight", lambda *_, c=curve: (pattern.vertices, np.array(c)))
         notes = fit_panels(cmap, pattern, PanelSettings(mode="watertight")).notes
         assert any("No step" in note for note in notes) == told
+
+
+def test_panels_that_leave_the_surface_are_told_and_held_nearer_by_its_weight():
+    pattern, cmap = hex_pattern(catenoid, 20, 5, -0.6), grid_map(catenoid, 96, 60, -0.7, 1.8)
+    away = {}
+    for surface in (0.0, 50.0):
+        wanted = PanelSettings(mode="watertight", weights=Weights(surface=surface))
+        panels = rationalize(cmap, pattern, wanted)
+        distance = cmap.surface.tree.nearest(panels.polygons.values).distance.max()
+        away[surface] = distance / panels.edge_length.mean()
+        told = [note for note in panels.notes if "leave the surface" in note]
+        assert len(told) == (away[surface] > 0.1)
+        if told:
+            assert f"up to {away[surface]:.0%} of" in told[0]
+            assert ("a weight of 50" in told[0]) == (surface == 0)
+    assert away[0.0] > 0.1
+    assert away[50.0] < away[0.0] / 2
+
+
+def test_panels_that_cross_themselves_are_counted():
+    square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    bow_tie = square[[0, 2, 1, 3]] + [0, 0, 5.0]
+    tables = Ragged.from_table(np.stack([square, bow_tie, square + 1.0]))
+    up = np.tile([0.0, 0, 1], (3, 1))
+    assert crossing_themselves(tables, means(tables), up).tolist() == [False, True, False]
