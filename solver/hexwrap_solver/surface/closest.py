@@ -32,6 +32,8 @@ SPREAD = (
     (4, 0x10C30C30C30C30C3),
     (2, 0x1249249249249249),
 )
+#: Distances from boxes are good to so many roundings of the coordinates.
+ROUNDINGS = 8
 
 
 @dataclass(frozen=True)
@@ -113,8 +115,9 @@ class TriangleTree:
         """The triangle with the nearest centroid bounds the search of the others."""
         first = np.asarray(self.centroids.query(points)[1])
         bound = nearest_in_triangles(points, self.corners[first])[1]
-        # Rounding of the box distances must not prune the guess itself.
-        reach = bound * (1 + 1e-9) + np.finfo(float).tiny
+        # Rounding, of the distance as of the boxes, must not prune the guess itself.
+        reach = bound * (1 + 1e-9) + ROUNDINGS * np.finfo(float).eps * np.abs(points).max(axis=1)
+        reach += np.finfo(float).tiny
         found = self._within(points, reach)
         if found is None:
             halves = (self._nearest(half) for half in np.array_split(points, 2))
