@@ -12,12 +12,9 @@ from hexwrap_solver.pattern.align import Straightening, place_by_sides, turn_bet
 from hexwrap_solver.pattern.cone import place_on_cone, place_on_flat_ring
 from hexwrap_solver.pattern.cylinder import place_on_cylinder
 from hexwrap_solver.pattern.lattice import Lattice
-from hexwrap_solver.pattern.placement import Placement, edge_angle, is_straight, quantum_turns
+from hexwrap_solver.pattern.placement import BEARABLE, Placement, edge_angle, is_straight, quantum_turns
 from hexwrap_solver.pattern.sides import has_corners, is_polygon
 from hexwrap_solver.pattern.types import PatternSettings
-
-#: Worst ratio of singular values − 1 that an alignment may cost.
-BEARABLE = 0.5
 
 
 def place_lattice(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings) -> Placement:
