@@ -52,7 +52,11 @@ OPTIONS = (
         ("panels", "mode"),
         "individual panels or one watertight mesh; 'none' stops after the pattern",
     ),
-    Option("--sizes", ("panels", "sizes"), "number of edge lengths; 'none': one per panel"),
+    Option(
+        "--sizes",
+        ("panels", "sizes"),
+        "number of edge lengths, fewer where some would be alike; 'none': one per panel",
+    ),
     Option("--size-cost", ("panels", "size_cost"), "what the sizes are best for"),
     Option("--edge-range", ("panels", "edge_range"), "allowed edge lengths", ("MIN", "MAX"), 2),
     Option("--target", ("panels", "target"), "limit of a panel's size"),

@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from hexwrap_server.files.text import angle, length
+from hexwrap_server.files.text import angle, length, lengths
 
 #: A table of sizes is not longer than this.
 MOST_SIZES = 24
@@ -103,9 +103,10 @@ def _sizes(sizes: list[dict[str, Any]]) -> Table:
     table.add_column("panels", justify="right")
     table.add_column("")
     most = max((size["count"] for size in sizes), default=1)
-    for size in sizes[:MOST_SIZES]:
+    words = lengths([size["edge_length"] for size in sizes[:MOST_SIZES]])
+    for size, word in zip(sizes, words, strict=False):
         bar = Text("█" * max(1, round(30 * size["count"] / most)), style=size["color"])
-        table.add_row(str(size["size"]), length(size["edge_length"]), str(size["count"]), bar)
+        table.add_row(str(size["size"]), word, str(size["count"]), bar)
     if len(sizes) > MOST_SIZES:
         table.add_row("…", "", f"{sum(size['count'] for size in sizes[MOST_SIZES:])}", "")
     return table

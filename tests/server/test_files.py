@@ -18,7 +18,7 @@ import trimesh
 from matplotlib.image import imread
 
 from hexwrap_server import cli, routes
-from hexwrap_server.files import WRITERS, Meta, NotMadeError, SheetError, scene, write
+from hexwrap_server.files import WRITERS, Meta, NotMadeError, SheetError, scene, text, write
 from hexwrap_server.files.dxf import object_coordinates
 from hexwrap_server.files.flat import lay_flat, pack
 from hexwrap_solver.arrays import Ragged
@@ -348,3 +348,16 @@ def test_pictures_far_from_the_origin_are_the_same() -> None:
     )
     assert near.shape == far.shape
     assert np.mean(np.abs(near - far) > 0.05) < 0.001
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ([0.4186622, 0.4188771, 0.4188902, 1.5], ["0.4187", "0.41888", "0.41889", "1.500"]),
+        ([0.0004994, 12.25, 1234.4, 1234.6], ["0.0004994", "12.25", "1234", "1235"]),
+        ([1.0, np.nextafter(1.0, 2.0)], ["1.0000000000000000", "1.0000000000000002"]),
+        ([], []),
+    ],
+)
+def test_lengths_have_the_digits_that_tell_them_apart(values, words):
+    assert text.lengths(values) == words

@@ -11,7 +11,7 @@ from hexwrap_server.files.drawing import drawing, encode
 from hexwrap_server.files.layers import size_layers
 from hexwrap_server.files.meta import Meta, SheetError, panels_of
 from hexwrap_server.files.table import neighbour_labels
-from hexwrap_server.files.text import length, one_line
+from hexwrap_server.files.text import length, lengths, one_line
 from hexwrap_solver.arrays import Floats, Ints, Ragged
 from hexwrap_solver.panels.types import Panels
 from hexwrap_solver.pipeline import Solution
@@ -123,12 +123,13 @@ def _write_inside(space: Modelspace, laid: Ragged, panels: Panels, names: list[s
     points = np.asarray(laid.values, dtype=np.float64)
     centre = np.stack([np.bincount(rows, points[:, i]) / count for i in range(2)], axis=1)
     inradius = _inradius(laid)
-    sizes = panels.size.tolist()
+    sizes, size_words = panels.size.tolist(), lengths(panels.class_length.tolist())
     for row, ((x, y), r, edge) in enumerate(
         zip(centre.tolist(), inradius.tolist(), panels.edge_length.tolist(), strict=True)
     ):
-        kind = "–" if sizes[row] < 0 else f"{sizes[row]:02d}"
-        for words, high, up in ((names[row], LABEL, 0.10), (f"{kind} / {length(edge)}", SIZE, -0.14)):
+        size = sizes[row]
+        told = f"– / {length(edge)}" if size < 0 else f"{size:02d} / {size_words[size]}"
+        for words, high, up in ((names[row], LABEL, 0.10), (told, SIZE, -0.14)):
             _write(space, "labels", words, high * r, (x, y + up * r), 0.0)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from hexwrap_server.files.colours import UNSIZED, size_colours
-from hexwrap_server.files.text import length
+from hexwrap_server.files.text import lengths
 from hexwrap_solver.panels.types import Panels
 
 
@@ -24,12 +24,12 @@ def size_name(size: int) -> str:
 
 def size_layers(panels: Panels) -> dict[int, Layer]:
     """The layer of each size that has panels, and of panels without a size (−1)."""
-    lengths = panels.class_length.tolist()
-    colours = size_colours(len(lengths))
+    words = lengths(panels.class_length.tolist())
+    colours = size_colours(len(words))
     used = set(panels.size.tolist())
     layers = {
-        i: Layer(f"{size_name(i)} ({length(ell)})", _bytes(colour))
-        for i, (ell, colour) in enumerate(zip(lengths, colours, strict=True))
+        i: Layer(f"{size_name(i)} ({word})", _bytes(colour))
+        for i, (word, colour) in enumerate(zip(words, colours, strict=True))
         if i in used
     }
     return layers | ({-1: Layer(size_name(-1), _bytes(UNSIZED))} if -1 in used else {})

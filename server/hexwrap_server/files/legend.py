@@ -65,11 +65,11 @@ def _legend(axes: Axes, height: int, panels: Panels, meta: Meta) -> None:
 
 def _swatches(axes: Axes, top: float, panels: Panels) -> None:
     """One row per size: colour, edge length, how many."""
-    counts, lengths = panels.class_count.tolist(), panels.class_length.tolist()
-    for i, colour in enumerate(colours.size_colours(len(lengths))):
+    counts, words = panels.class_count.tolist(), text.lengths(panels.class_length.tolist())
+    for i, colour in enumerate(colours.size_colours(len(words))):
         y = top + ROW * (i + 0.5)
         axes.add_patch(RegularPolygon((22, y), 6, radius=20, orientation=np.pi / 6, color=colour))
-        axes.text(64, y, text.length(lengths[i]), size=17, color=INK, va="center")
+        axes.text(64, y, words[i], size=17, color=INK, va="center")
         axes.text(WIDTH - 60, y, f"{counts[i]:,}", size=17, color=GREY, va="center", ha="right")
 
 
@@ -79,5 +79,6 @@ def _bar(axes: Axes, top: float, length: float, panels: Panels) -> None:
     axes.imshow(steps, extent=(2, 42, top + length, top), aspect="auto", interpolation="bilinear")
     axes.set(xlim=(0, WIDTH), ylim=axes.get_ylim())
     at = np.linspace(0, len(panels.class_length) - 1, 5).round().astype(int)
-    for share, value in zip(np.linspace(0, 1, 5).tolist(), panels.class_length[at].tolist(), strict=True):
-        axes.text(64, top + share * length, text.length(value), size=17, color=INK, va="center")
+    words = text.lengths(panels.class_length[at].tolist())
+    for share, word in zip(np.linspace(0, 1, 5).tolist(), words, strict=True):
+        axes.text(64, top + share * length, word, size=17, color=INK, va="center")

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from itertools import pairwise
 
 import numpy as np
+
+#: More significant digits no length is written with.
+MOST_DIGITS = 17
 
 
 def one_line(text: str) -> str:
@@ -14,9 +18,27 @@ def one_line(text: str) -> str:
 
 def length(value: float) -> str:
     """A length to four significant digits, or to the whole unit where it is larger."""
+    return _digits(value, 4)
+
+
+def lengths(values: list[float]) -> list[str]:
+    """Different lengths, ascending, each as ``length`` writes it, or with the digits that tell it apart."""
+    words = [length(value) for value in values]
+    for digits in range(5, MOST_DIGITS + 1):
+        same = [a == b for a, b in pairwise(words)]
+        alike = [a or b for a, b in zip([False, *same], [*same, False], strict=True)]
+        if not any(same):
+            break
+        pairs = zip(words, values, alike, strict=True)
+        words = [_digits(value, digits) if again else word for word, value, again in pairs]
+    return words
+
+
+def _digits(value: float, digits: int) -> str:
+    """So many significant digits, trailing zeros kept."""
     if not 1e-5 < abs(value) < 1e9:
-        return f"{value:.4g}"
-    return f"{value:.{max(0, 3 - int(np.floor(np.log10(abs(value)))))}f}"
+        return f"{value:.{digits}g}"
+    return f"{value:.{max(0, digits - 1 - int(np.floor(np.log10(abs(value)))))}f}"
 
 
 def angle(value: float) -> str:

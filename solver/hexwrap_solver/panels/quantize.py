@@ -8,7 +8,16 @@ import numpy as np
 
 from hexwrap_solver.arrays import Floats, Ints, Ragged
 from hexwrap_solver.errors import PanelsError
-from hexwrap_solver.panels.sizes import choose_lengths, floor_to, partition
+from hexwrap_solver.panels.sizes import (
+    ALIKE,
+    ALIKE_AREA,
+    SHRUNK,
+    choose_lengths,
+    floor_to,
+    lengths_of,
+    level,
+    partition,
+)
 from hexwrap_solver.panels.types import FittedPanels, Panels, PanelSettings, TradeOff
 
 #: The trade-off curve is computed for 1 … this many classes.
@@ -71,7 +80,11 @@ def quantize(fitted: FittedPanels, settings: PanelSettings) -> Panels:
         class_count=class_count.astype(np.int64),
         trade_off=_trade_off(fitted, limits, settings) if len(length) else None,
         energy=fitted.energy,
-        notes=fitted.notes + _range_notes(settings, fitted.limit[regular], outside),
+        notes=(
+            *fitted.notes,
+            *_range_notes(settings, fitted.limit[regular], outside),
+            *_size_notes(settings, limits[pick], length),
+        ),
         outside=outside,
     )
 
@@ -144,7 +157,7 @@ def _curve(fitted: FittedPanels, allowed: Floats, settings: PanelSettings) -> Fl
     free_length = _free_length(fitted)[order]
     curve = []
     for start in made.start:
-        length = np.repeat(floored[start], np.diff(np.append(start, len(limit))))
+        length = lengths_of(start, floored)
         uncovered = 1 - _unit_area(p) * float(length @ length) / cell_area
         curve.append((uncovered, float(np.max(free_length - length)) * width_of_unit))
     return np.array(curve)
@@ -164,3 +177,28 @@ def _range_notes(settings: PanelSettings, limit: Floats, outside: Ints) -> tuple
     if clipped:
         notes.append(f"{clipped} panels were held down to the greatest allowed edge length {high:g}.")
     return tuple(notes)
+
+
+def _size_notes(settings: PanelSettings, limit: Floats, length: Floats) -> list[str]:
+    """Of sizes that are not used, and of panels that share one far below what their cells allow."""
+    if settings.sizes is None or not len(length):
+        return []
+    notes = []
+    different = len(np.unique(level(np.sort(floor_to(limit, settings.increment)))))
+    used = len(np.unique(length))
+    if used < min(settings.sizes, different):
+        notes.append(
+            f"Of the {settings.sizes} sizes allowed {used} {'is' if used == 1 else 'are'} used: with more, "
+            f"some would differ by less than {ALIKE:.1%}, to cover no more than {ALIKE_AREA:.1%} of the area."
+        )
+    shrunk = np.flatnonzero(length < SHRUNK * limit)
+    if len(shrunk):
+        worst = shrunk[np.argmax(limit[shrunk])]
+        cost = "" if settings.size_cost == "worst" else "size_cost worst, "
+        notes.append(
+            f"{len(shrunk)} panels have less than {SHRUNK:.0%} of the edge length that their cells allow "
+            f"({length[worst]:.4g} instead of up to {limit[worst]:.4g}), since they share a size with "
+            f"smaller ones: more sizes, {cost}or an edge_range that the smallest panels do not reach keep "
+            "them larger."
+        )
+    return notes

@@ -2,6 +2,12 @@
 
 The best classes are intervals of the sorted limits, and a class takes the least limit of its members. What is
 lost is then an exact dynamic programme over the number of classes.
+
+Two things are not left to what is lost alone. Sizes that nobody could tell apart are not wanted: fewer are
+used then (``unlike``). And panels may not vanish for nothing: a few tiny cells lose so little area that the
+least loss lets dozens of larger panels shrink to them. Where panels would become shorter than a quarter of
+their limit, relative losses count beside the area, as far as a bounded share of the area allows
+(``_sparing``).
 """
 
 from __future__ import annotations
@@ -19,6 +25,20 @@ from hexwrap_solver.arrays import Bools, Floats, Ints
 INCREMENT_SLACK = 1e-9
 #: Neighbouring limits that differ by less than this (relatively) are equal but for rounding.
 ROUNDING = 1e-11
+
+#: Sizes whose lengths differ by less than this (relatively) are one size to everybody who builds, and fewer
+#: are used as long as that loses no more than this part of the median limit, or of the area what so much
+#: shorter edges lose.
+ALIKE = 1e-3
+ALIKE_AREA = 2 * ALIKE
+
+#: A panel shorter than this part of its limit, a sixteenth in area, has as good as vanished.
+SHRUNK = 0.25
+#: So much of the area may be given up for fewer such panels.
+PRICE = 0.02
+#: Relative losses beside the area, tried in this order; and the limit, relative to the median, below which
+#: they count no more than there, for the sums to keep their digits.
+RELATIVE, COUNTS_FROM = (0.1, 0.2, 0.4, 0.8, 1.6, 3.2), 0.01
 
 
 @dataclass(frozen=True)
@@ -47,8 +67,9 @@ def level(length: Floats) -> Floats:
     return np.asarray(length[np.flatnonzero(new)[np.cumsum(new) - 1]])
 
 
-def partition_by_area(length: Floats, classes: int) -> Partition:
-    """Least lost area, exactly, for 1…classes classes; length: (n,) ascending.
+def partition_by_area(length: Floats, classes: int, weight: Floats | None = None) -> Partition:
+    """Least lost area, exactly, for 1…classes classes; length: (n,) ascending. weight: (n,) of the panels,
+    1 unless given, which j then counts.
 
     With k classes over the first j limits, the greatest Σ length² is
         V_k(j) = max_i V_{k−1}(i) + (j − i)·ℓ_{i+1}²,
@@ -58,9 +79,10 @@ def partition_by_area(length: Floats, classes: int) -> Partition:
     value at j never exceeds V_{k−1}(j). Equal limits are one line.
     """
     square, first = np.unique(length**2, return_index=True)
-    n, m = len(length), len(square)
-    begin = np.append(first, n)
-    total = float(np.sum(length**2))
+    m = len(square)
+    counted = np.arange(len(length) + 1.0) if weight is None else np.append(0.0, np.cumsum(weight))
+    begin = counted[np.append(first, len(length))]
+    total = float(np.sum(length**2 if weight is None else weight * length**2))
     value = np.zeros(1)
     choice: list[Ints] = []
     loss: list[float] = []
@@ -77,7 +99,7 @@ def partition_by_area(length: Floats, classes: int) -> Partition:
     return Partition([first[_trace(choice, k, m)] for k in range(1, len(choice) + 1)], np.array(loss))
 
 
-def _upper_envelope(slope: Floats, intercept: Floats, at: Ints) -> Ints:
+def _upper_envelope(slope: Floats, intercept: Floats, at: Floats) -> Ints:
     """For each ascending abscissa the index of the highest of the lines, slopes strictly ascending."""
     run = np.diff(slope)
     quotient = np.diff(intercept) / run
@@ -173,6 +195,49 @@ def partition(
     return made, floored
 
 
+def lengths_of(start: Ints, floored: Floats) -> Floats:
+    """(n,) every class as long as its first, shortest member."""
+    return np.repeat(floored[start], np.diff(np.append(start, len(floored))))
+
+
+def unlike(made: Partition, floored: Floats, classes: int, cost: str) -> int:
+    """How many of the classes are worth while.
+
+    One after the other is given up as long as two of the best so many lengths are ``ALIKE``, unless that
+    loses more than ``ALIKE_AREA`` (``ALIKE``) of the whole against ``classes`` of them.
+    """
+    lost = ALIKE_AREA * float(floored @ floored) if cost == "area" else ALIKE * float(np.median(floored))
+    most = made.loss[classes - 1] + lost
+    while classes > 1 and made.loss[classes - 2] <= most:
+        used = floored[made.start[classes - 1]]
+        if not (np.diff(used) < ALIKE * used[:-1]).any():
+            break
+        classes -= 1
+    return classes
+
+
+def _sparing(floored: Floats, classes: int, plain: Floats) -> Floats:
+    """Lengths that leave fewer panels ``SHRUNK`` than the plain ones, with the least lost area, for no more
+    than ``PRICE`` of the area more.
+
+    Each that is tried is exactly the best for Σ (1 + μ·median²/limit²)·(limit² − length²): every panel's
+    area, and μ times what it loses of itself.
+    """
+
+    def shrunk(length: Floats) -> int:
+        return int((length < SHRUNK * floored).sum())
+
+    if not shrunk(plain):
+        return plain
+    relative = 1 / np.maximum(floored / np.median(floored), COUNTS_FROM) ** 2
+    least = plain @ plain - PRICE * (floored @ floored)
+    tried = [plain]
+    for share in RELATIVE:
+        made = partition_by_area(floored, classes, 1 + share * relative)
+        tried.append(lengths_of(made.start[-1], floored))
+    return min((one for one in tried if one @ one >= least), key=lambda one: (shrunk(one), -(one @ one)))
+
+
 def choose_lengths(
     limit: Floats,
     classes: int | None,
@@ -180,8 +245,8 @@ def choose_lengths(
     increment: float = 0.0,
     smallest: float = 0.0,
 ) -> Floats:
-    """(q,) the length of each panel: at most its limit, a multiple of the increment, one of ``classes``
-    values.
+    """(q,) the length of each panel: at most its limit, a multiple of the increment, one of at most
+    ``classes`` values, fewer where some would be ``ALIKE``.
 
     limit: (q,) positive, any order. classes: None leaves every panel its own (floored) limit.
     smallest: panels whose limit is below cannot reach the allowed range; they share no class with panels
@@ -197,8 +262,10 @@ def choose_lengths(
     ordered = [group[np.argsort(limit[group], kind="stable")] for group in groups]
     parts = [partition(limit[group], classes, cost, increment) for group in ordered]
     for group, (made, floored), k in zip(ordered, parts, _divide(parts, classes, cost), strict=True):
-        start = made.start[k - 1]
-        length[group] = np.repeat(floored[start], np.diff(np.append(start, len(group))))
+        chosen = lengths_of(made.start[unlike(made, floored, k, cost) - 1], floored)
+        if cost == "area" and len(groups) == 1:
+            chosen = _sparing(floored, classes, chosen)
+        length[group] = chosen
     return length
 
 

@@ -32,7 +32,8 @@ class ComponentSettings:
 class PanelSettings:
     """How panels are rationalized. Lengths in model units.
 
-    sizes: number of edge-length classes, None: one length per panel. edge_range: allowed (min, max).
+    sizes: number of edge-length classes, fewer where more would be alike, None: one length per panel.
+    edge_range: allowed (min, max).
     size_cost: ``area`` (least uncovered area) or ``worst`` (least greatest loss).
     target: upper limit of a panel's edge length. joint: least width left open between neighbours.
     increment: lengths are rounded down to its multiples, 0: not at all.

@@ -122,13 +122,15 @@ def manifold_corners(cells: Cells) -> tuple[Ints, Ints]:
     return vertex.astype(np.int64), point
 
 
-def is_simple(corner: Ragged, twin: Ints) -> bool:
-    """Whether shared vertices tell all sides apart: no cell comes to a vertex twice, and no two edges join
-    the same two vertices. Patterns of very few cells around fail it.
+def awkward_cells(corner: Ragged, twin: Ints) -> Bools:
+    """(c,) cells that shared vertices cannot tell apart: those that come to a vertex twice, and those with
+    one of several edges that join the same two vertices. Where very few cells go around, all are.
     """
     n = int(corner.values.max()) + 1
-    visits = corner.row * n + corner.values
+    _, visit, visits = np.unique(corner.row * n + corner.values, return_inverse=True, return_counts=True)
     following = corner.values[corner.next()]
     pairs = np.minimum(corner.values, following) * n + np.maximum(corner.values, following)
-    n_edges = len(pairs) - int(np.count_nonzero(twin >= 0)) // 2
-    return len(np.unique(visits)) == len(visits) and len(np.unique(pairs)) == n_edges
+    _, pair, sides = np.unique(pairs, return_inverse=True, return_counts=True)
+    own = np.where(twin >= 0, 2, 1)  # sides of the one edge that should join them
+    awkward = (visits[visit] > 1) | (sides[pair] > own)
+    return np.bincount(corner.row[awkward], minlength=corner.n_rows) > 0

@@ -17,15 +17,21 @@ from hexwrap_solver.domain.lift import points_at
 from hexwrap_solver.domain.locate import barycentric
 from hexwrap_solver.errors import PatternError
 from hexwrap_solver.pattern.arrangement import Points
-from hexwrap_solver.pattern.cells import is_simple, largest_part, manifold_corners, only_whole_cells
+from hexwrap_solver.pattern.cells import (
+    Cells,
+    awkward_cells,
+    largest_part,
+    manifold_corners,
+    only_whole_cells,
+)
 from hexwrap_solver.pattern.lattice import LATTICES, Lattice
 from hexwrap_solver.pattern.links import link_nodes
 from hexwrap_solver.pattern.nodes import Layout, find_nodes
 from hexwrap_solver.pattern.place import Placing
-from hexwrap_solver.pattern.placement import Placement, anchor_vertex
+from hexwrap_solver.pattern.placement import Placement, anchor_vertex, edge_angle
 from hexwrap_solver.pattern.rings import places, rows_from, turns_around, winding
 from hexwrap_solver.pattern.rotation import with_rotation
-from hexwrap_solver.pattern.size import ASKED
+from hexwrap_solver.pattern.size import ASKED, fitting_number
 from hexwrap_solver.pattern.trim import TooCoarse, Trimmed, trim
 from hexwrap_solver.pattern.types import Pattern, PatternSettings
 from hexwrap_solver.surface.normals import with_tangents
@@ -79,7 +85,7 @@ def _lay(placing: Placing, settings: PatternSettings, progress: Progress) -> Pat
     _check_count(cmap, layout, settings)
     nodes = find_nodes(layout)
     if not nodes.n:
-        raise _too_coarse(placement)
+        raise _too_coarse(cmap, settings, placement)
     progress(0.3, f"{nodes.n} nodes")
     links = link_nodes(layout, nodes)
     progress(0.6, "edges")
@@ -87,7 +93,7 @@ def _lay(placing: Placing, settings: PatternSettings, progress: Progress) -> Pat
         try:
             trimmed = trim(cmap, layout, nodes, links)
         except TooCoarse:
-            raise _too_coarse(placement) from None
+            raise _too_coarse(cmap, settings, placement) from None
     else:
         cells = only_whole_cells(lattice, layout.motion, links)
         own = nodes.own
@@ -127,24 +133,20 @@ def _check_count(cmap: ConformalMap, layout: Layout, settings: PatternSettings) 
 def _finish(
     cmap: ConformalMap, settings: PatternSettings, placement: Placement, layout: Layout, cut: Trimmed
 ) -> Pattern:
-    keep = largest_part(cut.cells) if cut.cells.n else np.zeros(0, dtype=bool)
+    keep, narrow = _usable(cut.cells, placement.motion.turns != 0)
     if not keep.any():
-        raise _too_coarse(placement)
+        raise _too_coarse(cmap, settings, placement)
     cells = cut.cells.part(keep)
     corner, point = manifold_corners(cells)
-    if not is_simple(Ragged(corner, cells.corner.offsets), cells.twin):
-        raise PatternError(
-            f"With {placement.around} cells around, cells touch themselves or share two edges with the same "
-            "ends, which no mesh of shared vertices can tell apart: ask for more cells around, or a shorter "
-            "edge."
-        )
     triangle, place = cut.points.face[point], cut.points.place[point]
     weights = barycentric(layout.corners[triangle], place)
     uv = (weights * cmap.corners()[triangle]).sum(axis=1)
     on_surface = surface_weights(cmap, triangle, weights)
     vertices, normals = _on_input_surface(cmap, triangle, on_surface)
     faces, neighbours = Ragged(corner, cells.corner.offsets), cells.neighbours()
-    first = _at_first_loop(cmap, layout.cover, placement, faces, neighbours, cells.turns)
+    first = _at_first_loop(cmap, layout.cover, faces, neighbours, cells.turns)
+    if first is None:
+        raise _too_coarse(cmap, settings, placement)
     ring = rows_from(neighbours, first)
     if settings.kind == "triangle":
         ring = ring // 2  # a row of triangles: those that stand and those that hang
@@ -170,17 +172,42 @@ def _finish(
         rotation=placement.rotation,
         edge_length=mean_edge(vertices, faces),
         distortion=placement.distortion,
-        notes=(*placement.notes, *_told(cut, int(np.count_nonzero(~keep)))),
+        notes=(*placement.notes, *_told(cut, narrow, int(np.count_nonzero(~keep)) - narrow)),
     )
 
 
-def _told(cut: Trimmed, apart: int) -> list[str]:
+def _usable(cells: Cells, narrows: bool) -> tuple[Bools, int]:
+    """(c,) the largest part without cells that no mesh of shared vertices can tell apart, and how many these
+    are. narrows: towards one end fewer go around, and those left out may be the few there; none are usable
+    otherwise."""
+    keep = np.ones(cells.n, dtype=bool)
+    narrow = 0
+    while keep.any():
+        members = np.flatnonzero(keep)
+        part = cells.part(keep)
+        keep[members] = largest_part(part)
+        members, part = np.flatnonzero(keep), cells.part(keep)
+        awkward = awkward_cells(Ragged(manifold_corners(part)[0], part.corner.offsets), part.twin)
+        if not awkward.any():
+            break
+        keep[members[awkward]] = False
+        keep &= narrows
+        narrow += int(awkward.sum())
+    return keep, narrow
+
+
+def _told(cut: Trimmed, narrow: int, apart: int) -> list[str]:
     notes = []
     if cut.joined:
         notes.append(f"{cut.joined} slivers at the boundary were joined to the cut cell beside them.")
     if cut.lost:
         notes.append(
             f"{cut.lost} slivers at the boundary were left out, {cut.dropped:.2f} cells in area altogether."
+        )
+    if narrow:
+        notes.append(
+            f"{narrow} cells at the narrow end were left out: so few go around it there that they touch "
+            "themselves."
         )
     if apart:
         notes.append(f"{apart} cells hung on the pattern by no edge and were left out.")
@@ -209,19 +236,34 @@ def mean_edge(vertices: Floats, faces: Ragged) -> float:
     return float(length @ area / area.sum())
 
 
-def _too_coarse(placement: Placement) -> PatternError:
+def _too_coarse(cmap: ConformalMap, settings: PatternSettings, placement: Placement) -> PatternError:
+    around, step, asked = placement.around, placement.step, ""
+    if settings.around not in (None, around):
+        only = f" (only multiples of {step} close up at this rotation)" if step > 1 else ""
+        asked = f", the nearest to the {settings.around} asked for{only}"
     return PatternError(
-        f"With {placement.around} cells around, the cells do not close up to a ring around the surface, "
-        "since they are too large for its narrowest place: ask for more cells around, or a shorter edge."
+        f"With {around} cell{'s' if around > 1 else ''} around{asked}, the cells do not close up to a ring "
+        "around the surface, since they are too large for its narrowest place: ask for more cells around, or "
+        f"a shorter edge{_that_fits(cmap, settings, placement)}."
+    )
+
+
+def _that_fits(cmap: ConformalMap, settings: PatternSettings, placement: Placement) -> str:
+    """A size that would do, where it is not that of the placement."""
+    lattice = LATTICES[settings.kind]
+    enough, edge = fitting_number(cmap, lattice, edge_angle(lattice, settings))
+    enough = placement.step * -(-enough // placement.step)
+    return (
+        "" if enough <= placement.around else f": {enough} cells around, or an edge length of {edge:.3g}, fit"
     )
 
 
 def _at_first_loop(
-    cmap: ConformalMap, cover: Cover, placement: Placement, faces: Ragged, neighbours: Ragged, sheet: Ints
-) -> Bools:
+    cmap: ConformalMap, cover: Cover, faces: Ragged, neighbours: Ragged, sheet: Ints
+) -> Bools | None:
     """(c,) cells with an edge on the loop of the pattern that faces the surface's loop 0.
 
-    Raises PatternError unless the pattern is an annulus: two boundary loops, one each way around.
+    None unless the pattern is an annulus: two boundary loops, one each way around.
     """
     following = faces.next()
     edge = np.flatnonzero(neighbours.values < 0)
@@ -234,7 +276,7 @@ def _at_first_loop(
     gained = np.bincount(which, weights=sheet[following[edge]] - sheet[edge])
     euler = n - (len(faces.values) + len(edge)) // 2 + faces.n_rows
     if len(loops) != 2 or sorted(np.rint(gained)) != [-1, 1] or euler != 0:
-        raise _too_coarse(placement)
+        return None
     side = int(np.argmax(gained * winding(cmap, cover)))
     first = np.zeros(faces.n_rows, dtype=bool)
     first[faces.row[edge[which == side]]] = True

@@ -13,6 +13,7 @@ from hexwrap_solver.pattern.cone import place_on_cone, place_on_flat_ring
 from hexwrap_solver.pattern.cylinder import place_on_cylinder
 from hexwrap_solver.pattern.lattice import Lattice
 from hexwrap_solver.pattern.placement import (
+    BEARABLE,
     Placement,
     check_phase,
     edge_angle,
@@ -22,9 +23,6 @@ from hexwrap_solver.pattern.placement import (
 )
 from hexwrap_solver.pattern.sides import has_corners, is_polygon
 from hexwrap_solver.pattern.types import PatternSettings
-
-#: Worst ratio of singular values − 1 that an alignment may cost.
-BEARABLE = 0.5
 
 
 def place_lattice(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings) -> Placement:

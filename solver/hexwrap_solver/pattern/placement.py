@@ -21,12 +21,16 @@ NEARLY = 1e-6
 #: Nearer than this, a multiple needs no correction (see Deck).
 EXACT = 1e-9
 
+#: Worst ratio of singular values − 1 that an alignment may cost.
+BEARABLE = 0.5
+
 
 @dataclass(frozen=True)
 class Placement:
     """place: (n,) the vertices of the (perhaps slightly stretched) domain, each in its own sheet, in lattice
     units; motion: what g is there. rotation: angle from the boundary direction to an edge. around: cells
-    once around (middle ring on cones). distortion: worst ratio of singular values − 1 of the stretch.
+    once around (middle ring on cones). distortion: worst ratio of singular values − 1 of the stretch. step:
+    around is one of its multiples.
     """
 
     place: Complexes
@@ -35,6 +39,7 @@ class Placement:
     around: int
     distortion: float
     notes: tuple[str, ...]
+    step: int = 1
 
 
 def quantum_turns(cmap: ConformalMap, lattice: Lattice) -> int:
@@ -50,7 +55,7 @@ def quantum_turns(cmap: ConformalMap, lattice: Lattice) -> int:
         f"The cone angle is {K:.8f} rad, but a {lattice.kind} pattern closes up only where it is a multiple "
         f"of {part}, up to {MAX_TURNS} of them; the nearest are {low}·{part} = {nearest[0]:.8f} and "
         f"{low + 1}·{part} = {nearest[1]:.8f} rad: choose boundary angles that add up to one of them, or "
-        f"boundary.quantum {part}.",
+        f"boundary.quantum {lattice.kind} for an isometric boundary.",
         data={"cone_angle": K, "quantum": quantum, "nearest": nearest},
     )
 

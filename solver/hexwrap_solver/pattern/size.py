@@ -10,8 +10,10 @@ from hexwrap_solver.errors import PatternError
 from hexwrap_solver.pattern.lattice import Lattice
 from hexwrap_solver.pattern.types import PatternSettings
 
-#: Cells around where neither a number nor a length is asked for.
-DEFAULT_AROUND = 48
+#: Where neither a number nor a length is asked for: so many cells around, but fewer where that would make
+#: more cells altogether, and more where not so many rows would fit between the loops, or where cells that are
+#: cut at the boundary would be fewer around the shorter loop.
+DEFAULT_AROUND, DEFAULT_CELLS, DEFAULT_ROWS, DEFAULT_NARROWEST = 48, 3000, 3.0, 3
 
 #: No cell is more than this many edges wide.
 EDGES_PER_CELL = 3.0
@@ -48,8 +50,50 @@ def wanted_edge(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings,
     """Edge length in the domain that gives the size asked for; angle: of the edges to the boundary."""
     if settings.edge_length is not None:
         return settings.edge_length / mean_stretch(cmap)
-    around = DEFAULT_AROUND if settings.around is None else settings.around
-    return cmap.circumference / (around * width_per_cell(lattice, angle))
+    if settings.around is None:
+        return default_edge(cmap, lattice, settings, angle)
+    return cmap.circumference / (settings.around * width_per_cell(lattice, angle))
+
+
+def default_edge(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings, angle: float) -> float:
+    """Edge length in the domain that suits its shape, whatever it is: short and long, conical and flat."""
+    area = float(face_areas(cmap)[1].sum())
+    width = width_per_cell(lattice, angle)
+    edge = cmap.circumference / (DEFAULT_AROUND * width)
+    of_cells = float(np.sqrt(area / (DEFAULT_CELLS * _unit_area(lattice))))
+    fitting = _edge_of_rows(cmap, lattice, angle)
+    if settings.boundary == "trim":
+        fitting = min(fitting, min(_lengths_of_loops(cmap)) / (DEFAULT_NARROWEST * width))
+    return min(max(edge, of_cells), fitting)
+
+
+def _edge_of_rows(cmap: ConformalMap, lattice: Lattice, angle: float) -> float:
+    """Edge length in the domain at which ``DEFAULT_ROWS`` fit between the loops, on the average."""
+    height = float(face_areas(cmap)[1].sum()) / cmap.circumference
+    return height * width_per_cell(lattice, angle) / (DEFAULT_ROWS * _unit_area(lattice))
+
+
+def fitting_number(cmap: ConformalMap, lattice: Lattice, angle: float) -> tuple[int, float]:
+    """Cells around, and their edge length on the surface, that leave room for ``DEFAULT_ROWS`` and for
+    ``DEFAULT_NARROWEST`` cells around the shorter loop."""
+    width = width_per_cell(lattice, angle)
+    narrowest = min(_lengths_of_loops(cmap)) / (DEFAULT_NARROWEST * width)
+    edge = min(_edge_of_rows(cmap, lattice, angle), narrowest)
+    return int(np.ceil(cmap.circumference / (edge * width))), edge * mean_stretch(cmap)
+
+
+def _unit_area(lattice: Lattice) -> float:
+    """Area of a cell of edge 1."""
+    return lattice.cell_area / lattice.edge**2
+
+
+def _lengths_of_loops(cmap: ConformalMap) -> list[float]:
+    """Of both loops, in the domain."""
+    faces, corners = cmap.surface.faces, cmap.corners()
+    n = len(cmap.uv)
+    key = faces * n + np.roll(faces, -1, axis=1)
+    length = abs(np.roll(corners, -1, axis=1) - corners)
+    return [float(length[np.isin(key, loop * n + np.roll(loop, -1))].sum()) for loop in cmap.surface.loops]
 
 
 def edges_around(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings, angle: float) -> float:

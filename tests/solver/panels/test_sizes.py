@@ -9,7 +9,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hexwrap_solver.panels.sizes import choose_lengths, floor_to, partition_by_area, partition_by_worst
+from hexwrap_solver.panels.sizes import (
+    ALIKE,
+    ALIKE_AREA,
+    PRICE,
+    SHRUNK,
+    choose_lengths,
+    floor_to,
+    lengths_of,
+    partition_by_area,
+    partition_by_worst,
+)
 
 limits = st.lists(st.floats(0.5, 2.0), min_size=1, max_size=9).map(lambda x: np.sort(np.array(x)))
 #: Many ties, as after rounding down to an increment.
@@ -44,6 +54,20 @@ def test_area_partition_is_optimal(length, classes):
         assert len(start) <= k
         assert lost_area(length, chosen) == pytest.approx(best, abs=1e-11)
         assert made.loss[k - 1] == pytest.approx(best, abs=1e-11)
+
+
+@given(limits | tied, st.integers(1, 5), st.integers(0, 10**6))
+def test_partition_of_weighted_area_is_optimal(length, classes, seed):
+    weight = np.random.default_rng(seed).uniform(0.1, 10.0, len(length))
+
+    def lost(length, chosen):
+        return float(weight @ (length**2 - chosen**2))
+
+    made = partition_by_area(length, classes, weight)
+    for k, start in enumerate(made.start, 1):
+        best = brute_force(length, length, k, lost)
+        assert lost(length, lengths_of(start, length)) == pytest.approx(best, abs=1e-10)
+        assert made.loss[k - 1] == pytest.approx(best, abs=1e-10)
 
 
 @given(limits | tied, st.integers(1, 5), st.sampled_from([0.0, 0.2]))
@@ -129,3 +153,57 @@ def test_large_problems_agree_with_the_quadratic_programme():
     for k in range(2, 9):
         value = np.where(i <= j, value[:-1, None] + (j - i) * square[:, None], -np.inf).max(axis=0)
         assert partition_by_area(length, 8).loss[k - 1] == pytest.approx(square.sum() - value[-1], rel=1e-11)
+
+
+@settings(max_examples=50)
+@given(st.integers(0, 10**6), st.floats(1e-6, 0.2), st.integers(1, 15), st.sampled_from(["area", "worst"]))
+def test_sizes_that_nobody_can_tell_apart_are_not_used(seed, spread, classes, cost):
+    """The classes used are the best so many; they lose next to nothing against all that are allowed; and
+    where two of them are alike, one fewer would lose more."""
+    limit = np.sort(1 + spread * np.random.default_rng(seed).random(200))
+    length = choose_lengths(limit, classes, cost)
+    used = np.unique(length)
+    made = partition_by_area(limit, classes) if cost == "area" else partition_by_worst(limit, limit, classes)
+    loss = lost_area(limit, length) if cost == "area" else greatest_loss(limit, length)
+    allowed = ALIKE_AREA * float(limit @ limit) if cost == "area" else ALIKE * float(np.median(limit))
+    assert loss == pytest.approx(made.loss[len(used) - 1], abs=1e-9)
+    assert loss <= made.loss[-1] + allowed + 1e-9
+    if (np.diff(used) < ALIKE * used[:-1]).any():
+        assert made.loss[len(used) - 2] > made.loss[-1] + allowed - 1e-9
+    if spread < 0.5 * ALIKE:
+        assert len(used) == 1
+
+
+def test_different_sizes_are_all_used():
+    limit = 1 + np.arange(1000) / 5000
+    for classes in (2, 11, 20):
+        assert len(np.unique(choose_lengths(limit, classes))) == classes
+
+
+@settings(max_examples=50)
+@given(st.integers(0, 10**6), st.integers(1, 30), st.integers(2, 12))
+def test_a_few_tiny_cells_do_not_make_others_vanish(seed, tiny, classes):
+    """Fewer panels far below their limit than at the least lost area, for a bounded part of the area; the
+    least lost area itself where there are none."""
+    rng = np.random.default_rng(seed)
+    limit = np.sort(np.concatenate([rng.uniform(0.7, 1.3, 500), rng.uniform(0, 1, tiny) ** 3 + 1e-6]))
+    length = choose_lengths(limit, classes)
+    made = partition_by_area(limit, classes)
+    least = lengths_of(made.start[-1], limit)
+    area = float(limit @ limit)
+    shrunk, before = (int((chosen < SHRUNK * limit).sum()) for chosen in (length, least))
+    assert shrunk <= before
+    assert (length <= limit).all()
+    assert len(np.unique(length)) <= classes
+    assert lost_area(limit, length) <= made.loss[-1] + max(PRICE, ALIKE_AREA) * area + 1e-9
+    if not before:
+        assert lost_area(limit, length) <= made.loss[-1] + ALIKE_AREA * area + 1e-9
+
+
+def test_one_tiny_cell_keeps_to_itself():
+    limit = np.concatenate([[1e-4], np.geomspace(0.05, 0.7, 40), np.linspace(0.7, 1.3, 400)])
+    least = lengths_of(partition_by_area(limit, 11).start[-1], limit)
+    length = choose_lengths(limit, 11)
+    assert (least < SHRUNK * limit).sum() > 20
+    assert (length < SHRUNK * limit).sum() < 10
+    assert choose_lengths(1000 * limit, 11) == pytest.approx(1000 * length, rel=1e-12)

@@ -241,3 +241,30 @@ def test_an_increment_longer_than_the_panels_is_refused():
     with pytest.raises(PanelsError, match="increment") as caught:
         panelize(torus, increment=10.0)
     assert caught.value.field == ("panels", "increment")
+
+
+def fitted_with(limit):
+    pattern, cmap = hex_pattern(cylinder, 24, 8, -0.6), grid_map(cylinder, 96, 60, -0.7, 1.8)
+    fitted = fit_panels(cmap, pattern, PanelSettings())
+    return replace(fitted, limit=np.resize(np.asarray(limit), len(fitted.limit)))
+
+
+def test_of_sizes_that_are_all_but_equal_one_is_used_and_told():
+    made = quantize(fitted_with(0.01 * (1 + 5e-4 * np.random.default_rng(0).random(50))), PanelSettings())
+    assert len(made.class_length) == 1
+    assert "Of the 11 sizes allowed 1 is used" in " ".join(made.notes)
+    alone = quantize(fitted_with([0.01]), PanelSettings())
+    assert len(alone.class_length) == 1
+    assert alone.notes == ()
+
+
+@pytest.mark.parametrize(("cost", "told"), [("area", "size_cost worst"), ("worst", "more sizes, or an edge")])
+def test_panels_far_below_what_their_cells_allow_are_told(cost, told):
+    limit = np.append(np.linspace(0.009, 0.01, 60), np.geomspace(1e-5, 1e-3, 6))
+    made = quantize(fitted_with(limit), PanelSettings(size_cost=cost, sizes=4))
+    few = int((made.edge_length < 0.25 * made.limit).sum())
+    assert few > 0
+    assert f"{few} panels have less than 25%" in made.notes[-1]
+    assert told in made.notes[-1]
+    apart = quantize(fitted_with(limit), PanelSettings(size_cost=cost, sizes=4, edge_range=(8e-3, 1.0)))
+    assert (apart.edge_length[apart.limit > 8e-3] > 8e-3).all()

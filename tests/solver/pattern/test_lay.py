@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +15,7 @@ from hexwrap_solver.pattern import lay_pattern
 from hexwrap_solver.pattern.lattice import LATTICES
 from hexwrap_solver.pattern.lay import mean_edge
 from hexwrap_solver.pattern.place import place_lattice
+from hexwrap_solver.pattern.placement import BEARABLE
 from hexwrap_solver.pattern.size import width_per_cell
 from hexwrap_solver.pattern.types import Pattern, PatternSettings
 from tests.solver.conformal.test_conformal_map import ring_with_corners
@@ -174,3 +176,73 @@ def test_the_mean_edge_is_that_of_the_cells_wherever_they_stand():
     faces = Ragged(np.arange(8), np.array([0, 4, 8]))
     for offset in (0.0, 1e6, 1e10):
         assert mean_edge(vertices + offset, faces) == pytest.approx(2.8, rel=1e-12)
+
+
+def short_ring(height):
+    return annuli.revolution(lambda z: 20 + 0 * z, np.linspace(0, height, 5), 120)
+
+
+@pytest.mark.parametrize("kind", ["hex", "triangle", "quad"])
+@pytest.mark.parametrize("rotation", ["edge", "vertex"])
+@pytest.mark.parametrize("height", [0.3, 1.5, 10.0, 100.0, 1000.0])
+def test_the_default_size_suits_short_rings_and_long_pipes(kind, rotation, height):
+    pattern = lay_pattern(short_ring(height), PatternSettings(kind=kind, rotation=rotation))
+    assert pattern.rings >= 3
+    assert pattern.distortion < 0.05
+    assert pattern.notes == ()
+    # At most ten per cent of freedom in the size; three rows of very short rings may need more.
+    assert pattern.n_cells < 1.25 * 3000 or pattern.rings <= 5
+
+
+def test_the_default_size_of_a_cone_counts_its_cells_whatever_its_narrow_end():
+    cmap = annuli.flat_cone(2 * np.pi / 3, 1.0, 200.0, 60, 40)
+    pattern = lay_pattern(cmap, PatternSettings())
+    assert 1000 < pattern.n_cells < 3300
+    assert "narrow end" in " ".join(pattern.notes)
+    check_closed(pattern)
+
+
+@pytest.mark.parametrize("kind", ["hex", "triangle", "quad"])
+@pytest.mark.parametrize("rotation", ["edge", "vertex"])
+def test_a_size_that_is_too_large_is_refused_with_one_that_fits(kind, rotation):
+    wanted = PatternSettings(kind=kind, rotation=rotation, around=12)
+    with pytest.raises(PatternError, match="more cells around") as caught:
+        lay_pattern(short_ring(1.5), wanted)
+    number, length = re.search(
+        r"(\d+) cells around, or an edge length of ([\d.]+), fit", str(caught.value)
+    ).groups()
+    for fitting in (
+        replace(wanted, around=int(number)),
+        replace(wanted, around=None, edge_length=float(length)),
+    ):
+        pattern = lay_pattern(short_ring(1.5), fitting)
+        assert pattern.rings >= 3
+        assert pattern.distortion < 0.2  # half a row of three
+
+
+def test_a_refusal_says_what_was_asked_and_which_numbers_close_up():
+    with pytest.raises(
+        PatternError, match=r"2 cells around, the nearest to the 3 asked for \(only multiples of 2"
+    ):
+        lay_pattern(short_ring(1.5), PatternSettings(around=3))
+
+
+@pytest.mark.parametrize("kind", ["hex", "triangle", "quad"])
+def test_rows_are_not_stretched_beyond_what_is_bearable(kind):
+    """With too few cells around for one row between the loops, one loop is aligned, and that is told."""
+    pattern = lay_pattern(short_ring(1.5), PatternSettings(kind=kind, around=20, boundary="trim"))
+    assert pattern.distortion == 0
+    assert "only one is aligned" in pattern.notes[0]
+    for around in (50, 100, 200, 400):
+        try:
+            pattern = lay_pattern(short_ring(1.5), PatternSettings(kind=kind, around=around))
+        except PatternError:
+            continue
+        assert pattern.distortion <= BEARABLE
+
+
+def test_a_cone_angle_that_does_not_suit_names_the_quantum_as_it_is_asked_for():
+    cmap = annuli.flat_cone(1.3, 1.0, 2.0, 60, 12)
+    for kind in ("hex", "triangle", "quad"):
+        with pytest.raises(NotAdaptedError, match=rf"boundary\.quantum {kind}\b"):
+            lay_pattern(cmap, PatternSettings(kind=kind))
