@@ -198,7 +198,7 @@ def _size_notes(settings: PanelSettings, limit: Floats, length: Floats) -> list[
         notes.append(
             f"{len(shrunk)} panels have less than {SHRUNK:.0%} of the edge length that their cells allow "
             f"({length[worst]:.4g} instead of up to {limit[worst]:.4g}), since they share a size with "
-            f"smaller ones: more sizes, {cost}or an edge_range that the smallest panels do not reach keep "
-            "them larger."
+            f"smaller ones: more sizes, {cost}or an edge_range whose least length few panels miss keep them "
+            "larger."
         )
     return notes

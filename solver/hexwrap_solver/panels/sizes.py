@@ -263,8 +263,8 @@ def choose_lengths(
     parts = [partition(limit[group], classes, cost, increment) for group in ordered]
     for group, (made, floored), k in zip(ordered, parts, _divide(parts, classes, cost), strict=True):
         chosen = lengths_of(made.start[unlike(made, floored, k, cost) - 1], floored)
-        if cost == "area" and len(groups) == 1:
-            chosen = _sparing(floored, classes, chosen)
+        if cost == "area":
+            chosen = _sparing(floored, k, chosen)
         length[group] = chosen
     return length
 

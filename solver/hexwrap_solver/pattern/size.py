@@ -11,9 +11,11 @@ from hexwrap_solver.pattern.lattice import Lattice
 from hexwrap_solver.pattern.types import PatternSettings
 
 #: Where neither a number nor a length is asked for: so many cells around, but fewer where that would make
-#: more cells altogether, and more where not so many rows would fit between the loops, or where cells that are
-#: cut at the boundary would be fewer around the shorter loop.
+#: more cells altogether, and more where not so many rows would fit between the loops, or where fewer cells
+#: than the last would go around the shorter loop.
 DEFAULT_AROUND, DEFAULT_CELLS, DEFAULT_ROWS, DEFAULT_NARROWEST = 48, 3000, 3.0, 3
+#: Whole cells may stay away from so much of the surface at its narrow end.
+DEFAULT_OPEN = 0.01
 
 #: No cell is more than this many edges wide.
 EDGES_PER_CELL = 3.0
@@ -61,10 +63,20 @@ def default_edge(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings
     width = width_per_cell(lattice, angle)
     edge = cmap.circumference / (DEFAULT_AROUND * width)
     of_cells = float(np.sqrt(area / (DEFAULT_CELLS * _unit_area(lattice))))
-    fitting = _edge_of_rows(cmap, lattice, angle)
-    if settings.boundary == "trim":
-        fitting = min(fitting, min(_lengths_of_loops(cmap)) / (DEFAULT_NARROWEST * width))
+    narrow = min(_lengths_of_loops(cmap)) if settings.boundary == "trim" else _narrow_ring(cmap)
+    fitting = min(_edge_of_rows(cmap, lattice, angle), narrow / (DEFAULT_NARROWEST * width))
     return min(max(edge, of_cells), fitting)
+
+
+def _narrow_ring(cmap: ConformalMap) -> float:
+    """Length of the ring around the apex, in the domain, that cuts off ``DEFAULT_OPEN`` of the surface."""
+    if cmap.deck.apex is None:
+        return cmap.circumference
+    area, _ = face_areas(cmap)
+    distance = abs(cmap.uv[cmap.surface.faces] - cmap.deck.apex).max(axis=1)
+    order = np.argsort(distance, kind="stable")
+    at = int(np.searchsorted(np.cumsum(area[order]), DEFAULT_OPEN * area.sum()))
+    return abs(cmap.deck.angle) * float(distance[order[at]])
 
 
 def _edge_of_rows(cmap: ConformalMap, lattice: Lattice, angle: float) -> float:

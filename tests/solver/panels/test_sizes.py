@@ -207,3 +207,11 @@ def test_one_tiny_cell_keeps_to_itself():
     assert (least < SHRUNK * limit).sum() > 20
     assert (length < SHRUNK * limit).sum() < 10
     assert choose_lengths(1000 * limit, 11) == pytest.approx(1000 * length, rel=1e-12)
+
+
+def test_panels_within_an_allowed_range_do_not_vanish_either():
+    limit = np.concatenate([[1e-4], np.geomspace(0.05, 0.7, 40), np.linspace(0.7, 1.3, 400)])
+    length = choose_lengths(limit, 11, smallest=0.01)
+    within = limit >= 0.01
+    assert (length[within] >= 0.05).all()
+    assert (length < SHRUNK * limit).sum() < 10
