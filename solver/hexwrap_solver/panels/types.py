@@ -54,7 +54,7 @@ class PanelSettings:
 
 @dataclass(frozen=True)
 class TradeOff:
-    """From this curve an architect chooses the number of sizes.
+    """From this curve an architect chooses the number of sizes: the least that so many can leave open.
 
     sizes: (k,) numbers of classes 1…; uncovered: (k,) fraction of the cells' area left open;
     worst_gap: (k,) greatest mean gap of a panel to its cell, model units.
