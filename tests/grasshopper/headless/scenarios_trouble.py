@@ -75,7 +75,7 @@ def server_dies_in_mid_job():
 
 def tokens_are_handed_on():
     port = world.free_port()
-    os.environ["HEXWRAP_TOKEN"] = "not for everybody"
+    os.environ["HEXWRAP_TOKEN"] = "not-for-everybody"
     try:
         server = world.Server(port, os.path.join(FOLDER, "token"))
     finally:
@@ -83,7 +83,7 @@ def tokens_are_handed_on():
     try:
         send = Component("Send").set(Mesh=world.tube(), Pattern=SMALL, Run=True, Port=port)
         assert "oken" in settle(send, 2).said("error")[0]
-        settle(send.set(Token="not for everybody", Name="again"), 4)
+        settle(send.set(Token="not-for-everybody", Name="again"), 4)
         assert send.Job, send.messages
         assert settle(Component("Collect").set(Job=send.Job), 2).Panels is not None
     finally:
