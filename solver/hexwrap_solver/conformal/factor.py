@@ -3,8 +3,8 @@
 Every node of the dissection tree eliminates its unknowns in one dense matrix, the front, with LAPACK, and
 hands what is left (the update) to its parent. The symbolic analysis is done once per pattern. It needs
 nothing but NumPy and SciPy: the arithmetic is in BLAS, with a few short Python steps per front of some fifty
-unknowns. Analysis and first factorisation, which is what a new mesh costs, take 1.7 and 1.1 times as long
-as in CHOLMOD and 0.6 times as long as in MKL PARDISO, at 20,000 and 200,000 vertices (``benchmarks/map.py``);
+unknowns. Analysis and first factorisation, which is what a new mesh costs, take 1.6 and 1.05 times as long
+as in CHOLMOD and 0.5 times as long as in MKL PARDISO, at 20,000 and 200,000 vertices (``benchmarks/map.py``);
 SciPy's own SuperLU takes 2.6 and 5.4 times as long.
 """
 
