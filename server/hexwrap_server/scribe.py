@@ -133,7 +133,7 @@ class There:
             for sent in self._sent:
                 sent.result()
             kind, content = self._scribe.answer() or ("died", "")
-        except OSError as error:
+        except Exception as error:  # an answer that nobody reads would be taken for that of a later job
             kind, content = "died", str(error)
         if kind == "written":
             return cast(Written, content)

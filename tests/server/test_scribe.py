@@ -114,6 +114,17 @@ def test_a_fault_of_the_scribe_costs_its_help_only(scribe: Scribe) -> None:
     assert scribe.is_ready
 
 
+def test_what_cannot_be_sent_leaves_no_answer_to_the_next(scribe: Scribe) -> None:
+    solution = cylinder()
+    with There(scribe) as writer:
+        writer.made("surface", object())
+        writer.rest(solution, TIMINGS)
+        written = writer.finish(None)
+    assert written.result is not None
+    assert gzip.decompress(written.result) == result_json(solution, TIMINGS)
+    assert not scribe.is_ready
+
+
 def test_a_file_that_cannot_be_written_is_told(scribe: Scribe, tmp_path: Path) -> None:
     with pytest.raises(StorageError):
         write(There(scribe), cylinder(), tmp_path / "nowhere" / "result")
