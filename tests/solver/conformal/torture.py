@@ -230,6 +230,27 @@ def retriangulated(random: Random) -> Surface:
     return taken_in(tower.vertices, random_flips(tower.faces, len(tower.vertices), random, 4000))
 
 
+def crooked_prism(sides: int, random: Random) -> Surface:
+    """A prism of height 2: between neighbouring vertical edges, with vertices at random heights, triangles
+    run up in a random zigzag. In its own metric it is a flat cylinder, triangulated far from Delaunay."""
+    vertices, columns, faces = [], [], []
+    for i in range(sides):
+        heights = np.concatenate([[0.0], np.sort(random.uniform(0.05, 1.95, random.integers(5, 12))), [2.0]])
+        columns.append(len(vertices) + np.arange(len(heights)))
+        angle = 2 * np.pi * i / sides
+        vertices += [[np.cos(angle), np.sin(angle), z] for z in heights]
+    for left, right in zip(columns, [*columns[1:], columns[0]], strict=True):
+        a, b = 0, 0
+        for step in random.permutation([0] * (len(left) - 1) + [1] * (len(right) - 1)):
+            if step == 0:
+                faces.append([left[a], right[b], left[a + 1]])
+                a += 1
+            else:
+                faces.append([left[a], right[b], right[b + 1]])
+                b += 1
+    return taken_in(np.array(vertices), np.array(faces))
+
+
 def random_flips(faces: Ints, n: int, random: Random, tries: int) -> Ints:
     """Random edge flips that leave a simplicial surface."""
     rows = faces.tolist()

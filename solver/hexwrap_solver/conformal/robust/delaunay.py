@@ -16,6 +16,8 @@ front triangles; ``down``: a triangle over its edge that bounds a cell, so that 
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from hexwrap_solver.arrays import Complexes, Floats, Ints
@@ -31,6 +33,9 @@ LARGE = 10.0
 FLATTEST = 1e-14
 #: Rounds of independent flips before something must be wrong; meshes seen so far need some dozens.
 MAX_ROUNDS = 4_000
+
+#: Flips independent edges of a mesh, and sets their scaled log-lengths: euclidean ones, or Ptolemy's.
+Flip = Callable[[MirrorMesh, Ints, Floats, bool], None]
 
 
 def cosine_sums(mesh: MirrorMesh, edges: Ints, length: Floats) -> tuple[Floats, Floats]:
@@ -80,13 +85,19 @@ def _cell_cosine(side: Floats, middle: Floats, far: Floats) -> tuple[Floats, Flo
 
 
 def make_delaunay(
-    mesh: MirrorMesh, u: Floats, *, euclidean: bool = False, doubtful: Ints | None = None
+    mesh: MirrorMesh,
+    u: Floats,
+    *,
+    euclidean: bool = False,
+    doubtful: Ints | None = None,
+    do: Flip | None = None,
 ) -> int:
     """Flips until every edge is Delaunay in the metric with logarithmic factors u. Returns the number of
     flips.
 
     euclidean: keep the piecewise flat metric of u = 0 (then u must vanish). doubtful: the edges that may not
-    be Delaunay at first, where known. Raises ConvergenceError if rounding keeps it from ending.
+    be Delaunay at first, where known. do: ``flip``, or what does the same. Raises ConvergenceError if
+    rounding keeps it from ending.
     """
     length = mesh.scaled(u)
     edges = np.arange(len(length)) if doubtful is None else doubtful
@@ -98,7 +109,7 @@ def make_delaunay(
         if not len(bad):
             return total
         now, claims = _independent(mesh, bad)
-        _flip(mesh, now, length, euclidean)
+        (do or flip)(mesh, now, length, euclidean)
         total += len(now)
         mesh.log_length[now] = length[now] - (u[mesh.origin[2 * now]] + u[mesh.origin[2 * now + 1]]) / 2
         edges = _around(mesh, claims, bad)
@@ -141,7 +152,7 @@ def _around(mesh: MirrorMesh, claims: Ints, bad: Ints) -> Ints:
     return np.unique(np.concatenate([bad, h >> 1, cross[cross >= 0]]))
 
 
-def _flip(mesh: MirrorMesh, edges: Ints, length: Floats, euclidean: bool) -> None:
+def flip(mesh: MirrorMesh, edges: Ints, length: Floats, euclidean: bool) -> None:
     """Flips independent edges; ``length`` (e,) gets the new scaled log-lengths."""
     crossing = mesh.crossing[edges]
     cell = mesh.outer[2 * edges] | mesh.outer[2 * edges + 1]
@@ -170,7 +181,7 @@ def _flip_across(mesh: MirrorMesh, edges: Ints, length: Floats, euclidean: bool)
     h1, h2, t1, t2 = mesh.next[h], mesh.prev[h], mesh.next[t], mesh.prev[t]
     e, jk, ki, il, lj = (length[x >> 1] for x in (h, h1, h2, t1, t2))
     if euclidean:
-        one, two = _apex(e, ki, jk), _apex(e, il, lj)
+        one, two = apex_over(e, ki, jk), apex_over(e, il, lj)
         length[edges] = e + np.log(np.abs(one - np.conj(two)))
     else:
         length[edges] = np.logaddexp(jk + il, ki + lj) - e
@@ -190,8 +201,8 @@ def _flip_down(mesh: MirrorMesh, edges: Ints, length: Floats, euclidean: bool) -
     e, b, a = length[edges], length[h1 >> 1], length[h2 >> 1]
     if euclidean:
         slope = (np.exp(m_j - e) - np.exp(m_i - e)) / 2
-        along = _along(slope)
-        apex = _apex(e, a, b)
+        along = along_mirror(slope)
+        apex = apex_over(e, a, b)
         length[edges] = e + np.log(np.exp(m_i - e) + 2 * (apex.real * slope + apex.imag * along))
     else:
         diagonal = 0.5 * np.logaddexp(2 * e, m_i + m_j)
@@ -219,7 +230,7 @@ def _flip_up(mesh: MirrorMesh, edges: Ints, length: Floats, euclidean: bool) -> 
     a, b = length[left >> 1], length[right >> 1]
     if euclidean:
         first, second = (np.exp(m - a) - np.exp(m_i - a)) / 2, (np.exp(m_j - b) - np.exp(m - b)) / 2
-        along = _along(first) + np.exp(b - a) * _along(second)
+        along = along_mirror(first) + np.exp(b - a) * along_mirror(second)
         length[edges] = a + np.log(np.hypot(along, first + np.exp(b - a) * second))
     else:
         length[edges] = (
@@ -237,7 +248,7 @@ def _flip_up(mesh: MirrorMesh, edges: Ints, length: Floats, euclidean: bool) -> 
     mesh.next[below], mesh.prev[after] = after, below
 
 
-def _apex(base: Floats, left: Floats, right: Floats) -> Complexes:
+def apex_over(base: Floats, left: Floats, right: Floats) -> Complexes:
     """Apex of triangles over the unit segment 0–1 from log-lengths; ``left`` is the side at 0."""
     a, b = np.exp(left - base), np.exp(right - base)
     x = (1 + (a - b) * (a + b)) / 2
@@ -247,6 +258,6 @@ def _apex(base: Floats, left: Floats, right: Floats) -> Complexes:
     return np.asarray(x + 1j * np.maximum(0.5 * np.sqrt(np.maximum(square, 0.0)), FLATTEST))
 
 
-def _along(slope: Floats) -> Floats:
+def along_mirror(slope: Floats) -> Floats:
     """The part of a unit edge that runs along the mirror line, from the part that runs away from it."""
     return np.asarray(np.sqrt(np.maximum((1 - slope) * (1 + slope), 0.0)))

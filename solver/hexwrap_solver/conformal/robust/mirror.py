@@ -87,24 +87,29 @@ class MirrorMesh:
         return np.where(cross < 0, -np.inf, log_length[cross])
 
 
+def half_edge_names(surface: Surface) -> Ints:
+    """(3m,) what the half-edges of the faces are called in ``mirror_mesh``."""
+    twin = surface.twin
+    lead = (twin < 0) | (np.arange(len(twin)) < twin)
+    edge = np.zeros(len(twin), dtype=np.int64)
+    edge[lead] = np.arange(int(lead.sum()))
+    edge[~lead] = edge[twin[~lead]]
+    return np.asarray(2 * edge + ~lead)
+
+
 def mirror_mesh(surface: Surface, log_length: Floats, turn: Ints) -> MirrorMesh:
     """The double of a surface. log_length, turn: (3m,) per half-edge of the faces (see ``topology``)."""
     faces, twin, n = surface.faces, surface.twin, len(surface.vertices)
-    inner = np.arange(faces.size)
-    lead = (twin < 0) | (inner < twin)
-    edge = np.zeros(faces.size, dtype=np.int64)
-    edge[lead] = np.arange(int(lead.sum()))
-    follow = ~lead
-    edge[follow] = edge[twin[follow]]
-    name = 2 * edge + follow  # of every half-edge of the faces
-    size = 2 * int(lead.sum())
+    name = half_edge_names(surface)
+    edge = name >> 1
+    size = 2 * (int(edge.max()) + 1)
     boundary = np.flatnonzero(twin < 0)
     outside = name[boundary] + 1
 
     origin, following, previous, turns = (np.zeros(size, dtype=np.int64) for _ in range(4))
     origin[name] = faces.ravel()
     origin[outside] = np.roll(faces, -1, axis=1).ravel()[boundary]
-    following[name] = name[next_half_edge(inner)]
+    following[name] = name[next_half_edge(np.arange(faces.size))]
     at_origin = np.zeros(n, dtype=np.int64)
     at_origin[origin[outside]] = outside
     following[outside] = at_origin[faces.ravel()[boundary]]

@@ -55,9 +55,7 @@ def split_edges(problem: Problem, marked: Ints, place: Floats) -> Problem:
     surface, targets = problem.surface, problem.targets
     faces, twin, n = surface.faces, surface.twin, len(surface.vertices)
     tail, head = half_edges(faces)
-    name = np.where(twin[marked] >= 0, np.minimum(marked, twin[marked]), marked)
-    _, first = np.unique(name, return_index=True)
-    h, s = marked[first], place[first]
+    h, s = once_per_edge(surface, marked, place)
     i, j = tail[h], head[h]
     new = n + np.arange(len(h))
     point = np.full(faces.size, -1, dtype=np.int64)
@@ -94,6 +92,13 @@ def split_edges(problem: Problem, marked: Ints, place: Floats) -> Problem:
         targets.tie_angle + np.pi * counts,
     )
     return Problem(refined, grown, blend(problem.u), parent)
+
+
+def once_per_edge(surface: Surface, marked: Ints, place: Floats) -> tuple[Ints, Floats]:
+    """The half-edges (and places) that ``split_edges`` gives a new vertex each, in the order of these."""
+    twin = surface.twin[marked]
+    _, first = np.unique(np.where(twin >= 0, np.minimum(marked, twin), marked), return_index=True)
+    return marked[first], place[first]
 
 
 def _subdivide(faces: Ints, point: Ints, vertices: Floats) -> tuple[Ints, Ints]:

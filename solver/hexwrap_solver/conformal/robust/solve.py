@@ -18,6 +18,7 @@ from hexwrap_solver.conformal.robust.descent import ACCEPTED, Descent, FlipEnerg
 from hexwrap_solver.conformal.robust.develop import develop
 from hexwrap_solver.conformal.robust.metric import Metric, angle_sums
 from hexwrap_solver.conformal.robust.mirror import MirrorMesh, mirror_mesh
+from hexwrap_solver.conformal.robust.overlay import Overlay, insert
 from hexwrap_solver.conformal.robust.refine import (
     Problem,
     collapsing,
@@ -55,8 +56,9 @@ def solve_with_flips(
 
     Newton's method runs on the intrinsic Delaunay triangulation of the annulus glued to its mirror image (see
     ``mirror``, ``delaunay``, ``descent``). The vertices keep the places it gives them, and the original
-    triangles are drawn straight between these. Where one would turn over, its longest edge is split and the
-    map computed again; ``surface`` of the result is then the refined mesh. start: (n,) u to start from.
+    triangles are drawn straight between these. Where one would turn over, its longest edge is split: at first
+    without solving again (see ``overlay``); where that does not suffice, with the new vertices as unknowns.
+    ``surface`` of the result is then the refined mesh. start: (n,) u to start from.
     Sources: Gu, Luo, Sun, Wu 2018 (existence); Springborn 2020; Gillespie, Springborn, Crane 2021 (flips).
     Raises ConvergenceError where double precision does not suffice.
     """
@@ -77,13 +79,18 @@ def _refined(
     more than ``most`` times the vertices go without, and into ``omitted``."""
     iterations, fewest, span = 0, len(surface.faces), np.inf
     for attempt in range(MAX_ROUNDS):
-        problem = _uncollapse(problem)
-        found = _draw(problem, _flatten(problem, progress, span))
+        problem, turn = _uncollapse(problem)
+        flat = _flatten(problem, turn, progress, span)
+        found, lift = _draw(problem, flat)
         iterations += found.iterations
         wrong = np.flatnonzero(misdrawn(found))
         if not len(wrong):
-            _check_drawn(found, problem.targets)
+            _check_drawn(found, flat.off)
             return _told(found, surface, iterations)
+        if attempt == 0:
+            refined = _inserted(problem, flat, found, lift, wrong)
+            if refined is not None:
+                return _told(refined, surface, iterations)
         problem = replace(problem, u=found.log_scale)
         before = len(problem.surface.vertices)
         if attempt >= PATIENCE and attempt % SHELLS == 0 and len(wrong) <= FEW:
@@ -112,6 +119,22 @@ def _refined(
     )
 
 
+def _inserted(
+    problem: Problem, flat: _Flat, found: ConformalMap, lift: Ints, wrong: Ints
+) -> ConformalMap | None:
+    """The map that was found, with new vertices where it puts them, until no triangle turns over; None where
+    that does not succeed."""
+    try:
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            overlay = Overlay(found, flat.log_length, flat.turn, flat.descent.u, lift)
+            drawn = insert(overlay, problem.targets, wrong)
+        if drawn is not None:
+            _check_drawn(drawn, flat.off)
+    except ConvergenceError:
+        return None
+    return drawn
+
+
 @dataclass(frozen=True)
 class FlatMetric:
     """A flat metric that has not been drawn. surface: the one it belongs to, with vertices inserted where
@@ -126,8 +149,8 @@ def metric_with_flips(
     surface: Surface, targets: Targets, progress: Progress = no_progress, start: Floats | None = None
 ) -> FlatMetric:
     """The metric of ``solve_with_flips``, whether or not straight triangles can be drawn in it."""
-    problem = _uncollapse(_problem(surface, targets, start))
-    flat = _flatten(problem, progress)
+    problem, turn = _uncollapse(_problem(surface, targets, start))
+    flat = _flatten(problem, turn, progress)
     return FlatMetric(problem.surface, flat.descent.u, flat.sums)
 
 
@@ -143,12 +166,13 @@ def _turns(surface: Surface) -> Ints:
     return np.asarray(np.roll(sheet, -1, axis=1) - sheet)
 
 
-def _uncollapse(problem: Problem) -> Problem:
-    """Splits what has no room in the domain, until there is nothing of the kind."""
+def _uncollapse(problem: Problem) -> tuple[Problem, Ints]:
+    """Splits what has no room in the domain, until there is nothing of the kind. Also gives ``_turns``."""
     while True:
-        marked = collapsing(problem.surface, problem.targets, _turns(problem.surface).ravel())
+        turn = _turns(problem.surface)
+        marked = collapsing(problem.surface, problem.targets, turn.ravel())
         if not len(marked):
-            return problem
+            return problem, turn
         problem = split_edges(problem, marked, np.full(len(marked), 0.5))
 
 
@@ -157,26 +181,29 @@ class _Flat:
     """A flat Delaunay metric on the mirrored annulus.
 
     turn: (m, 3) see ``_turns``. unit: logarithm of the length in which the metric is measured.
-    cone_angle: K. sums: (n,) angle sums. flips: all of them."""
+    log_length: (3m,) of the surface's half-edges in it.
+    cone_angle: K. sums: (n,) angle sums. flips: all of them. off: how far prescribed boundary angles are
+    missed."""
 
     mesh: MirrorMesh
     turn: Ints
+    log_length: Floats
     unit: float
     cone_angle: float
     descent: Descent
     sums: Floats
     flips: int
+    off: float
 
 
-def _flatten(problem: Problem, progress: Progress, known_span: float = np.inf) -> _Flat:
+def _flatten(problem: Problem, turn: Ints, progress: Progress, known_span: float = np.inf) -> _Flat:
     """The metric with the problem's angle sums. Raises ConvergenceError.
 
-    known_span: the least span of u that came out of the rounds of refinement so far; later ones may have run
-    away.
+    turn: (m, 3) see ``_turns``. known_span: the least span of u that came out of the rounds of refinement so
+    far; later ones may have run away.
     """
     surface, targets = problem.surface, problem.targets
     free = bool((targets.tie == 0).any() and len(targets.tie_angle) == 1)  # the cone angle comes out
-    turn = _turns(surface)
     log_length = np.log(opposite_lengths(surface.vertices, surface.faces))[[2, 0, 1]].T.ravel()
     unit = float(np.median(log_length))  # logarithms near 0 have the most digits behind the point
     mesh = mirror_mesh(surface, log_length - unit, turn.ravel())
@@ -187,7 +214,8 @@ def _flatten(problem: Problem, progress: Progress, known_span: float = np.inf) -
     known = sums if free else targets.angle
     angle = cone_angle_of(targets, known, surface)
     check_span(descent.u, angle)
-    if not (descent.residual <= ACCEPTED and _met(targets, sums, surface)):
+    off = _off(targets, sums, surface)
+    if not (descent.residual <= ACCEPTED and off <= PROMISED):
         raise failure(
             min(known_span, float(np.ptp(descent.u))),
             angle,
@@ -196,11 +224,12 @@ def _flatten(problem: Problem, progress: Progress, known_span: float = np.inf) -
             "double precision cannot hold the map of this surface; remesh it more evenly",
             [],
         )
-    return _Flat(mesh, turn, unit, angle, descent, sums, flips + descent.flips)
+    return _Flat(mesh, turn, log_length - unit, unit, angle, descent, sums, flips + descent.flips, off)
 
 
-def _draw(problem: Problem, flat: _Flat) -> ConformalMap:
-    """The map of the vertices, with the triangles as they are, whether they turn over or not."""
+def _draw(problem: Problem, flat: _Flat) -> tuple[ConformalMap, Ints]:
+    """The map of the vertices, with the triangles as they are, whether they turn over or not; and the lift of
+    its ``Development``."""
     surface, targets, descent, sums = problem.surface, problem.targets, flat.descent, flat.sums
     u, metric = _centred(descent, targets)
     check_reach(u, flat.cone_angle)
@@ -213,7 +242,7 @@ def _draw(problem: Problem, flat: _Flat) -> ConformalMap:
     unit = np.exp(flat.unit)
     deck = Deck(flat.cone_angle, laid.translation * unit)
     uv, deck, circumference = normalise(surface, laid.uv * unit, sheet, deck, foot)
-    return ConformalMap(
+    found = ConformalMap(
         surface=surface,
         log_scale=u,
         uv=straighten(surface, targets, uv, sheet, deck),
@@ -226,13 +255,14 @@ def _draw(problem: Problem, flat: _Flat) -> ConformalMap:
         flips=flat.flips,
         closing_error=laid.gap,
     )
+    return found, laid.lift
 
 
-def _met(targets: Targets, sums: Floats, surface: Surface) -> bool:
-    """Whether the prescribed boundary angles are as exact as promised."""
+def _off(targets: Targets, sums: Floats, surface: Surface) -> float:
+    """How far prescribed boundary angles are missed, radians."""
     loops = np.concatenate(surface.loops)
     listed = loops[targets.tie[loops] < 0]
-    return bool((np.abs(sums - targets.angle)[listed] <= PROMISED).all())
+    return float(np.abs(sums - targets.angle)[listed].max(initial=0.0))
 
 
 def _centred(descent: Descent, targets: Targets) -> tuple[Floats, Metric]:
@@ -243,13 +273,11 @@ def _centred(descent: Descent, targets: Targets) -> tuple[Floats, Metric]:
     return descent.u - middle, replace(descent.metric, length=descent.metric.length - middle)
 
 
-def _check_drawn(found: ConformalMap, targets: Targets) -> None:
+def _check_drawn(found: ConformalMap, off: float) -> None:
     """Raises ConvergenceError where boundary angles, as drawn, are not as exact as promised: small residuals
-    add up along the way through a domain of very large and very small parts."""
-    loops = np.concatenate(found.surface.loops)
-    off = np.where(targets.tie[loops] < 0, np.concatenate(found.boundary_angles) - targets.angle[loops], 0.0)
+    add up along the way through a domain of very large and very small parts. off: as in ``_Flat``."""
     error = drawn_error(found)
-    if error + np.abs(off).max() > PROMISED:
+    if error + off > PROMISED:
         raise failure(
             float(np.ptp(found.log_scale)),
             found.deck.angle,

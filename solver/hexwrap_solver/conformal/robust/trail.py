@@ -1,0 +1,218 @@
+"""Points carried through flips.
+
+A point of a triangle (i, j, k) has homogeneous coordinates: weights of three vectors v_i, v_j, v_k in R³. On
+the flat surface these are (x, y, 1) of the corners. In the hyperbolic structure that all discretely conformal
+metrics share, they are light-like with ⟨v_i, v_j⟩ = −l_ij² / 2, where l is the length in the metric: inside
+the circumcircle of a triangle, (corner − centre, radius). So in a metric in which edges are Delaunay, both
+kinds of coordinates are the same, and from one metric to the next v_i grows by e^{u_i} (Springborn 2020;
+Gillespie, Springborn, Crane 2021: maps that are projective between circumcircles).
+
+A cell counts as a triangle (i, j, K): K is the unit vector at right angles to the mirror line, towards the
+mirror; ⟨v_i, K⟩ = −m_i / 2 and ⟨K, K⟩ = 1, with m_i the length of the crossing edge at i. All kinds of flips
+then put the other diagonal into a quad (i, l, j, k), any of which may be K, with one relation
+v_l = β_i v_i + β_j v_j + β_k v_k, where β_k < 0 < β_i, β_j.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hexwrap_solver.arrays import Bools, Floats, Ints
+from hexwrap_solver.conformal.robust import delaunay
+from hexwrap_solver.conformal.robust.mirror import MirrorMesh
+
+
+@dataclass(frozen=True)
+class Places:
+    """Points in pieces (triangles or cells) of a mirrored mesh.
+
+    half_edge: (k,) a side of each point's triangle, or the outer half-edge of its cell.
+    weight: (k, 3) of the vectors of its origin, its end, and its apex or K.
+    power: (k,) which copy of the origin belongs to it, counted as ``MirrorMesh.turn`` is.
+    """
+
+    half_edge: Ints
+    weight: Floats
+    power: Ints
+
+
+@dataclass(frozen=True)
+class _Flips:
+    """Independent flips from the diagonal (I, J) between pieces (I, J, k) and (J, I, l) to (k, l).
+
+    Of the old pieces, for any half-edge of theirs: old: (r,) half-edge. flip: (r,) the flip that replaces it.
+    over: (r,) whether it is the piece at l. order: (r, 3) where the weights of I, J and k or l stand.
+    shift: (r,) power of I minus power of the origin.
+    Of the new pieces at I and at J: new: (2, f) half-edge. sort: (2, 3) which of (I or J, l, k) stand where.
+    lead: (2, f) power of the origin minus power of I.
+    relation: (f, 3) β of I, J and k.
+    """
+
+    old: Ints
+    flip: Ints
+    over: Bools
+    order: Ints
+    shift: Ints
+    new: Ints
+    sort: Ints
+    lead: Ints
+    relation: Floats
+
+
+@dataclass
+class Trail:
+    """All flips from one triangulation to another, in the order in which they were done."""
+
+    rounds: list[_Flips] = field(default_factory=list)
+
+    def flip(self, mesh: MirrorMesh, edges: Ints, length: Floats, euclidean: bool) -> None:
+        """``delaunay.flip``, taken down."""
+        crossing = mesh.crossing[edges]
+        cell = (mesh.outer[2 * edges] | mesh.outer[2 * edges + 1]) & ~crossing
+        kinds = (_up, crossing), (_down, cell), (_across, ~(crossing | cell))
+        started = [kind(mesh, edges[which], length) for kind, which in kinds if which.any()]
+        delaunay.flip(mesh, edges, length, euclidean)
+        self.rounds += [finish(length, euclidean) for finish in started]
+
+    def follow(self, places: Places, size: int) -> Places:
+        """Where points of the first triangulation are in the last one. size: number of half-edges."""
+        at, weight, power = places.half_edge.copy(), places.weight.copy(), places.power.copy()
+        row = np.full(size, -1)
+        for flips in self.rounds:
+            row[flips.old] = np.arange(len(flips.old))
+            hit = np.flatnonzero(row[at] >= 0)
+            if len(hit):
+                at[hit], weight[hit], power[hit] = _carried(flips, row[at[hit]], weight[hit], power[hit])
+            row[flips.old] = -1
+        return Places(at, weight, power)
+
+
+def _carried(flips: _Flips, row: Ints, weight: Floats, power: Ints) -> tuple[Ints, Floats, Ints]:
+    """Points in old pieces ``row`` in the new pieces: half-edges, weights and powers."""
+    f, over = flips.flip[row], flips.over[row]
+    weight = np.take_along_axis(weight, flips.order[row], axis=1)
+    beta = flips.relation[f]
+    side = (weight[:, 0] * beta[:, 1] < weight[:, 1] * beta[:, 0]).astype(np.int64)  # 0 at I, 1 at J
+    k = np.arange(len(row))
+    ratio = weight[k, 1 - side] / beta[k, 1 - side]
+    carried = np.stack(
+        [
+            np.maximum(weight[k, side] - ratio * beta[k, side], 0.0),
+            ratio + np.where(over, weight[:, 2], 0.0),
+            np.where(over, 0.0, weight[:, 2]) - ratio * beta[:, 2],
+        ],
+        axis=1,
+    )
+    carried = np.take_along_axis(carried, flips.sort[side], axis=1)
+    return flips.new[side, f], carried, power + flips.shift[row] + flips.lead[side, f]
+
+
+#: What finishes the record of flips after they are done: it gets the new lengths.
+_Finish = Callable[[Floats, bool], _Flips]
+#: Half-edges, whether they are sides of the piece at l, ``order``, ``shift``.
+_Old = tuple[Ints, bool, tuple[int, int, int], Ints]
+#: Half-edges, ``sort``, ``lead``.
+_New = tuple[Ints, tuple[int, int, int], Ints]
+
+
+def _record(old: Sequence[_Old], at_i: _New, at_j: _New, relation: Floats) -> _Flips:
+    count = len(at_i[0])
+    return _Flips(
+        old=np.concatenate([half_edges for half_edges, _, _, _ in old]),
+        flip=np.tile(np.arange(count), len(old)),
+        over=np.repeat([over for _, over, _, _ in old], count),
+        order=np.repeat([order for _, _, order, _ in old], count, axis=0),
+        shift=np.concatenate([shift for _, _, _, shift in old]),
+        new=np.stack([at_i[0], at_j[0]]),
+        sort=np.array([at_i[1], at_j[1]]),
+        lead=np.stack([at_i[2], at_j[2]]),
+        relation=relation,
+    )
+
+
+def _across(mesh: MirrorMesh, edges: Ints, length: Floats) -> _Finish:
+    """Triangles (i, j, k) and (j, i, l) become (i, l, k) and (j, k, l)."""
+    h, t = 2 * edges, 2 * edges + 1
+    h1, h2, t1, t2 = mesh.next[h], mesh.prev[h], mesh.next[t], mesh.prev[t]
+    e, turn, none = length[edges], mesh.turn, np.zeros(len(edges), dtype=np.int64)
+    old = (
+        *_triangle(mesh, h),
+        (t, True, (1, 0, 2), turn[t]),
+        (t1, True, (0, 2, 1), none),
+        (t2, True, (2, 1, 0), -turn[t1]),
+    )
+    at_i, at_j = (t1, (0, 1, 2), none), (h1, (0, 2, 1), turn[h])
+
+    def finish(length: Floats, euclidean: bool) -> _Flips:
+        jk, ki, il, lj, kl = (length[x >> 1] for x in (h1, h2, t1, t2, h))
+        if euclidean:
+            apex, other = delaunay.apex_over(e, ki, jk), np.conj(delaunay.apex_over(e, il, lj))
+            beta_k = other.imag / apex.imag
+            beta_j = other.real - beta_k * apex.real
+            return _record(old, at_i, at_j, np.stack([1 - beta_j - beta_k, beta_j, beta_k], axis=1))
+        log_beta = np.stack([lj + kl - e - ki, il + kl - e - jk, lj + il - jk - ki], axis=1)
+        return _record(old, at_i, at_j, np.exp(log_beta) * (1, 1, -1))
+
+    return finish
+
+
+def _down(mesh: MirrorMesh, edges: Ints, length: Floats) -> _Finish:
+    """Triangle (i, j, x) and cell (j, i, K) become the cells (x, i, K) and (j, x, K)."""
+    below = np.where(mesh.outer[2 * edges], 2 * edges, 2 * edges + 1)
+    h = below ^ 1
+    h1, h2 = mesh.next[h], mesh.prev[h]
+    turn = mesh.turn
+    old = (*_triangle(mesh, h), (below, True, (1, 0, 2), turn[below]))
+    at_i, at_j = (h2, (2, 0, 1), -turn[h2]), (h1, (0, 2, 1), turn[h])
+    e, m_j, m_i = length[edges], mesh.cross_length(below, length), mesh.cross_length(mesh.next[below], length)
+
+    def finish(length: Floats, euclidean: bool) -> _Flips:
+        relation = _cell_relation(e, length[h2 >> 1], length[h1 >> 1], m_i, m_j, euclidean)
+        i, j, pole = relation.T  # of x; those of K are
+        return _record(old, at_i, at_j, np.stack([-i, -j, np.ones_like(i)], axis=1) / pole[:, None])
+
+    return finish
+
+
+def _up(mesh: MirrorMesh, edges: Ints, length: Floats) -> _Finish:
+    """Cells (x, i, K) and (j, x, K) become triangle (x, i, j) and cell (j, i, K)."""
+    below, right = 2 * edges + 1, mesh.next[2 * edges]
+    left = mesh.prev[right]
+    turn, none = mesh.turn, np.zeros(len(edges), dtype=np.int64)
+    old = (right, False, (0, 2, 1), none), (left, True, (1, 2, 0), turn[left])
+    at_x, at_pole = (right, (0, 2, 1), none), (below, (1, 2, 0), -turn[left])
+    m_j, m_i = mesh.cross_length(left, length), mesh.cross_length(mesh.next[right], length)
+
+    def finish(length: Floats, euclidean: bool) -> _Flips:
+        relation = _cell_relation(length[edges], length[right >> 1], length[left >> 1], m_i, m_j, euclidean)
+        i, j, pole = relation.T  # of x; those of j are
+        return _record(old, at_x, at_pole, np.stack([np.ones_like(i), -pole, -i], axis=1) / j[:, None])
+
+    return finish
+
+
+def _triangle(mesh: MirrorMesh, h: Ints) -> tuple[_Old, _Old, _Old]:
+    """The triangle (I, J, k) to the left of half-edges from I to J."""
+    second, third = mesh.next[h], mesh.prev[h]
+    return (
+        (h, False, (0, 1, 2), np.zeros(len(h), dtype=np.int64)),
+        (second, False, (2, 0, 1), -mesh.turn[h]),
+        (third, False, (1, 2, 0), mesh.turn[third]),
+    )
+
+
+def _cell_relation(ij: Floats, xi: Floats, xj: Floats, m_i: Floats, m_j: Floats, euclidean: bool) -> Floats:
+    """(f, 3) β with v_x = β_i v_i + β_j v_j + β_K K, from log-lengths."""
+    if euclidean:
+        slope = (np.exp(m_j - ij) - np.exp(m_i - ij)) / 2  # K is (−slope, −along) where i = 0, j = 1
+        x = delaunay.apex_over(ij, xi, xj)
+        drop = x.imag / delaunay.along_mirror(slope)
+        beta_j = x.real - drop * slope
+        return np.stack([1 - beta_j, beta_j, -np.exp(ij) * drop], axis=1)
+    diagonal = 0.5 * np.logaddexp(2 * ij, m_i + m_j)
+    both = xi + xj - diagonal
+    beta_i, beta_j = np.logaddexp(2 * xj, both + m_j) - 2 * ij, np.logaddexp(2 * xi, both + m_i) - 2 * ij
+    return np.stack([np.exp(beta_i), np.exp(beta_j), -np.exp(both)], axis=1)
