@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexwrap_solver.arrays import Floats, Progress, no_progress
+from hexwrap_solver.arrays import Bools, Floats, Ints, Progress, no_progress
 from hexwrap_solver.conformal.energy import Corners, Energy
 from hexwrap_solver.conformal.factor import Factorisation
 
@@ -41,6 +41,12 @@ CHORD_GAIN = 0.2
 #: Where more than so many triangles are broken after so many steps, or any after a full step that leaves at
 #: most SETTLED of the residual, the minimum has broken triangles as well: the search ends there.
 BROKEN, PATIENCE, SETTLED = 8, 2, 0.05
+
+
+#: After a step that was cut short, unknowns with a residual of at least the share LOCAL of the largest, and
+#: RINGS of their neighbours, are brought near the minimum first, where these are no more than the share FEW
+#: of all; by at most LOCAL_STEPS steps.
+LOCAL, RINGS, FEW, LOCAL_STEPS = 0.1, 3, 0.25, 8
 
 
 @dataclass(frozen=True)
@@ -108,7 +114,12 @@ def minimise(energy: Energy, start: Floats | None = None, progress: Progress = n
             point = following
         if gain > STAGNATION and near:
             break
-        if _stays_broken(point.corners, iterations, full and gain <= SETTLED):
+        settled = full and gain <= SETTLED
+        if not full and not _stays_broken(point.corners, iterations, False):
+            before = point.residual
+            point = _relaxed(energy, point)
+            settled = point.residual <= SETTLED * before
+        if _stays_broken(point.corners, iterations, settled):
             break
         chord = full and chords_left(point.residual, gain, tolerance) <= CHORDS
     return Minimum(
@@ -119,6 +130,51 @@ def minimise(energy: Energy, start: Floats | None = None, progress: Progress = n
         factorisations,
         converged=point.residual <= ACCEPTED,
     )
+
+
+def _relaxed(energy: Energy, point: _Point) -> _Point:
+    """Newton's method among the unknowns where the residual is large, and their neighbours, if these are few.
+
+    For the sake of a few triangles that break, steps of all unknowns are cut short again and again (nonlinear
+    elimination; Cai, Keyes 2002).
+    """
+    for _ in range(LOCAL_STEPS):
+        among = _around(energy, np.abs(point.gradient) > LOCAL * point.residual)
+        if len(among) > FEW * len(point.x) or point.residual <= ACCEPTED:
+            break
+        direction = _local_direction(energy, point, among)
+        following = None if direction is None else _line_search(energy, point, direction)[0]
+        if following is None:
+            break
+        point = following
+    return point
+
+
+def _around(energy: Energy, marked: Bools) -> Ints:
+    """The marked unknowns (n,), and those up to RINGS edges away from them."""
+    marked = marked.copy()
+    for _ in range(RINGS):
+        joined = marked[energy.rows] | marked[energy.columns]
+        marked[energy.rows[joined]] = marked[energy.columns[joined]] = True
+    return np.flatnonzero(marked)
+
+
+def _local_direction(energy: Energy, point: _Point, among: Ints) -> Floats | None:
+    """``_newton_direction`` where only the unknowns ``among`` may change."""
+    local = np.full(len(point.x), -1)
+    local[among] = np.arange(len(among))
+    rows, columns = local[energy.rows], local[energy.columns]
+    inside = (rows >= 0) & (columns >= 0)
+    factorisation = Factorisation(energy.points[among], rows[inside], columns[inside])
+    diagonal, off_diagonal = energy.hessian(point.corners)
+    found = _solved(
+        factorisation, diagonal[among], off_diagonal[inside], -point.gradient[among], point.corners
+    )
+    if found is None:
+        return None
+    direction = np.zeros(len(point.x))
+    direction[among] = found
+    return direction
 
 
 def _stays_broken(corners: Corners, iterations: int, settled: bool) -> bool:
@@ -157,21 +213,27 @@ def _newton_step(energy: Energy, factorisation: Factorisation, point: _Point) ->
 
 
 def _newton_direction(energy: Energy, factorisation: Factorisation, point: _Point) -> Floats | None:
-    """H⁻¹(−∇E). None where the system cannot be solved.
+    """H⁻¹(−∇E). None where the system cannot be solved."""
+    return _solved(factorisation, *energy.hessian(point.corners), -point.gradient, point.corners)
+
+
+def _solved(
+    factorisation: Factorisation, diagonal: Floats, off_diagonal: Floats, right: Floats, corners: Corners
+) -> Floats | None:
+    """The solution of a system with the Hessian, if it leads downhill.
 
     Broken triangles add nothing to H; where a vertex has no other ones H is singular, so a small multiple of
     the diagonal is added, more where that does not suffice (Levenberg 1944).
     """
-    diagonal, off_diagonal = energy.hessian(point.corners)
     scale = max(float(np.abs(diagonal).max()), 1.0)
-    for shift in SHIFTS[int(point.corners.broken.any()) :]:
+    for shift in SHIFTS[int(corners.broken.any()) :]:
         try:
             factorisation.factorise(diagonal + shift * scale, off_diagonal)
         except np.linalg.LinAlgError:
             continue
-        direction = -factorisation.solve(point.gradient)
-        if np.isfinite(direction).all() and point.gradient @ direction < 0:
-            return direction
+        direction = factorisation.solve(right)
+        if np.isfinite(direction).all() and right @ direction > 0:
+            return np.asarray(direction)
     return None
 
 

@@ -27,9 +27,9 @@ from hexwrap_solver.conformal.robust.trail import Places, Trail
 from hexwrap_solver.conformal.types import ConformalMap, Targets
 from hexwrap_solver.surface.topology import half_edges
 
-#: Rounds of insertion, and of them without progress: meshes seen so far take up to six, or go on and on
-#: around a vertex of many edges, from one triangle to the next.
-MAX_ROUNDS, PATIENCE = 12, 3
+#: Rounds of insertion, and of them without progress. Most meshes take up to six; around a vertex of many
+#: edges each round may lead to the next triangle only.
+MAX_ROUNDS, PATIENCE = 100, 40
 #: Insertion that makes more than so many times the vertices, and so many more, does not come to an end.
 MOST, MOST_MORE = 2, 400
 
