@@ -115,5 +115,17 @@ def solve_after(report: Report, seconds: float, *arguments: Any) -> Any:
     return solve(report, *arguments)
 
 
+def solve_held(report: Report, stage: str, gate: str, *arguments: Any) -> Any:
+    """A job that stays at a stage until there is a file."""
+    from hexwrap_server.work import solve
+
+    def held(at: str, fraction: float, what: str) -> None:
+        report(at, fraction, what)
+        while at == stage and not Path(gate).exists():
+            time.sleep(0.01)
+
+    return solve(held, *arguments)
+
+
 def die_at_once(report: Report, *arguments: Any) -> None:
     os._exit(9)

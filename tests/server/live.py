@@ -17,6 +17,8 @@ from hexwrap_server.engine import Engine
 from hexwrap_server.service import Service
 from hexwrap_server.settings import Settings
 
+OVER = ("done", "failed", "cancelled")
+
 
 class Live(httpx.Client):
     """A client of a running server, and the server's inside."""
@@ -50,11 +52,35 @@ def running(data: Path, own: Engine | None = None, **settings: Any) -> Iterator[
         listener.close()
 
 
+def until_at(client: httpx.Client, id: str, stage: str = "surface", seconds: float = 60) -> None:
+    """Until the job runs and is at a stage. To be seen there it has to stay there."""
+    deadline = time.monotonic() + seconds
+    while True:
+        job = client.get(f"/v1/jobs/{id}").json()
+        assert job["status"] not in OVER, f"over before it was seen at its {stage}: {job}"
+        if (job["status"], job["stage"]) == ("running", stage):
+            return
+        assert time.monotonic() < deadline, f"not at its {stage} after {seconds} s: {job}"
+        time.sleep(0.02)
+
+
+def over_first(client: httpx.Client, ids: list[str], seconds: float = 60) -> dict[str, Any]:
+    """The first of some jobs that is over."""
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline:
+        for id in ids:
+            job: dict[str, Any] = client.get(f"/v1/jobs/{id}").json()
+            if job["status"] in OVER:
+                return job
+        time.sleep(0.02)
+    raise AssertionError(f"none of {ids} is over after {seconds} s")
+
+
 def finished(client: httpx.Client, id: str, seconds: float = 60) -> dict[str, Any]:
     """The job when it is over."""
     deadline = time.monotonic() + seconds
     while time.monotonic() < deadline:
         job: dict[str, Any] = client.get(f"/v1/jobs/{id}", params={"wait": 10}).json()
-        if job["status"] in ("done", "failed", "cancelled"):
+        if job["status"] in OVER:
             return job
     raise AssertionError(f"job {id} is not over after {seconds} s")

@@ -21,7 +21,7 @@ from hexwrap_server.engine import nobody
 from hexwrap_server.worker import MemoryLimitError, TimeLimitError, WorkerDiedError
 from hexwrap_solver.errors import RequestError
 from tests.server.bodies import request, tube
-from tests.server.live import finished, running
+from tests.server.live import finished, over_first, running, until_at
 
 distributed = pytest.importorskip("distributed", reason="dask.distributed is not installed (extra 'dask')")
 CALLS = "tests.server.calls:"
@@ -55,6 +55,20 @@ async def engine(made: Any) -> AsyncIterator[Any]:
         yield e
     finally:
         await e.stop()
+
+
+def held_by(gate: Path, scheduler: str) -> Any:
+    """An engine whose jobs stay at their pattern until there is a gate.
+
+    However fast they are, they run when their machine is killed or they are stopped.
+    """
+    from hexwrap_server.dask_engine import DaskEngine
+
+    class Held(DaskEngine):
+        async def run(self, function: str, *arguments: Any, **rest: Any) -> Any:
+            return await super().run(CALLS + "solve_held", "pattern", str(gate), *arguments, **rest)
+
+    return Held(scheduler)
 
 
 def run(story: Coroutine[Any, Any, None]) -> None:
@@ -189,40 +203,46 @@ def test_lost_scheduler_fails_its_job_and_is_found_again(tmp_path: Path) -> None
 @pytest.mark.skipif(os.name == "nt", reason="kill -9 of POSIX")
 def test_job_whose_machine_is_killed_fails_alone(tmp_path: Path) -> None:
     """As the job whose worker process is killed on one machine."""
+    gate = tmp_path / "gate"
     with (
         distributed.LocalCluster(
             n_workers=2, threads_per_worker=1, dashboard_address=":0", protocol="tcp://", silence_logs=50
         ) as made,
-        running(tmp_path, engine="dask", scheduler=made.scheduler_address) as client,
+        running(tmp_path / "data", held_by(gate, made.scheduler_address)) as client,
     ):
         bodies = [request(surface=tube(400, 150, height=10 + i), pattern={"around": 60}) for i in range(2)]
         ids = [client.post("/v1/jobs", json=body).json()["id"] for body in bodies]
-        while not all(client.get(f"/v1/jobs/{id}").json()["stage"] for id in ids):
-            time.sleep(0.02)
+        for id in ids:
+            until_at(client, id, "pattern")  # and both stay there: one on each machine
         os.kill(made.workers[0].pid, signal.SIGKILL)
-        jobs = sorted((finished(client, id) for id in ids), key=lambda job: job["status"])
-        assert [job["status"] for job in jobs] == ["done", "failed"]
-        assert jobs[1]["problem"]["type"] == "/problems/worker-died"
-        assert client.get(f"/v1/jobs/{jobs[1]['id']}/result").status_code == 503
-        again = client.post("/v1/jobs", json=bodies[ids.index(jobs[1]["id"])]).json()["id"]
+        lost = over_first(client, ids)
+        assert (lost["status"], lost["problem"]["type"]) == ("failed", "/problems/worker-died")
+        assert client.get(f"/v1/jobs/{lost['id']}/result").status_code == 503
+        (neighbour,) = set(ids) - {lost["id"]}
+        until_at(client, neighbour, "pattern")
+        gate.touch()
+        assert finished(client, neighbour)["status"] == "done"
+        again = client.post("/v1/jobs", json=bodies[ids.index(lost["id"])]).json()["id"]
         assert finished(client, again)["status"] == "done"
 
 
 @pytest.mark.filterwarnings("ignore")
 def test_running_job_on_a_cluster_is_stopped(tmp_path: Path) -> None:
+    gate = tmp_path / "gate"
     with (
         distributed.LocalCluster(
             n_workers=1, threads_per_worker=1, dashboard_address=":0", protocol="tcp://", silence_logs=50
         ) as made,
-        running(tmp_path, engine="dask", scheduler=made.scheduler_address) as client,
+        running(tmp_path / "data", held_by(gate, made.scheduler_address)) as client,
     ):
         body = request(surface=tube(400, 150), pattern={"around": 60})
         id = client.post("/v1/jobs", json=body).json()["id"]
-        while not client.get(f"/v1/jobs/{id}").json()["stage"]:
-            time.sleep(0.02)
+        until_at(client, id, "pattern")
         start = time.monotonic()
         assert client.delete(f"/v1/jobs/{id}").status_code == 204
         assert time.monotonic() - start < 2
+        assert client.get(f"/v1/jobs/{id}").json()["status"] == "cancelled"
+        gate.touch()
         small = client.post("/v1/jobs", json=request()).json()["id"]
         assert finished(client, small)["status"] == "done"
 

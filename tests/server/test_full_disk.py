@@ -17,7 +17,7 @@ from hexwrap_server.engine import ProcessEngine
 from hexwrap_server.requests import Order
 from hexwrap_server.store import Store
 from tests.server.bodies import request, tube
-from tests.server.live import Live, finished, running
+from tests.server.live import Live, finished, running, until_at
 
 Fill = Callable[[bool], None]
 
@@ -48,31 +48,26 @@ class Full:
         return self._real.executemany(statement, *values)
 
 
-class Elsewhere(ProcessEngine):
-    """Sends back what other workers put into files; takes its time first."""
+class Held(ProcessEngine):
+    """Its jobs stay at their surface until there is a gate, where it has one."""
 
-    seconds = 0.0
+    gate: Path | None = None
 
     async def run(self, function: str, *arguments: Any, **rest: Any) -> Any:
-        if arguments and isinstance(arguments[0], Order):
-            function = "tests.server.calls:solve_after"
-            arguments = (self.seconds, *arguments)
+        if self.gate and isinstance(arguments[0], Order):
+            function = "tests.server.calls:solve_held"
+            arguments = ("surface", str(self.gate), *arguments)
         return await super().run(function, *arguments, **rest)
 
 
 @pytest.fixture
-def server(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Live, Full, Elsewhere]]:
+def server(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Live, Full, Held]]:
     monkeypatch.setattr(jobs, "CATCH_UP_INTERVAL", 0.1)
-    engine = Elsewhere(1)
+    engine = Held(1)
     with running(tmp_path, engine) as client:
         disk = Full(client.service.store._db)
         client.service.store._db = disk  # type: ignore[assignment]
         yield client, disk, engine
-
-
-def until_running(client: Live, id: str) -> None:
-    while client.get(f"/v1/jobs/{id}").json()["stage"] != "surface":
-        time.sleep(0.02)
 
 
 def status_on_disk(client: Live, id: str) -> str:
@@ -82,13 +77,14 @@ def status_on_disk(client: Live, id: str) -> str:
 
 
 def test_job_that_ends_on_a_full_disk_fails_and_is_written_later(
-    server: tuple[Live, Full, Elsewhere], tmp_path: Path
+    server: tuple[Live, Full, Held], tmp_path: Path
 ) -> None:
     client, disk, engine = server
-    engine.seconds = 1.0
+    engine.gate = tmp_path / "gate"
     id = client.post("/v1/jobs", json=request()).json()["id"]
-    until_running(client, id)
+    until_at(client, id)
     disk.is_full = True
+    engine.gate.touch()
     job = finished(client, id)
     assert (job["status"], job["problem"]["type"]) == ("failed", "/problems/storage")
     assert "database or disk is full" in job["problem"]["detail"]
@@ -102,11 +98,10 @@ def test_job_that_ends_on_a_full_disk_fails_and_is_written_later(
     while status_on_disk(client, id) != "failed":
         assert time.monotonic() < deadline
         time.sleep(0.05)
-    engine.seconds = 0.0
     assert client.post("/v1/solve", json=request()).status_code == 200
 
 
-def test_requests_on_a_full_disk_are_refused_with_503(server: tuple[Live, Full, Elsewhere]) -> None:
+def test_requests_on_a_full_disk_are_refused_with_503(server: tuple[Live, Full, Held]) -> None:
     client, disk, _ = server
     done = client.post("/v1/jobs", json=request()).json()["id"]
     finished(client, done)
@@ -124,26 +119,27 @@ def test_requests_on_a_full_disk_are_refused_with_503(server: tuple[Live, Full, 
     assert client.delete(f"/v1/jobs/{done}").status_code == 204
 
 
-def test_running_job_can_be_stopped_on_a_full_disk(server: tuple[Live, Full, Elsewhere]) -> None:
+def test_running_job_can_be_stopped_on_a_full_disk(server: tuple[Live, Full, Held], tmp_path: Path) -> None:
     client, disk, engine = server
-    engine.seconds = 60.0
+    engine.gate = tmp_path / "gate"
     id = client.post("/v1/jobs", json=request()).json()["id"]
-    until_running(client, id)
+    until_at(client, id)
     disk.is_full = True
     assert client.delete(f"/v1/jobs/{id}").status_code == 204
     assert client.get(f"/v1/jobs/{id}").json()["status"] == "cancelled"
 
 
 def test_jobs_end_and_requests_are_refused_when_the_database_breaks(
-    server: tuple[Live, Full, Elsewhere],
+    server: tuple[Live, Full, Held], tmp_path: Path
 ) -> None:
     client, disk, engine = server
     done = client.post("/v1/jobs", json=request()).json()["id"]
     finished(client, done)
-    engine.seconds = 1.0
+    engine.gate = tmp_path / "gate"
     id = client.post("/v1/jobs", json=request(pattern={"around": 8})).json()["id"]
-    until_running(client, id)
+    until_at(client, id)
     disk.is_broken = True
+    engine.gate.touch()
     job = finished(client, id, seconds=10)
     assert (job["status"], job["problem"]["type"]) == ("failed", "/problems/storage")
     for method, path in (("GET", "/v1/jobs"), ("GET", f"/v1/jobs/{done}/result"), ("POST", "/v1/jobs")):
@@ -154,11 +150,15 @@ def test_jobs_end_and_requests_are_refused_when_the_database_breaks(
 
 
 def test_server_that_dies_before_the_end_is_written_runs_the_job_again(tmp_path: Path) -> None:
-    with running(tmp_path, workers=1) as client:
+    engine = Held(1)
+    engine.gate = tmp_path / "gate"
+    with running(tmp_path, engine) as client:
         disk = Full(client.service.store._db)
         client.service.store._db = disk  # type: ignore[assignment]
         id = client.post("/v1/jobs", json=request(surface=tube(200, 100))).json()["id"]
+        until_at(client, id)
         disk.is_full = True
+        engine.gate.touch()
         assert finished(client, id)["status"] == "failed"
     with running(tmp_path, workers=1) as client:
         assert finished(client, id)["status"] == "done"
@@ -210,13 +210,14 @@ def test_program_that_holds_the_database_holds_nobody_else(tmp_path: Path) -> No
 
 
 def test_job_that_ends_while_the_database_is_held_is_written_when_it_is_free(tmp_path: Path) -> None:
-    engine = Elsewhere(1)
-    engine.seconds = 1.0
+    engine = Held(1)
+    engine.gate = tmp_path / "gate"
     with running(tmp_path, engine) as client:
         id = client.post("/v1/jobs", json=request()).json()["id"]
-        until_running(client, id)
+        until_at(client, id)
         with contextlib.closing(sqlite3.connect(tmp_path / "hexwrap.sqlite3", isolation_level=None)) as other:
             other.execute("BEGIN IMMEDIATE")
+            engine.gate.touch()
             job = client.get(f"/v1/jobs/{id}", params={"wait": 2}).json()
             assert job["status"] == "running"
             other.execute("ROLLBACK")

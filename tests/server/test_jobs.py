@@ -25,7 +25,7 @@ from hexwrap_server.settings import MIB, Settings
 from hexwrap_server.store import FolderInUseError, Job, Store
 from hexwrap_server.worker import WorkerDiedError
 from tests.server.bodies import request, tube
-from tests.server.live import Live, finished, running
+from tests.server.live import Live, finished, running, until_at
 
 Behave = Callable[..., Live]
 
@@ -85,17 +85,14 @@ def post(client: Live, **changes: Any) -> str:
     return id
 
 
-def until_running(client: Live, id: str) -> None:
-    deadline = time.monotonic() + 20
-    while client.get(f"/v1/jobs/{id}").json()["stage"] != "surface":
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
-
-
-def test_identical_requests_at_once_run_once(behave: Behave, server: tuple[Live, Watched]) -> None:
-    client, surface = behave("solve_after", 0.5), fresh()
+def test_identical_requests_at_once_run_once(
+    behave: Behave, server: tuple[Live, Watched], tmp_path: Path
+) -> None:
+    gate = tmp_path / "gate"
+    client, surface = behave("solve_held", "surface", str(gate)), fresh()
     ids = [post(client, name=f"client {i}", surface=surface) for i in range(4)]
     assert len(set(ids)) == 4
+    gate.touch()
     assert {finished(client, id)["status"] for id in ids} == {"done"}
     assert server[1].calls == 1
     later = client.get(f"/v1/jobs/{post(client, surface=surface)}").json()
@@ -121,7 +118,7 @@ def test_changed_settings_reuse_the_stages_before(tmp_path: Path) -> None:
 def test_running_job_is_stopped_and_frees_its_worker(behave: Behave) -> None:
     client = behave("solve_after", 60)
     id = post(client, surface=fresh())
-    until_running(client, id)
+    until_at(client, id)
     start = time.monotonic()
     assert client.delete(f"/v1/jobs/{id}").status_code == 204
     assert time.monotonic() - start < 2
@@ -136,7 +133,7 @@ def test_running_job_is_stopped_and_frees_its_worker(behave: Behave) -> None:
 def test_queue_has_positions_and_an_end(behave: Behave) -> None:
     client = behave("solve_after", 60)
     first = post(client, surface=fresh())
-    until_running(client, first)
+    until_at(client, first)
     waiting = [post(client, surface=fresh()) for _ in range(2)]
     assert [client.get(f"/v1/jobs/{id}").json()["queue_position"] for id in waiting] == [0, 1]
     full = client.post("/v1/jobs", json=request(surface=fresh()))
@@ -147,10 +144,13 @@ def test_queue_has_positions_and_an_end(behave: Behave) -> None:
     assert client.get("/health").json()["queued"] == 1
 
 
-def test_cancelling_one_of_two_equal_jobs_leaves_the_other(behave: Behave) -> None:
-    client, surface = behave("solve_after", 0.5), fresh()
+def test_cancelling_one_of_two_equal_jobs_leaves_the_other(behave: Behave, tmp_path: Path) -> None:
+    gate = tmp_path / "gate"
+    client, surface = behave("solve_held", "surface", str(gate)), fresh()
     first, second = post(client, surface=surface), post(client, surface=surface)
+    until_at(client, first)
     assert client.delete(f"/v1/jobs/{first}").status_code == 204
+    gate.touch()
     assert finished(client, second)["status"] == "done"
     assert client.get(f"/v1/jobs/{first}").json()["status"] == "cancelled"
 
@@ -158,7 +158,7 @@ def test_cancelling_one_of_two_equal_jobs_leaves_the_other(behave: Behave) -> No
 def test_cancelled_work_can_be_asked_for_again(behave: Behave) -> None:
     client, surface = behave("solve_after", 60), fresh()
     first = post(client, surface=surface)
-    until_running(client, first)
+    until_at(client, first)
     client.delete(f"/v1/jobs/{first}")
     behave("solve_after", 0.0)
     assert finished(client, post(client, surface=surface))["status"] == "done"
@@ -336,23 +336,27 @@ def test_jobs_that_find_no_place_in_time_fail(tmp_path: Path) -> None:
         assert (job["status"], job["problem"]["detail"]) == ("failed", "There was no place.")
 
 
-def test_wait_holds_the_answer_and_lets_go(behave: Behave) -> None:
-    client = behave("solve_after", 1.5)
+def test_wait_holds_the_answer_and_lets_go(behave: Behave, tmp_path: Path) -> None:
+    gate = tmp_path / "gate"
+    client = behave("solve_held", "surface", str(gate))
     id = post(client, surface=fresh())
     start = time.monotonic()
     assert client.get(f"/v1/jobs/{id}", params={"wait": 0.3}).json()["status"] in ("queued", "running")
     assert 0.25 < time.monotonic() - start < 1.2
     refused = client.get(f"/v1/jobs/{id}/result")
     assert (refused.status_code, refused.json()["type"]) == (409, "/problems/not-finished")
+    gate.touch()
     assert client.get(f"/v1/jobs/{id}", params={"wait": 30}).json()["status"] == "done"
 
 
-def test_client_that_goes_away_disturbs_nothing(behave: Behave) -> None:
-    client = behave("solve_after", 1.0)
+def test_client_that_goes_away_disturbs_nothing(behave: Behave, tmp_path: Path) -> None:
+    gate = tmp_path / "gate"
+    client = behave("solve_held", "surface", str(gate))
     with pytest.raises(httpx.ReadTimeout):
         client.post("/v1/solve", json=request(name="impatient", surface=fresh()), timeout=0.5)
     job = client.get("/v1/jobs").json()["jobs"][0]
-    assert job["name"] == "impatient"
+    assert (job["name"], job["finished"]) == ("impatient", None)
+    gate.touch()
     assert finished(client, job["id"])["status"] == "done"
 
 
@@ -364,7 +368,7 @@ def test_jobs_survive_a_restart(tmp_path: Path) -> None:
         before = client.get(f"/v1/jobs/{done}/result").content
         engine.instead, engine.first = "solve_after", (60,)
         ids = [post(client, pattern={"around": n}) for n in (10, 12, 14)]
-        until_running(client, ids[0])
+        until_at(client, ids[0])
     with running(tmp_path, workers=1) as client:
         assert [finished(client, id)["status"] for id in ids] == ["done"] * 3
         assert client.get(f"/v1/jobs/{done}").json()["status"] == "done"
@@ -376,7 +380,7 @@ def test_jobs_survive_a_restart(tmp_path: Path) -> None:
 def test_work_that_killed_the_server_thrice_is_given_up(tmp_path: Path) -> None:
     with running(tmp_path, slow(60)) as client:
         id, same = post(client), post(client)
-        until_running(client, id)
+        until_at(client, id)
     store = Store(tmp_path)
     job = store.job(id)
     assert job is not None
