@@ -1,12 +1,14 @@
 """Time and memory of the conformal map against its floor.
 
-    python benchmarks/map.py [--vertices 2000 20000 200000] [--route plain flips]
+    python benchmarks/map.py [--vertices 2000 20000 200000] [--route plain flips meshes]
 
 The floor is (Newton steps) × (one sparse Cholesky factorisation + two triangular solves) on the same matrix.
 It is measured with the solver's own factorisation and, where installed (``pip install cvxopt pypardiso``),
 with CHOLMOD (cvxopt) and MKL PARDISO, analysis not counted. Newton steps are those of Newton's method with
 a factorisation in each step. Beside it stands what a solver takes for a new mesh: analysis and first
-factorisation. Times are processor seconds of one thread, the best of a few runs.
+factorisation. ``flips`` is the robust route on the same towers, ``meshes`` the whole map of those meshes of
+the torture table that need it, each beside a tower of equal size. Times are processor seconds of one thread,
+the best of a few runs.
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ os.environ.update(dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL
 import sys
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -33,6 +36,13 @@ from hexwrap_solver.conformal.robust import solve_with_flips
 from hexwrap_solver.conformal.types import BoundaryCondition
 from hexwrap_solver.surface import surface_from_mesh
 from hexwrap_solver.surface.types import SentMesh
+
+sys.path.insert(0, str(Path(__file__).parents[1]))  # for tests.*, where this runs as a script
+
+from tests.solver.conformal.shared import MESHES, load
+from tests.solver.conformal.torture import TORTURE
+
+ROUTES = ["plain", "flips", "meshes"]
 
 
 def tower(n: int) -> SentMesh:
@@ -174,6 +184,22 @@ def flips(n: int, repeats: int) -> None:
     )
 
 
+def hard_meshes(repeats: int) -> None:
+    """Meshes that need flips, beside towers of as many vertices that need none."""
+    generated = {name: make(np.random.default_rng(0)) for name, make in TORTURE.items()}
+    for name, surface in {**{name: load(path) for name, path in MESHES.items()}, **generated}.items():
+        seconds, found = best(lambda s=surface: conformal_map(s, BoundaryCondition()), repeats)
+        if not found.flips:
+            continue
+        n = len(surface.vertices)
+        smooth = surface_from_mesh(tower(n))
+        ordinary, _ = best(lambda s=smooth: conformal_map(s, BoundaryCondition()), repeats)
+        print(
+            f"{n:>9,} vertices: {name} {seconds:.3f} s, {found.flips} flips, {found.inserted} inserted, "
+            f"{seconds / ordinary:.2f} × a smooth tower"
+        )
+
+
 def peak_gigabytes() -> float:
     """Peak memory of this process so far."""
     try:
@@ -189,7 +215,7 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--vertices", type=int, nargs="+", default=[2_000, 20_000, 200_000])
-    parser.add_argument("--route", nargs="+", choices=["plain", "flips"], default=["plain", "flips"])
+    parser.add_argument("--route", nargs="+", choices=ROUTES, default=ROUTES)
     parser.add_argument("--repeats", type=int, default=3)
     args = parser.parse_args()
     if "plain" in args.route:
@@ -201,6 +227,8 @@ def main() -> None:
     if "flips" in args.route:
         for n in args.vertices:
             flips(n, args.repeats)
+    if "meshes" in args.route:
+        hard_meshes(args.repeats)
 
 
 if __name__ == "__main__":

@@ -8,6 +8,10 @@ Public meshes are taken from ../shared/meshes where that folder exists.
 from __future__ import annotations
 
 import argparse
+import os
+
+os.environ.update(dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1"))
+
 import time
 
 import numpy as np
