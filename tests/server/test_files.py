@@ -21,6 +21,7 @@ from hexwrap_server import cli, routes
 from hexwrap_server.files import WRITERS, Meta, NotMadeError, SheetError, scene, text, write
 from hexwrap_server.files.dxf import object_coordinates
 from hexwrap_server.files.flat import lay_flat, pack
+from hexwrap_server.files.unrolled import Unrolled
 from hexwrap_solver.arrays import Ragged
 from hexwrap_solver.panels.types import Components, Support
 from hexwrap_solver.pipeline import Solution
@@ -294,6 +295,20 @@ def test_svg_marks_corners_with_their_angles(solution: Solution) -> None:
     ns = {"s": "http://www.w3.org/2000/svg"}
     assert [t.text for t in root.iterfind(".//s:text[@class='angle halo']", ns)] == ["4π/3", "π/3"]
     assert len(root.findall(".//s:circle[@class='corner']", ns)) == 2
+
+
+def test_faces_laid_out_in_islands_are_cut_around_each(solution: Solution) -> None:
+    """Faces may stand in any sheet: around islands of them the cut runs in circles."""
+    faces = solution.map.surface.faces
+    inner = np.setdiff1d(faces, np.concatenate(solution.map.surface.loops))
+    island = (faces == inner[len(inner) // 2]).any(axis=1)
+    beside = np.isin(faces, faces[island]).any(axis=1) & ~island
+    sheet = solution.map.sheet + np.where(island, 2, np.where(beside, 1, 0))[:, None]
+    cut = Unrolled.of(replace(solution.map, sheet=sheet)).cut
+    assert len(np.unique(cut)) == len(cut)
+    plain = Unrolled.of(solution.map).cut
+    assert len(cut) > len(plain) + 2 * island.sum()
+    assert b"<path" in write("domain.svg", replace(solution, map=replace(solution.map, sheet=sheet)), ODD)
 
 
 def test_domain_dxf_is_the_domain_in_its_own_units(solution: Solution) -> None:

@@ -68,13 +68,14 @@ def _chained(sides: Ints, tail: Ints, head: Ints, start: Complexes, end: Complex
         for other in leaving.get(int(head[side]), []):
             if abs(start[other] - end[side]) < near:
                 following[side] = other
-    ordered: list[int] = []
-    for first in sorted(set(sides.tolist()) - set(following.values())):
+    starts = sorted(set(sides.tolist()) - set(following.values()))
+    ordered: dict[int, None] = {}
+    for first in [*starts, *sorted(sides.tolist())]:  # what is left after the starts runs in circles
         at: int | None = first
-        while at is not None:
-            ordered.append(at)
+        while at is not None and at not in ordered:
+            ordered[at] = None
             at = following.get(at)
-    return np.array(ordered, dtype=np.int64)
+    return np.array(list(ordered), dtype=np.int64)
 
 
 def cells(cmap: ConformalMap, pattern: Pattern) -> Ragged:

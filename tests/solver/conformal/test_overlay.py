@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from hexwrap_solver.arrays import Floats, Ints, no_progress
-from hexwrap_solver.conformal import boundary
+from hexwrap_solver.conformal import boundary, conformal_map
+from hexwrap_solver.conformal.cut import cut_open
 from hexwrap_solver.conformal.energy import opposite_lengths
 from hexwrap_solver.conformal.orientation import misdrawn
 from hexwrap_solver.conformal.robust import solve as robust
@@ -13,7 +15,7 @@ from hexwrap_solver.conformal.robust.delaunay import make_delaunay
 from hexwrap_solver.conformal.robust.mirror import MirrorMesh, mirror_mesh
 from hexwrap_solver.conformal.robust.overlay import Overlay, insert
 from hexwrap_solver.conformal.robust.trail import Places, Trail
-from hexwrap_solver.conformal.types import ConformalMap, Targets
+from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap, Targets
 from hexwrap_solver.surface.types import Surface
 from tests.solver.conformal.annuli import bump
 from tests.solver.conformal.checks import faults
@@ -22,7 +24,7 @@ from tests.solver.conformal.torture import TORTURE, crooked_prism
 
 def _mirrored(surface: Surface) -> MirrorMesh:
     log_length = np.log(opposite_lengths(surface.vertices, surface.faces))[[2, 0, 1]].T.ravel()
-    return mirror_mesh(surface, log_length, robust._turns(surface).ravel())
+    return mirror_mesh(surface, log_length, robust._turns(cut_open(surface).sheet).ravel())
 
 
 def _everywhere(mesh: MirrorMesh, random: np.random.Generator) -> Places:
@@ -100,9 +102,9 @@ def _by_vertex(mesh: MirrorMesh, at: Places) -> Floats:
 
 
 def _overlay(surface: Surface) -> tuple[Overlay, ConformalMap, Targets]:
-    problem, turn = robust._uncollapse(robust._problem(surface, boundary.straight(surface), None))
-    flat = robust._flatten(problem, turn, no_progress)
-    found, lift = robust._draw(problem, flat)
+    problem, cut = robust._uncollapse(robust._problem(surface, boundary.straight(surface), None))
+    flat = robust._flatten(problem, cut, no_progress)
+    found, lift, _ = robust._draw(problem, flat)
     return Overlay(found, flat.log_length, flat.turn, flat.descent.u, lift), found, problem.targets
 
 
@@ -131,12 +133,30 @@ def test_a_flat_cylinder_maps_to_itself_between_vertices_too() -> None:
 def test_inserted_vertices_change_nothing_for_the_others() -> None:
     surface = TORTURE["retriangulated"](np.random.default_rng(0))
     overlay, found, targets = _overlay(surface)
-    wrong = np.flatnonzero(misdrawn(found))
-    assert len(wrong) > 20
-    refined = insert(overlay, targets, wrong)
-    assert refined is not None
+    assert misdrawn(found).sum() > 20
+    inserted = insert(overlay, targets)
+    assert inserted is not None
+    refined = inserted.map
     n = len(found.uv)
     assert len(refined.uv) > n
     assert np.array_equal(refined.uv[:n], found.uv)
     assert np.array_equal(refined.log_scale[:n], found.log_scale)
     assert faults(refined) == []
+
+
+@pytest.mark.parametrize("name", ["retriangulated", "noisy", "eared"])
+def test_faces_lie_side_by_side_but_for_one_cut(name: str) -> None:
+    found = conformal_map(TORTURE[name](np.random.default_rng(0)), BoundaryCondition())
+    assert found.flips > 100
+    surface, corners = found.surface, found.corners()
+    start, end = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
+    inner = np.flatnonzero(surface.twin >= 0)
+    twin = surface.twin[inner]
+    apart = np.abs(start[inner] - end[twin]) + np.abs(end[inner] - start[twin]) > 1e-6 * found.circumference
+    banks = inner[apart]
+    vertices, count = np.unique(surface.faces.ravel()[banks], return_counts=True)
+    on_loops = np.isin(vertices, np.concatenate(surface.loops))
+    assert (
+        count == np.where(on_loops, 1, 2)
+    ).all()  # each bank passes every vertex once, and ends on the loops
+    assert on_loops.sum() == 2

@@ -130,16 +130,18 @@ class Overlay:
         which = (self.found.surface.faces[face] == owner[:, None]).argmax(axis=1)
         return np.asarray(self.found.sheet[face, which])
 
-    def drawn(self, problem: Problem, anchors: Anchors, uv: Complexes) -> ConformalMap:
-        """The map on a refined surface. Its parents are the faces of the first surface. uv: (n,)."""
+    def drawn(self, problem: Problem, anchors: Anchors, uv: Complexes) -> tuple[ConformalMap, Ints]:
+        """The map on a refined surface, whose parents are the faces of the first one, and ``Refined.start``.
+        uv: (n,)."""
         found, surface = self.found, problem.surface
         owner = anchors.owner[surface.faces]
         sheet = np.stack([self.sheets(problem.parent, owner[:, c]) for c in range(3)], axis=1)
-        sheet -= sheet[:, :1]
+        start = sheet[:, 0].copy()
+        sheet -= start[:, None]
         sums = [np.full(len(uv), np.pi) for _ in surface.loops]
         for k in range(2):
             sums[k][found.surface.loops[k]] = found.boundary_angles[k]
-        return replace(
+        drawn = replace(
             found,
             surface=surface,
             log_scale=problem.u,
@@ -147,13 +149,25 @@ class Overlay:
             sheet=sheet,
             boundary_angles=(sums[0][surface.loops[0]], sums[1][surface.loops[1]]),
         )
+        return drawn, start
 
 
-def insert(overlay: Overlay, targets: Targets, wrong: Ints) -> ConformalMap | None:
+@dataclass(frozen=True)
+class Refined:
+    """A map with new vertices. parent: (m,) the face of the first surface that each face is a part of. start:
+    (m,) where its first corner stands there, see ``ConformalMap.sheet``."""
+
+    map: ConformalMap
+    parent: Ints
+    start: Ints
+
+
+def insert(overlay: Overlay, targets: Targets) -> Refined | None:
     """The map with new vertices, until no triangle turns over; None where there is no end to it.
 
-    targets: of the surface that the map was found on. wrong: its faces that turn over.
+    targets: of the surface that the map was found on.
     """
+    wrong = np.flatnonzero(misdrawn(overlay.found))
     surface, uv = overlay.found.surface, overlay.found.uv
     corners, n = surface.faces, len(surface.vertices)
     problem = Problem(surface, targets, overlay.found.log_scale, np.arange(len(corners)))
@@ -169,7 +183,7 @@ def insert(overlay: Overlay, targets: Targets, wrong: Ints) -> ConformalMap | No
             added, u = overlay.place(face, anchors.weight[before:], anchors.owner[before:])
             problem.u[before:] = u
             uv = np.concatenate([uv, added])
-            drawn = overlay.drawn(problem, anchors, uv)
+            drawn, start = overlay.drawn(problem, anchors, uv)
             turn = np.roll(drawn.sheet, -1, axis=1) - drawn.sheet
             marked = collapsing(problem.surface, problem.targets, turn.ravel())
             place = np.full(len(marked), 0.5)
@@ -177,7 +191,7 @@ def insert(overlay: Overlay, targets: Targets, wrong: Ints) -> ConformalMap | No
             return None
         wrong = np.flatnonzero(misdrawn(drawn))
         if not len(wrong):
-            return drawn
+            return Refined(drawn, problem.parent, start)
         counts.append(len(wrong))
         if attempt >= PATIENCE and min(counts[-PATIENCE:]) >= min(counts[:-PATIENCE]):
             return None

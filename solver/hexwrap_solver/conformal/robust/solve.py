@@ -79,16 +79,16 @@ def _refined(
     more than ``most`` times the vertices go without, and into ``omitted``."""
     iterations, fewest, span = 0, len(surface.faces), np.inf
     for attempt in range(MAX_ROUNDS):
-        problem, turn = _uncollapse(problem)
-        flat = _flatten(problem, turn, progress, span)
-        found, lift = _draw(problem, flat)
+        problem, cut = _uncollapse(problem)
+        flat = _flatten(problem, cut, progress, span)
+        found, lift, first = _draw(problem, flat)
         iterations += found.iterations
         wrong = np.flatnonzero(misdrawn(found))
         if not len(wrong):
             _check_drawn(found, flat.off)
-            return _told(found, surface, iterations)
+            return _told(_in_one_piece(found, first), surface, iterations)
         if attempt == 0:
-            refined = _inserted(problem, flat, found, lift, wrong)
+            refined = _inserted(problem, flat, found, lift, first)
             if refined is not None:
                 return _told(refined, surface, iterations)
         problem = replace(problem, u=found.log_scale)
@@ -120,19 +120,29 @@ def _refined(
 
 
 def _inserted(
-    problem: Problem, flat: _Flat, found: ConformalMap, lift: Ints, wrong: Ints
+    problem: Problem, flat: _Flat, found: ConformalMap, lift: Ints, first: Ints
 ) -> ConformalMap | None:
     """The map that was found, with new vertices where it puts them, until no triangle turns over; None where
     that does not succeed."""
     try:
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             overlay = Overlay(found, flat.log_length, flat.turn, flat.descent.u, lift)
-            drawn = insert(overlay, problem.targets, wrong)
-        if drawn is not None:
-            _check_drawn(drawn, flat.off)
+            refined = insert(overlay, problem.targets)
+        if refined is None:
+            return None
+        drawn, start = refined.map, first[refined.parent] + refined.start
+        _check_drawn(drawn, flat.off)
     except ConvergenceError:
         return None
-    return drawn
+    return _in_one_piece(drawn, start)
+
+
+def _in_one_piece(found: ConformalMap, first: Ints) -> ConformalMap:
+    """The same map with its faces laid out side by side, but for one cut, if corners are near enough to the
+    origin there to keep their digits. first: (m,) where the first corner of each face then stands."""
+    whole = replace(found, sheet=found.sheet + first[:, None])
+    exact = not misdrawn(whole).any() and drawn_error(whole) <= max(PROMISED / 100, drawn_error(found))
+    return whole if exact else found
 
 
 @dataclass(frozen=True)
@@ -149,8 +159,8 @@ def metric_with_flips(
     surface: Surface, targets: Targets, progress: Progress = no_progress, start: Floats | None = None
 ) -> FlatMetric:
     """The metric of ``solve_with_flips``, whether or not straight triangles can be drawn in it."""
-    problem, turn = _uncollapse(_problem(surface, targets, start))
-    flat = _flatten(problem, turn, progress)
+    problem, cut = _uncollapse(_problem(surface, targets, start))
+    flat = _flatten(problem, cut, progress)
     return FlatMetric(problem.surface, flat.descent.u, flat.sums)
 
 
@@ -159,20 +169,20 @@ def _problem(surface: Surface, targets: Targets, start: Floats | None) -> Proble
     return Problem(surface, targets, u, np.arange(len(surface.faces)))
 
 
-def _turns(surface: Surface) -> Ints:
+def _turns(sheet: Ints) -> Ints:
     """(m, 3) how often the side from each corner to the next goes around the annulus (see
-    ``MirrorMesh.turn``)."""
-    sheet = cut_open(surface).sheet
+    ``MirrorMesh.turn``). sheet: (m, 3) see ``Cut``."""
     return np.asarray(np.roll(sheet, -1, axis=1) - sheet)
 
 
 def _uncollapse(problem: Problem) -> tuple[Problem, Ints]:
-    """Splits what has no room in the domain, until there is nothing of the kind. Also gives ``_turns``."""
+    """Splits what has no room in the domain, until there is nothing of the kind. Also gives the sheets of a
+    ``Cut``."""
     while True:
-        turn = _turns(problem.surface)
-        marked = collapsing(problem.surface, problem.targets, turn.ravel())
+        sheet = cut_open(problem.surface).sheet
+        marked = collapsing(problem.surface, problem.targets, _turns(sheet).ravel())
         if not len(marked):
-            return problem, turn
+            return problem, sheet
         problem = split_edges(problem, marked, np.full(len(marked), 0.5))
 
 
@@ -180,13 +190,13 @@ def _uncollapse(problem: Problem) -> tuple[Problem, Ints]:
 class _Flat:
     """A flat Delaunay metric on the mirrored annulus.
 
-    turn: (m, 3) see ``_turns``. unit: logarithm of the length in which the metric is measured.
+    cut: (m, 3) sheets of a ``Cut``. unit: logarithm of the length in which the metric is measured.
     log_length: (3m,) of the surface's half-edges in it.
     cone_angle: K. sums: (n,) angle sums. flips: all of them. off: how far prescribed boundary angles are
     missed."""
 
     mesh: MirrorMesh
-    turn: Ints
+    cut: Ints
     log_length: Floats
     unit: float
     cone_angle: float
@@ -195,18 +205,22 @@ class _Flat:
     flips: int
     off: float
 
+    @property
+    def turn(self) -> Ints:
+        return _turns(self.cut)
 
-def _flatten(problem: Problem, turn: Ints, progress: Progress, known_span: float = np.inf) -> _Flat:
+
+def _flatten(problem: Problem, cut: Ints, progress: Progress, known_span: float = np.inf) -> _Flat:
     """The metric with the problem's angle sums. Raises ConvergenceError.
 
-    turn: (m, 3) see ``_turns``. known_span: the least span of u that came out of the rounds of refinement so
-    far; later ones may have run away.
+    cut: (m, 3) sheets of a ``Cut``. known_span: the least span of u that came out of the rounds of refinement
+    so far; later ones may have run away.
     """
     surface, targets = problem.surface, problem.targets
     free = bool((targets.tie == 0).any() and len(targets.tie_angle) == 1)  # the cone angle comes out
     log_length = np.log(opposite_lengths(surface.vertices, surface.faces))[[2, 0, 1]].T.ravel()
     unit = float(np.median(log_length))  # logarithms near 0 have the most digits behind the point
-    mesh = mirror_mesh(surface, log_length - unit, turn.ravel())
+    mesh = mirror_mesh(surface, log_length - unit, _turns(cut).ravel())
     flips = make_delaunay(mesh, np.zeros(mesh.n), euclidean=True)
     span = MAX_SPAN if free else largest_span(cone_angle_of(targets, targets.angle, surface))
     descent = descend(FlipEnergy(Energy(surface, targets), mesh), problem.u, span, progress)
@@ -224,21 +238,20 @@ def _flatten(problem: Problem, turn: Ints, progress: Progress, known_span: float
             "double precision cannot hold the map of this surface; remesh it more evenly",
             [],
         )
-    return _Flat(mesh, turn, log_length - unit, unit, angle, descent, sums, flips + descent.flips, off)
+    return _Flat(mesh, cut, log_length - unit, unit, angle, descent, sums, flips + descent.flips, off)
 
 
-def _draw(problem: Problem, flat: _Flat) -> tuple[ConformalMap, Ints]:
-    """The map of the vertices, with the triangles as they are, whether they turn over or not; and the lift of
-    its ``Development``."""
+def _draw(problem: Problem, flat: _Flat) -> tuple[ConformalMap, Ints, Ints]:
+    """The map of the vertices, with the triangles as they are, whether they turn over or not; the lift of its
+    ``Development``; and (m,) where the first corner of each face stands if all are laid out side by side."""
     surface, targets, descent, sums = problem.surface, problem.targets, flat.descent, flat.sums
     u, metric = _centred(descent, targets)
     check_reach(u, flat.cone_angle)
     foot = int(surface.loops[0][0])
     laid = develop(flat.mesh, metric, flat.cone_angle)
-    lift = laid.lift[surface.faces]
-    sheet = lift[:, :1] - lift
-    sheet[:, 1] += flat.turn[:, 0]
-    sheet[:, 2] -= flat.turn[:, 2]
+    sheet = flat.cut - laid.lift[surface.faces]
+    first = sheet[:, 0].copy()
+    sheet -= first[:, None]  # every face beside the copy of its first corner, near which its digits are
     unit = np.exp(flat.unit)
     deck = Deck(flat.cone_angle, laid.translation * unit)
     uv, deck, circumference = normalise(surface, laid.uv * unit, sheet, deck, foot)
@@ -255,7 +268,7 @@ def _draw(problem: Problem, flat: _Flat) -> tuple[ConformalMap, Ints]:
         flips=flat.flips,
         closing_error=laid.gap,
     )
-    return found, laid.lift
+    return found, laid.lift, first
 
 
 def _off(targets: Targets, sums: Floats, surface: Surface) -> float:
