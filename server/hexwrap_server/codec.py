@@ -54,12 +54,12 @@ def is_whole(data: bytes) -> bool:
 
 
 def decode(data: bytes) -> Any:
-    """What was encoded; arrays are read-only views of data. Raises CodecError."""
+    """What was encoded; arrays are read-only. Raises CodecError."""
     if not is_whole(data):
         raise CodecError("damaged, or of another version")
     _, length, _ = _HEAD.unpack_from(data)
-    body = memoryview(data)[_HEAD.size :]
     try:
+        body = _aligned(data, _HEAD.size)
         header = json.loads(bytes(body[:length]))
         return _join(header["value"], _arrays(header["arrays"], body, length))
     except (AttributeError, ImportError, KeyError, TypeError, ValueError) as error:
@@ -136,6 +136,16 @@ def _padded(position: int, arrays: list[np.ndarray[Any, Any]]) -> Iterator[bytes
 def _raw(array: np.ndarray[Any, Any]) -> memoryview:
     """The bytes of a contiguous array, in place."""
     return array.reshape(-1).view(np.uint8).data
+
+
+def _aligned(data: bytes, start: int) -> memoryview:
+    """A read-only copy of data from start, at an address where numbers may stand.
+
+    NumPy takes numbers that stand elsewhere to such a place piece by piece, in each operation anew.
+    """
+    copy = np.frombuffer(data, np.uint8, offset=start).copy()
+    copy.flags.writeable = False
+    return copy.data
 
 
 def _arrays(shapes: list[Any], body: memoryview, position: int) -> list[np.ndarray[Any, Any]]:

@@ -13,8 +13,9 @@ import numpy as np
 
 #: Bytes that are fetched at most, and at the first time; and in one piece.
 MOST, FIRST, PIECE = 64 * 2**20, 32 * 2**20, 2**20
-#: What one pause fetched, a later one fetches as far as this share, where jobs needed less since.
-FADE = 0.8
+#: What one pause fetched was enough where jobs got less than ENOUGH by themselves since: then the next one
+#: fetches this share of it.
+ENOUGH, FADE = PIECE, 0.95
 PAGE = 4096
 
 
@@ -37,11 +38,12 @@ class Heap:
         self._seen = count()
 
     def fetch(self) -> int:
-        """Get and give back as much as jobs got since the last time. Returns how many bytes that was."""
+        """Get and give back as much as jobs needed since the last time. Returns how many bytes that was."""
         now = self._count()
         if now is None or self._seen is None:
             return 0
-        self._wanted = min(max((now - self._seen) * PAGE, FADE * self._wanted), MOST)
+        missing = (now - self._seen) * PAGE  # besides what was fetched for them
+        self._wanted = min(self._wanted + missing, MOST) if missing > ENOUGH else FADE * self._wanted
         pieces = [np.ones(PIECE // 8) for _ in range(int(self._wanted) // PIECE)]
         self._seen = self._count()
         return len(pieces) * PIECE

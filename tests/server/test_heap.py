@@ -17,7 +17,7 @@ def test_as_much_as_was_needed_fading_and_bounded() -> None:
     count = [0]
     heap = Heap(lambda: count[0])
     assert heap.fetch() == int(FADE * FIRST) // PIECE * PIECE
-    for _ in range(30):
+    for _ in range(100):
         heap.fetch()
     assert heap.fetch() == 0
     count[0] += 5 * PIECE // PAGE
@@ -25,6 +25,17 @@ def test_as_much_as_was_needed_fading_and_bounded() -> None:
     assert heap.fetch() == 4 * PIECE
     count[0] += 10 * MOST // PAGE
     assert heap.fetch() == MOST
+
+
+def test_what_was_missing_comes_on_top_of_what_was_fetched() -> None:
+    need, count = 20 * PIECE, [0]
+    heap = Heap(lambda: count[0])
+    missing = []
+    for _ in range(100):
+        fetched = heap.fetch()
+        missing.append(max(need - fetched, 0))
+        count[0] += missing[-1] // PAGE
+    assert 0 < max(missing[50:]) <= (1 - FADE) * need + 2 * PIECE
 
 
 def test_elsewhere_nothing_is_done() -> None:

@@ -45,6 +45,11 @@ def test_arrays_come_out_as_they_went_in(array: np.ndarray[Any, Any]) -> None:
     assert np.array_equal(back, array, equal_nan=array.dtype.kind in "fc")
 
 
+def test_arrays_come_out_where_numbers_may_stand_and_cannot_be_changed() -> None:
+    back = decode(encode([np.ones(3, dtype=bool), np.ones(3), np.ones(3, dtype=complex)]))
+    assert all(array.flags.aligned and not array.flags.writeable for array in back)
+
+
 def test_solutions_come_out_as_they_went_in() -> None:
     solution = cylinder()
     back = decode(encode(solution))
