@@ -17,7 +17,7 @@ from hexwrap_solver.conformal.types import ConformalMap, Targets
 from hexwrap_solver.surface.types import Surface
 from tests.solver.conformal.annuli import bump
 from tests.solver.conformal.checks import faults
-from tests.solver.conformal.torture import TORTURE, crooked_prism
+from tests.solver.conformal.torture import TORTURE, crooked_prism, random_flips, taken_in
 
 
 def _mirrored(surface: Surface) -> MirrorMesh:
@@ -140,3 +140,14 @@ def test_inserted_vertices_change_nothing_for_the_others() -> None:
     assert np.array_equal(refined.uv[:n], found.uv)
     assert np.array_equal(refined.log_scale[:n], found.log_scale)
     assert faults(refined) == []
+
+
+def test_corners_that_open_beyond_a_straight_angle_end_in_few_rounds() -> None:
+    random = np.random.default_rng(2)
+    tower = bump(8, 6)
+    surface = taken_in(tower.vertices, random_flips(tower.faces, len(tower.vertices), random, 1500))
+    overlay, found, targets = _overlay(surface)
+    refined = insert(overlay, targets, np.flatnonzero(misdrawn(found)))
+    assert refined is not None
+    assert faults(refined) == []
+    assert len(refined.uv) < 2 * len(surface.vertices)
