@@ -102,7 +102,8 @@ class ConformalMap:
     """A discrete periodic parameterization (paper, definition 1), unrolled.
 
     surface: the mesh that was solved (with inserted vertices where that was needed).
-    log_scale: (n,) u; new edge lengths are e^{(u_i+u_j)/2}·l_ij where flips = 0.
+    log_scale: (n,) u; new edge lengths are e^{(u_i+u_j)/2}·l_ij where flips = 0. At inserted vertices the
+    factor of the map there.
     uv: (n,) complex; each vertex once, in one unrolled sheet.
     sheet: (m, 3); corner c of face f stands at g^{sheet[f,c]}(uv[faces[f,c]]); every face is then a
     positively oriented triangle.

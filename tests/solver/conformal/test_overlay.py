@@ -19,7 +19,7 @@ from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap, Targ
 from hexwrap_solver.surface.types import Surface
 from tests.solver.conformal.annuli import bump
 from tests.solver.conformal.checks import faults
-from tests.solver.conformal.torture import TORTURE, crooked_prism
+from tests.solver.conformal.torture import TORTURE, crooked_prism, random_flips, taken_in
 
 
 def _mirrored(surface: Surface) -> MirrorMesh:
@@ -156,7 +156,17 @@ def test_faces_lie_side_by_side_but_for_one_cut(name: str) -> None:
     banks = inner[apart]
     vertices, count = np.unique(surface.faces.ravel()[banks], return_counts=True)
     on_loops = np.isin(vertices, np.concatenate(surface.loops))
-    assert (
-        count == np.where(on_loops, 1, 2)
-    ).all()  # each bank passes every vertex once, and ends on the loops
+    assert (count == np.where(on_loops, 1, 2)).all()  # both banks pass every vertex once
     assert on_loops.sum() == 2
+
+
+def test_corners_that_open_beyond_a_straight_angle_end_in_few_rounds() -> None:
+    random = np.random.default_rng(2)
+    tower = bump(8, 6)
+    surface = taken_in(tower.vertices, random_flips(tower.faces, len(tower.vertices), random, 1500))
+    overlay, found, targets = _overlay(surface)
+    assert misdrawn(found).any()
+    refined = insert(overlay, targets)
+    assert refined is not None
+    assert faults(refined.map) == []
+    assert len(refined.map.uv) < 2 * len(surface.vertices)

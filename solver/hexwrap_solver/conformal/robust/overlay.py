@@ -30,6 +30,8 @@ from hexwrap_solver.surface.topology import half_edges
 #: Rounds of insertion, and of them without progress. Most meshes take up to six; around a vertex of many
 #: edges each round may lead to the next triangle only.
 MAX_ROUNDS, PATIENCE = 100, 40
+#: From this round on the edges to split are those that are longest in the domain.
+DRAWN = 2
 #: Insertion that makes more than so many times the vertices, and so many more, does not come to an end.
 MOST, MOST_MORE = 2, 400
 
@@ -171,9 +173,10 @@ def insert(overlay: Overlay, targets: Targets) -> Refined | None:
     surface, uv = overlay.found.surface, overlay.found.uv
     corners, n = surface.faces, len(surface.vertices)
     problem = Problem(surface, targets, overlay.found.log_scale, np.arange(len(corners)))
-    anchors, counts = Anchors.of_vertices(n), [len(wrong)]
+    anchors, counts, drawn = Anchors.of_vertices(n), [len(wrong)], overlay.found
     for attempt in range(MAX_ROUNDS):
-        marked, place = split_places(problem.surface, problem.targets, wrong, attempt)
+        domain = drawn.corners()[wrong] if attempt >= DRAWN else None
+        marked, place = split_places(problem.surface, problem.targets, wrong, attempt, domain)
         while len(marked):
             marked, place = once_per_edge(problem.surface, marked, place)
             before = len(problem.surface.vertices)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hexwrap_solver.arrays import Bools, Floats, Ints
+from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints
 from hexwrap_solver.conformal.energy import corner_angles, opposite_lengths
 from hexwrap_solver.conformal.robust.retriangulate import flatten_out
 from hexwrap_solver.conformal.types import Targets
@@ -236,24 +236,31 @@ def _crowded(surface: Surface, targets: Targets, most: float, among: Ints) -> In
     return 3 * (corner // 3) + (corner % 3 + 1) % 3
 
 
-def split_places(surface: Surface, targets: Targets, wrong: Ints, attempt: int) -> tuple[Ints, Floats]:
+def split_places(
+    surface: Surface, targets: Targets, wrong: Ints, attempt: int, drawn: Complexes | None = None
+) -> tuple[Ints, Floats]:
     """(half-edges, places) to split where the faces ``wrong`` have turned over.
 
     One edge of each, at the foot of its altitude: the longest; but the one opposite to a corner that the map
     opens wide, since splits at the edges of such a corner would repeat themselves on ever smaller scales. And
     around boundary vertices of theirs with few triangles for their target all opposite edges: a wide angle
     wants a fan, and the finer a fan the more attempts have failed.
+    drawn: (k, 3) corners of these faces in the domain, where the longest edge there is to be split. A corner
+    that the map opens beyond π, turned over on every scale, faces that one.
     """
     corner = surface.vertices[surface.faces[wrong]]
     along = np.roll(corner, -1, axis=1) - corner
     length = np.linalg.norm(along, axis=2)
     opened = _opened(surface, targets)[wrong]
     side = np.where(opened.sum(axis=1) == 1, (opened.argmax(axis=1) + 1) % 3, length.argmax(axis=1))
+    middle = opened.any(axis=1) | (drawn is not None)
+    if drawn is not None:
+        side = np.abs(np.roll(drawn, -1, axis=1) - drawn).argmax(axis=1)
     rows = np.arange(len(wrong))
     edge = along[rows, side]
     apex = corner[rows, (side + 2) % 3] - corner[rows, side]
     foot = np.einsum("kd,kd->k", apex, edge) / length[rows, side] ** 2
-    foot = np.where(opened.any(axis=1), np.clip(foot, *MIDDLE), np.clip(foot, *WITHIN))
+    foot = np.where(middle, np.clip(foot, *MIDDLE), np.clip(foot, *WITHIN))
     wide = WIDE / (1 + attempt / HASTE)
     fan = _crowded(surface, targets, wide, np.unique(surface.faces[wrong]))
     return np.concatenate([fan, 3 * wrong + side]), np.concatenate([np.full(len(fan), 0.5), foot])
