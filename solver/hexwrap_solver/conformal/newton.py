@@ -47,6 +47,8 @@ BROKEN, PATIENCE, SETTLED = 8, 2, 0.05
 #: RINGS of their neighbours, are brought near the minimum first, where these are no more than the share FEW
 #: of all; by at most LOCAL_STEPS steps.
 LOCAL, RINGS, FEW, LOCAL_STEPS = 0.1, 3, 0.25, 8
+#: So many times that this leaves more than STAGNATION of the residual, and it is not tried again.
+FRUITLESS = 3
 
 
 @dataclass(frozen=True)
@@ -95,7 +97,7 @@ def minimise(energy: Energy, start: Floats | None = None, progress: Progress = n
     factorisation = Factorisation(energy.points, energy.rows, energy.columns)
     point = _Point.at(energy, np.zeros(energy.n_dof) if start is None else energy.unknowns_of(start))
     tolerance = max(ROUNDING, np.finfo(float).eps * largest(energy.target))
-    iterations, factorisations, chord = 0, 0, False
+    iterations, factorisations, fruitless, chord = 0, 0, 0, False
     while point.residual > tolerance and iterations < MAX_STEPS:
         progress(
             min(0.9, iterations / 10), f"Newton step {iterations + 1}, residual {point.residual:.1e} rad"
@@ -115,10 +117,11 @@ def minimise(energy: Energy, start: Floats | None = None, progress: Progress = n
         if gain > STAGNATION and near:
             break
         settled = full and gain <= SETTLED
-        if not full and not _stays_broken(point.corners, iterations, False):
+        if not full and fruitless < FRUITLESS and not _stays_broken(point.corners, iterations, False):
             before = point.residual
             point = _relaxed(energy, point)
             settled = point.residual <= SETTLED * before
+            fruitless += point.residual > STAGNATION * before
         if _stays_broken(point.corners, iterations, settled):
             break
         chord = full and chords_left(point.residual, gain, tolerance) <= CHORDS
