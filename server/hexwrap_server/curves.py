@@ -1,4 +1,7 @@
-"""Points and curves drawn elsewhere, for ``hexwrap lift``: CSV, JSON, DXF and 3DM, in and out."""
+"""Points and curves drawn elsewhere, for ``hexwrap lift``: CSV, JSON, DXF and 3DM, in and out.
+
+ezdxf is loaded with the first DXF file (see ``files.drawing``).
+"""
 
 from __future__ import annotations
 
@@ -13,10 +16,6 @@ from typing import Any
 
 import numpy as np
 import rhino3dm
-from ezdxf.filemanagement import new
-from ezdxf.filemanagement import read as read_drawing
-from ezdxf.lldxf.const import DXFError
-from ezdxf.path import make_path
 
 from hexwrap_server.files.drawing import encode
 from hexwrap_solver.arrays import Floats
@@ -111,8 +110,12 @@ def _read_json(data: bytes) -> list[Curve]:
 
 def _read_dxf(data: bytes) -> list[Curve]:
     """Points, lines, polylines, arcs, circles, ellipses and splines of the model space."""
+    from ezdxf.filemanagement import read
+    from ezdxf.lldxf.const import DXFError
+    from ezdxf.path import make_path
+
     try:
-        document = read_drawing(io.StringIO(data.decode("utf-8", "replace")))
+        document = read(io.StringIO(data.decode("utf-8", "replace")))
     except DXFError as error:
         raise DrawingError(f"The drawing is no DXF file: {error}.") from None
     space = document.modelspace()
@@ -192,6 +195,8 @@ def _write_json(curves: list[Curve]) -> bytes:
 
 
 def _write_dxf(curves: list[Curve]) -> bytes:
+    from ezdxf.filemanagement import new
+
     document = new("R2010")
     document.header["$INSUNITS"] = 0
     space = document.modelspace()

@@ -2,26 +2,24 @@
 
 Writing numbers as text holds the interpreter, so that in a thread of the worker it takes its time from the
 stages. The worker sends each finished stage through a pipe, and gets back where the parts of the text stand.
-When the worker dies, however it dies, the scribe reads the end of its input and leaves; when the scribe dies,
-the worker writes by itself.
+When the worker dies, however it dies, the scribe leaves (see ``scribe_main``); when the scribe dies, the
+worker writes by itself.
 """
 
 from __future__ import annotations
 
 import contextlib
 import logging
-import os
-import queue
 import subprocess
 import sys
 import threading
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from types import TracebackType
-from typing import IO, Any, cast
+from typing import Any, cast
 
-from hexwrap_server import codec, garbage, logs
-from hexwrap_server.frames import pipes_of_child, read_frame, write_frame
+from hexwrap_server import codec
+from hexwrap_server.frames import read_frame, write_frame
 from hexwrap_server.writing import Here, Written
 from hexwrap_solver.errors import HexwrapError
 from hexwrap_solver.pipeline import Solution
@@ -29,9 +27,6 @@ from hexwrap_solver.pipeline import Solution
 #: Stages whose values are written.
 WRITTEN = ("surface", "map", "pattern", "panels")
 log = logging.getLogger("hexwrap.scribe")
-
-#: What is to be done, about what, with what: see ``_Desk``.
-Order = tuple[str, Any, bytes]
 
 
 class Scribe:
@@ -51,7 +46,7 @@ class Scribe:
         if self._process is not None:
             return
         level = logging.getLevelName(log.getEffectiveLevel())
-        program = "from hexwrap_server.scribe import main; main()"
+        program = "from hexwrap_server.scribe_main import main; main()"
         self._process = subprocess.Popen(
             [sys.executable, "-P", "-c", program, level], stdin=subprocess.PIPE, stdout=subprocess.PIPE
         )
@@ -148,32 +143,7 @@ class There:
             return writer.finish(path)
 
 
-def main() -> None:
-    """The life of a scribe: write what is sent, until the worker is gone."""
-    inlet, outlet = pipes_of_child()
-    orders: queue.SimpleQueue[Order] = queue.SimpleQueue()
-    threading.Thread(target=_listen, args=(inlet, orders), daemon=True).start()
-    logs.set_up_logging(sys.argv[1])
-    garbage.look_no_more()
-    write_frame(outlet, ("ready",))
-    desk = _Desk()
-    while True:
-        answer = desk.do(*orders.get())
-        if answer is not None:
-            write_frame(outlet, answer)
-
-
-def _listen(inlet: IO[bytes], orders: queue.SimpleQueue[Order]) -> None:
-    while (head := read_frame(inlet)) is not None:
-        kind, name, size = head
-        data = inlet.read(size)
-        if len(data) < size:
-            break
-        orders.put((kind, name, data))
-    os._exit(0)
-
-
-class _Desk:
+class Desk:
     """What the scribe has of a job. The first fault is told at its end."""
 
     def __init__(self) -> None:

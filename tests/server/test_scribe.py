@@ -136,7 +136,7 @@ def test_scribes_go_with_their_workers(tmp_path: Path) -> None:
         url = f"http://127.0.0.1:{port}/v1/solve"
 
         def scribes() -> list[psutil.Process]:
-            return [p for p in children(process) if "hexwrap_server.scribe" in " ".join(p.cmdline())]
+            return [p for p in children(process) if "hexwrap_server.scribe_main" in " ".join(p.cmdline())]
 
         for turn in range(2):  # it is started after the first job, and used for the second
             answer = httpx.post(url, json=body(turn), trust_env=False, timeout=60)
@@ -146,7 +146,7 @@ def test_scribes_go_with_their_workers(tmp_path: Path) -> None:
         worker = scribe.parent()
         assert worker is not None
         worker.kill()
-        until(lambda: is_gone(scribe), seconds=5)
+        until(lambda: is_gone(scribe))
 
 
 def body(turn: int) -> dict[str, Any]:

@@ -1,15 +1,19 @@
-"""What all DXF files share: a document with its layers, and its bytes."""
+"""What all DXF files share: a document with its layers, and its bytes.
+
+ezdxf is loaded when something is drawn: it takes a quarter second that most processes have no use for.
+"""
 
 from __future__ import annotations
 
 import io
-
-from ezdxf.document import Drawing
-from ezdxf.filemanagement import new
+from typing import TYPE_CHECKING
 
 from hexwrap_server.files.layers import size_layers
 from hexwrap_server.files.text import one_line
 from hexwrap_solver.panels.types import Panels
+
+if TYPE_CHECKING:
+    from ezdxf.document import Drawing
 
 
 def drawing(panels: Panels, name: str, *others: str) -> Drawing:
@@ -22,6 +26,8 @@ def drawing(panels: Panels, name: str, *others: str) -> Drawing:
 
 def grey_drawing(name: str, *others: str) -> Drawing:
     """An empty drawing without a unit, with grey layers."""
+    from ezdxf.filemanagement import new
+
     document = new("R2010")
     document.header["$INSUNITS"] = 0
     document.header["$PROJECTNAME"] = one_line(name)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from ezdxf.layouts.layout import Modelspace
 
 from hexwrap_server.files.drawing import drawing, encode
 from hexwrap_server.files.layers import size_layers
@@ -15,6 +15,9 @@ from hexwrap_server.files.text import length, lengths, one_line
 from hexwrap_solver.arrays import Floats, Ints, Ragged
 from hexwrap_solver.panels.types import Panels
 from hexwrap_solver.pipeline import Solution
+
+if TYPE_CHECKING:
+    from ezdxf.layouts.layout import Modelspace
 
 #: Space left between outlines, and along the rim of a sheet, in parts of the largest panel's width.
 SPACE = 0.04

@@ -1,20 +1,23 @@
-"""A rendered scene with its title and the legend of sizes, as PNG."""
+"""A rendered scene with its title and the legend of sizes, as PNG.
+
+matplotlib is loaded when a picture is made: it takes half a second that most processes have no use for.
+"""
 
 from __future__ import annotations
 
 import io
 import warnings
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
-from matplotlib.patches import RegularPolygon
 
 from hexwrap_server.files import colours, text
 from hexwrap_server.files.meta import Meta
 from hexwrap_solver.arrays import Floats
 from hexwrap_solver.panels.types import Panels
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 #: Pixels; dots per inch only relates them to matplotlib's points.
 WIDTH, ROW, DPI = 420, 54, 100
@@ -25,6 +28,9 @@ INK, GREY = "#23262b", "#70757d"
 
 def compose(image: Floats, panels: Panels, meta: Meta) -> bytes:
     """PNG of the image (h, w, 3) with the legend on its right."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
     height, width = image.shape[:2]
     figure = Figure(figsize=((width + WIDTH) / DPI, height / DPI), dpi=DPI, facecolor="white")
     FigureCanvasAgg(figure)
@@ -58,7 +64,7 @@ def _legend(axes: Axes, height: int, panels: Panels, meta: Meta) -> None:
         _bar(axes, top, rows * ROW - 20, panels)
     if cut:
         y = top + ROW * (rows + 0.5)
-        axes.add_patch(RegularPolygon((22, y), 6, radius=20, orientation=np.pi / 6, color=colours.UNSIZED))
+        _hexagon(axes, y, colours.UNSIZED)
         axes.text(64, y, "of no size class", size=17, color=GREY, va="center")
         axes.text(WIDTH - 60, y, f"{cut:,}", size=17, color=GREY, va="center", ha="right")
 
@@ -68,9 +74,15 @@ def _swatches(axes: Axes, top: float, panels: Panels) -> None:
     counts, words = panels.class_count.tolist(), text.lengths(panels.class_length.tolist())
     for i, colour in enumerate(colours.size_colours(len(words))):
         y = top + ROW * (i + 0.5)
-        axes.add_patch(RegularPolygon((22, y), 6, radius=20, orientation=np.pi / 6, color=colour))
+        _hexagon(axes, y, colour)
         axes.text(64, y, words[i], size=17, color=INK, va="center")
         axes.text(WIDTH - 60, y, f"{counts[i]:,}", size=17, color=GREY, va="center", ha="right")
+
+
+def _hexagon(axes: Axes, y: float, colour: str) -> None:
+    from matplotlib.patches import RegularPolygon
+
+    axes.add_patch(RegularPolygon((22, y), 6, radius=20, orientation=np.pi / 6, color=colour))
 
 
 def _bar(axes: Axes, top: float, length: float, panels: Panels) -> None:

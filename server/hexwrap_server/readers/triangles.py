@@ -1,12 +1,10 @@
-"""PLY and STL, by trimesh."""
+"""PLY and STL, by trimesh, which is loaded with the first such file: most servers never see one."""
 
 from __future__ import annotations
 
 import io
 
 import numpy as np
-from trimesh.exchange.ply import load_ply
-from trimesh.exchange.stl import load_stl
 
 from hexwrap_server.readers.errors import UnreadableFileError
 from hexwrap_solver.arrays import Ragged
@@ -15,11 +13,15 @@ from hexwrap_solver.surface import SentMesh
 
 def read_ply(data: bytes) -> SentMesh:
     """Triangles, or quads where all faces are; trimesh splits mixed ones."""
+    from trimesh.exchange.ply import load_ply
+
     return _sent(load_ply(io.BytesIO(data), fix_texture=False, skip_materials=True), "PLY")
 
 
 def read_stl(data: bytes) -> SentMesh:
     """Binary or text; three vertices of its own for each triangle."""
+    from trimesh.exchange.stl import load_stl
+
     sent = _sent(load_stl(io.BytesIO(data)), "STL")
     return SentMesh(sent.vertices, sent.faces)  # its normals belong to faces
 
