@@ -181,11 +181,11 @@ def check_panels(result: Json, *, regular: bool = True, overlap_free: bool = Tru
         if p["size"][i] in table and abs(table[p["size"][i]] - length) > 1e-9 * length:
             bad.append(f"panel {p['label'][i]} has ℓ = {length}, its class {table[p['size'][i]]}")
             break
-    inward = 0
+    inward, pattern_normals = 0, np.array(result["pattern"]["normals"])
     for i, polygon in enumerate(p["polygons"]):
         q, n = np.array(polygon), np.array(p["normal"][i])
         area = np.cross(q - q[0], np.roll(q, -1, 0) - q[0]).sum(0)
-        outside = np.array(result["pattern"]["normals"])[result["pattern"]["faces"][p["face"][i]]].sum(0)
+        outside = pattern_normals[result["pattern"]["faces"][p["face"][i]]].sum(0)
         inward += bool(area @ n <= 0 or n @ outside <= 0 or abs(np.linalg.norm(n) - 1) > 1e-9)
     if inward:
         bad.append(f"{inward} panels or their normals do not look outward")
@@ -216,7 +216,8 @@ def check_quality(result: Json) -> list[str]:
         turn = np.arctan2(np.cross(edge, back) @ outward / np.linalg.norm(outward), (edge * back).sum(1))
         angles.append(np.abs(turn % (2 * np.pi) - (len(q) - 2) * np.pi / len(q)).max())
     u = result["map"]["log_scale"]
-    cells = [np.array(pattern["vertices"])[face] for face in pattern["faces"]]
+    vertices = np.array(pattern["vertices"])
+    cells = [vertices[face] for face in pattern["faces"]]
     found = {
         ("scale_ratio",): np.exp(max(u) - min(u)),
         ("planarity", "max"): max(planarity),

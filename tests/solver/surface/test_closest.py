@@ -81,12 +81,12 @@ def test_the_result_does_not_depend_on_how_many_pairs_are_looked_at_together(mon
     tree = closest.TriangleTree.build(vertices, faces)
     whole = tree.nearest(points)
     np.testing.assert_allclose(whole.distance, brute_force(points, vertices, faces), rtol=1e-12)
-    for pairs in (1, 1000):
+    for pairs, some in ((1, slice(None, None, 20)), (1000, slice(None))):
         monkeypatch.setattr(closest, "MOST_PAIRS", pairs)
         monkeypatch.setattr(closest, "COMPARED", pairs)
-        parts = tree.nearest(points)
-        np.testing.assert_array_equal(parts.face, whole.face)
-        np.testing.assert_array_equal(parts.distance, whole.distance)
+        parts = tree.nearest(points[some])
+        np.testing.assert_array_equal(parts.face, whole.face[some])
+        np.testing.assert_array_equal(parts.distance, whole.distance[some])
 
 
 @settings(max_examples=30, deadline=None)
