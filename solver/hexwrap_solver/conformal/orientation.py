@@ -86,7 +86,7 @@ def _drawn(found: ConformalMap) -> tuple[Floats, Floats]:
     k = np.arange(len(face))
     here = corners[k, c]
     a, b = corners[k, (c + 1) % 3] - here, corners[k, (c + 2) % 3] - here
-    sums = np.bincount(faces[face, c], np.angle(np.conj(a) * b), len(inner))
+    sums = np.bincount(faces[face, c], np.angle(np.conj(a) * b), len(inner)).astype(np.float64)
     rounding = np.zeros(len(inner))
     shortest = np.maximum(np.minimum(np.abs(a), np.abs(b)), np.finfo(float).tiny)
     np.maximum.at(rounding, faces[face, c], CORNER * np.abs(here) / shortest)
