@@ -38,9 +38,10 @@ MAX_TRIALS = 30
 CHORDS = 6
 #: What a chord step may leave of the residual to be kept.
 CHORD_GAIN = 0.2
-#: Where more than so many triangles are broken after so many steps, or any after a full step that leaves at
-#: most SETTLED of the residual, the minimum has broken triangles as well: the search ends there.
-BROKEN, PATIENCE, SETTLED = 8, 2, 0.05
+#: Where more than BROKEN_AT_FIRST triangles are broken after the first step, more than BROKEN after others,
+#: or any after a full step that leaves at most SETTLED of the residual, the minimum has broken triangles as
+#: well: the search ends there.
+BROKEN_AT_FIRST, BROKEN, SETTLED = 16, 8, 0.05
 
 
 #: After a step that was cut short, unknowns with a residual of at least the share LOCAL of the largest, and
@@ -183,7 +184,7 @@ def _local_direction(energy: Energy, point: _Point, among: Ints) -> Floats | Non
 def _stays_broken(corners: Corners, iterations: int, settled: bool) -> bool:
     """Whether the original triangulation can be given up, see BROKEN."""
     count = int(corners.broken.sum())
-    return count > 0 and (settled or (iterations >= PATIENCE and count > BROKEN))
+    return count > (0 if settled else BROKEN if iterations > 1 else BROKEN_AT_FIRST)
 
 
 def largest(gradient: Floats) -> float:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from hexwrap_solver.arrays import Bools, Complexes, Floats
@@ -11,8 +13,8 @@ from hexwrap_solver.conformal.types import ConformalMap
 ROUNDINGS = 32 * np.finfo(np.float64).eps
 #: What the rounding of corners does to an angle, times their distance over its shorter side.
 CORNER = 16 * np.finfo(np.float64).eps
-#: Boundary angles are promised to 1e-9.
-ANGLE = 5e-10
+#: Boundary angles are promised to 1e-9, and so is their sum, per √n of n angles.
+ANGLE, TURN = 5e-10, 1e-9
 
 
 def positive(corners: Complexes) -> Bools:
@@ -43,19 +45,39 @@ def misdrawn(found: ConformalMap) -> Bools:
 
 
 def faithful(found: ConformalMap) -> bool:
-    """Whether the angles drawn at the boundary add up to ``boundary_angles``."""
-    return bool(_drawn_errors(found)[0].max() <= ANGLE)
+    """Whether the angles drawn at the boundary add up to ``boundary_angles``, and these to the cone angle."""
+    sums, _ = _drawn(found)
+    return bool(_off_told(found, sums).max() <= ANGLE and _off_turn(found, sums) <= TURN)
 
 
-def drawn_error(found: ConformalMap) -> float:
-    """How far the angles drawn at the boundary are off ``boundary_angles``, beyond the rounding of corners,
-    which short edges far from the origin cannot do without."""
-    error, rounding = _drawn_errors(found)
-    return float((error - rounding).max())
+@dataclass(frozen=True)
+class DrawnErrors:
+    """angle: how far the angles drawn at the boundary are off ``boundary_angles``, beyond the rounding of
+    corners, which short edges far from the origin cannot do without. turn: how far the first loop is from
+    turning by the cone angle, per √n of its n vertices: as single roundings add up."""
+
+    angle: float
+    turn: float
 
 
-def _drawn_errors(found: ConformalMap) -> tuple[Floats, Floats]:
-    """(b,) of the vertices on both loops, and (b,) what the rounding of corners may do to them."""
+def drawn_errors(found: ConformalMap) -> DrawnErrors:
+    """Of a map as drawn, radians."""
+    sums, rounding = _drawn(found)
+    return DrawnErrors(float((_off_told(found, sums) - rounding).max()), _off_turn(found, sums))
+
+
+def _off_told(found: ConformalMap, sums: Floats) -> Floats:
+    return np.asarray(np.abs(sums - np.concatenate(found.boundary_angles)))
+
+
+def _off_turn(found: ConformalMap, sums: Floats) -> float:
+    n = len(found.surface.loops[0])
+    return abs(float((np.pi - sums[:n]).sum()) - found.deck.angle) / float(np.sqrt(n))
+
+
+def _drawn(found: ConformalMap) -> tuple[Floats, Floats]:
+    """(b,) angle sums of the vertices on both loops as drawn, and (b,) what the rounding of corners may do to
+    them."""
     faces, loops = found.surface.faces, np.concatenate(found.surface.loops)
     inner = np.ones(len(found.surface.vertices), dtype=bool)
     inner[loops] = False
@@ -64,8 +86,8 @@ def _drawn_errors(found: ConformalMap) -> tuple[Floats, Floats]:
     k = np.arange(len(face))
     here = corners[k, c]
     a, b = corners[k, (c + 1) % 3] - here, corners[k, (c + 2) % 3] - here
-    sums = np.bincount(faces[face, c], np.angle(np.conj(a) * b), len(inner))
+    sums = np.bincount(faces[face, c], np.angle(np.conj(a) * b), len(inner)).astype(np.float64)
     rounding = np.zeros(len(inner))
     shortest = np.maximum(np.minimum(np.abs(a), np.abs(b)), np.finfo(float).tiny)
-    np.maximum.at(rounding, faces[face, c], CORNER * np.abs(corners).max(axis=1) / shortest)
-    return np.abs(sums[loops] - np.concatenate(found.boundary_angles)), rounding[loops]
+    np.maximum.at(rounding, faces[face, c], CORNER * np.abs(here) / shortest)
+    return sums[loops], rounding[loops]

@@ -18,9 +18,6 @@ from hexwrap_solver.conformal.span import MAX_SPAN, check_reach, check_span
 from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap, Deck, Targets
 from hexwrap_solver.surface.types import Surface
 
-#: Angle sums this near to their targets make u a start for the search with flips, radians.
-CLOSE = 0.5
-
 NO_ANGLES = (
     "The boundary's mode is angles, but its list of angles is empty: every boundary angle is 180°, as with"
     " straight."
@@ -104,8 +101,7 @@ class _Plain:
     @property
     def start(self) -> Floats | None:
         """Where a search with flips may start; None where this one ran away."""
-        near = self.minimum.residual < CLOSE and np.ptp(self.minimum.u) < MAX_SPAN
-        return self.minimum.u if near else None
+        return self.minimum.u if np.ptp(self.minimum.u) < MAX_SPAN else None
 
 
 def _plain(surface: Surface, targets: Targets, start: Floats | None, progress: Progress) -> _Plain:

@@ -20,8 +20,16 @@ from tests.solver.conformal.torture import MODES
 AROUND = 6
 #: Rows are so many times as high as quads are wide.
 HIGH = 20.0
-#: Vertices around, rows, height (over a circumference of 2π), boundary angles.
-BANDS = [(11, 21, 0.006, "entrance"), (7, 21, 0.0073, "densified")]
+#: Vertices around, rows, height (over a circumference of 2π), boundary angles: no double holds these maps.
+BANDS = [(15, 5, 0.005, "entrance"), (7, 21, 0.003, "entrance")]
+#: The same, where double precision just suffices or does not.
+AT_THE_LIMIT = [
+    (7, 5, 0.005, "densified"),
+    (7, 11, 0.004, "densified"),
+    (7, 21, 0.0073, "entrance"),
+    (11, 5, 0.003, "entrance"),
+    (15, 5, 0.02, "entrance"),
+]
 
 
 def tube(rows: int) -> Surface:
@@ -88,6 +96,19 @@ def test_bands_far_too_wide_for_their_corners_are_refused_for_the_span(
     surface = grid(around, rows, revolution(lambda s: 1 + 0 * s, lambda s: height * s))
     with pytest.raises(ConvergenceError, match=r"10\^\d+ times as much as others.*ask for boundary angles"):
         conformal_map(surface, MODES[kind](surface, np.random.default_rng(1039)))
+
+
+@pytest.mark.parametrize(("around", "rows", "height", "kind"), AT_THE_LIMIT)
+def test_bands_at_the_limit_are_right_or_refused(around: int, rows: int, height: float, kind: str) -> None:
+    """Each angle may be within 1e-9 while their sum is not, and the layout in one piece less exact than that
+    of single triangles."""
+    surface = grid(around, rows, revolution(lambda s: 1 + 0 * s, lambda s: height * s))
+    condition = MODES[kind](surface, np.random.default_rng(1039))
+    try:
+        found = conformal_map(surface, condition)
+    except ConvergenceError:
+        return
+    assert faults(found, asked_angles(found, surface, condition)) == []
 
 
 @pytest.mark.parametrize("height", [0.025, 0.01])

@@ -12,7 +12,7 @@ from hexwrap_solver.conformal.boundary import cone_angle_of
 from hexwrap_solver.conformal.cut import cut_open
 from hexwrap_solver.conformal.energy import Energy, opposite_lengths
 from hexwrap_solver.conformal.layout import normalise
-from hexwrap_solver.conformal.orientation import drawn_error, misdrawn
+from hexwrap_solver.conformal.orientation import drawn_errors, misdrawn
 from hexwrap_solver.conformal.robust.delaunay import make_delaunay
 from hexwrap_solver.conformal.robust.descent import ACCEPTED, Descent, FlipEnergy, descend
 from hexwrap_solver.conformal.robust.develop import develop
@@ -141,7 +141,11 @@ def _in_one_piece(found: ConformalMap, first: Ints) -> ConformalMap:
     """The same map with its faces laid out side by side, but for one cut, if corners are near enough to the
     origin there to keep their digits. first: (m,) where the first corner of each face then stands."""
     whole = replace(found, sheet=found.sheet + first[:, None])
-    exact = not misdrawn(whole).any() and drawn_error(whole) <= max(PROMISED / 100, drawn_error(found))
+    if misdrawn(whole).any():
+        return found
+    before, after = drawn_errors(found), drawn_errors(whole)
+    least = PROMISED / 100
+    exact = after.angle <= max(least, before.angle) and after.turn <= max(least, before.turn)
     return whole if exact else found
 
 
@@ -289,8 +293,9 @@ def _centred(descent: Descent, targets: Targets) -> tuple[Floats, Metric]:
 def _check_drawn(found: ConformalMap, off: float) -> None:
     """Raises ConvergenceError where boundary angles, as drawn, are not as exact as promised: small residuals
     add up along the way through a domain of very large and very small parts. off: as in ``_Flat``."""
-    error = drawn_error(found)
-    if error + off > PROMISED:
+    drawn = drawn_errors(found)
+    error = max(drawn.angle + off, drawn.turn)
+    if error > PROMISED:
         raise failure(
             float(np.ptp(found.log_scale)),
             found.deck.angle,
