@@ -117,9 +117,11 @@ def overhead(client: httpx.Client, n: int, rounds: int) -> None:
         staged.append(sum(orjson.loads(answer)["timings"].values()))
         again.append(posted(client, body)[0])
     a, b = min(own), min(through)
+    median = statistics.median(t / s for t, s in zip(through, own, strict=True))
     outside = min(t - s for t, s in zip(through, staged, strict=True))
     print(
         f"{n:>8} vertices  solver {a:7.3f} s   service {b:7.3f} s   adds {100 * (b / a - 1):5.1f} % "
+        f"  (median of neighbours {100 * (median - 1):5.1f} %)"
         f"  outside stages {outside:6.3f} s ({100 * outside / a:4.1f} %)   again {1000 * min(again):6.1f} ms"
     )
 
@@ -155,6 +157,7 @@ def main() -> None:
     parser.add_argument("--vertices", type=int, nargs="+", default=[2000, 20000])
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--clients", type=int, nargs="*", default=[1, 8, 50])
     given = parser.parse_args()
     with server(given.workers) as client:
         alone(orjson.dumps({"surface": tower(500)}))  # so that neither side pays for first imports
@@ -163,8 +166,8 @@ def main() -> None:
         for n in given.vertices:
             overhead(client, n, given.rounds)
         cached(client)
-        for clients, jobs in ((1, 10), (8, 40), (50, 100)):
-            load(client, clients, jobs)
+        for clients in given.clients:
+            load(client, clients, max(10, min(5 * clients, 100)))
 
 
 if __name__ == "__main__":
