@@ -26,12 +26,11 @@ from hexwrap_solver.conformal.robust.straight import straighten
 from hexwrap_solver.conformal.robust.trail import Places, Trail
 from hexwrap_solver.conformal.types import ConformalMap, Targets
 from hexwrap_solver.surface.topology import half_edges
-from hexwrap_solver.surface.types import Surface
 
-#: Rounds of insertion, and of them without progress. Most meshes take up to six.
+#: Rounds of insertion, and of them without progress. Most meshes take up to six; around a vertex of many
+#: edges each round may lead to the next triangle only.
 MAX_ROUNDS, PATIENCE = 100, 40
-#: From this round on the edges to split are those that are longest in the domain; around a vertex of many
-#: edges this leads from each triangle to the next, so that later rounds go 1, 3, 7 … steps ahead.
+#: From this round on the edges to split are those that are longest in the domain.
 DRAWN = 2
 #: Insertion that makes more than so many times the vertices, and so many more, does not come to an end.
 MOST, MOST_MORE = 2, 400
@@ -176,11 +175,7 @@ def insert(overlay: Overlay, targets: Targets) -> Refined | None:
     problem = Problem(surface, targets, overlay.found.log_scale, np.arange(len(corners)))
     anchors, counts, drawn = Anchors.of_vertices(n), [len(wrong)], overlay.found
     for attempt in range(MAX_ROUNDS):
-        domain = None
-        if attempt >= DRAWN:
-            domain = drawn.corners()
-            wrong = _path(problem.surface, domain, wrong, 2 ** max(attempt - DRAWN - 1, 0) - 1)
-            domain = domain[wrong]
+        domain = drawn.corners()[wrong] if attempt >= DRAWN else None
         marked, place = split_places(problem.surface, problem.targets, wrong, attempt, domain)
         while len(marked):
             marked, place = once_per_edge(problem.surface, marked, place)
@@ -204,22 +199,6 @@ def insert(overlay: Overlay, targets: Targets) -> Refined | None:
         if attempt >= PATIENCE and min(counts[-PATIENCE:]) >= min(counts[:-PATIENCE]):
             return None
     return None
-
-
-def _path(surface: Surface, corners: Complexes, wrong: Ints, steps: int) -> Ints:
-    """The faces ``wrong`` and those that ``steps`` steps lead to, each across the longest edge in the domain
-    (longest-edge propagation; Rivara 1997)."""
-    longest = 3 * np.arange(len(corners)) + np.abs(np.roll(corners, -1, axis=1) - corners).argmax(axis=1)
-    on_path = np.zeros(len(corners), dtype=bool)
-    at = wrong
-    for _ in range(steps + 1):
-        on_path[at] = True
-        across = surface.twin[longest[at]]
-        at = across[across >= 0] // 3
-        at = at[~on_path[at]]
-        if not len(at):
-            break
-    return np.flatnonzero(on_path)
 
 
 def _corners(mesh: MirrorMesh) -> Ints:
