@@ -38,9 +38,10 @@ MAX_TRIALS = 40
 #: Added to the diagonal, relative to it and to 1, one after the other until the Hessian is definite: in exact
 #: arithmetic it always is.
 LIFTS = (0.0, 1e-9, 1e-6)
-#: Where the residual is above LOCAL at first, at no more than the share FEW of the unknowns with RINGS of
-#: their neighbours, these are brought near the solution first, by at most LOCAL_STEPS steps.
-LOCAL, RINGS, FEW, LOCAL_STEPS = 0.03, 3, 0.25, 8
+#: At first, and after a step that was cut short: where the residual is above LOCAL and the share SHARE of the
+#: largest, at no more than the share FEW of the unknowns with RINGS of their neighbours, these are brought
+#: near the solution by themselves, by at most LOCAL_STEPS steps.
+LOCAL, SHARE, RINGS, FEW, LOCAL_STEPS = 0.03, 0.03, 3, 0.25, 8
 #: Newton may overshoot, but not by so much, where the answer is of use.
 RUNAWAY = 2.0
 #: Above this the answer is not accepted. Needles of 1e-4 degrees have rounding of 1e-9 in their angles.
@@ -143,7 +144,7 @@ def _relaxed(energy: FlipEnergy, x: Floats, metric: Metric, gradient: Floats) ->
     """
     at = _Step(x, metric, gradient, False)
     for _ in range(LOCAL_STEPS):
-        among = _around(energy, np.abs(at.gradient) > LOCAL)
+        among = _around(energy, np.abs(at.gradient) > max(LOCAL, SHARE * largest(at.gradient)))
         if not 0 < len(among) <= FEW * len(x):
             break
         direction = np.zeros(len(x))
@@ -191,6 +192,8 @@ def descend(energy: FlipEnergy, start: Floats, span: float, progress: Progress) 
             metric, gradient = energy.at(x)
             break
         iterations += 1
+        if not step.full:
+            step = _relaxed(energy, *step[:3])
         gain = largest(step.gradient) / residual
         if gain < 1 or residual > ACCEPTED:
             x, metric, gradient = step.x, step.metric, step.gradient

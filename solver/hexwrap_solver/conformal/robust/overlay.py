@@ -29,11 +29,12 @@ from hexwrap_solver.surface.topology import half_edges
 
 #: Rounds of insertion, and of them without progress. Most meshes take up to six; around a vertex of many
 #: edges each round may lead to the next triangle only.
-MAX_ROUNDS, PATIENCE = 100, 40
+MAX_ROUNDS, PATIENCE = 200, 100
 #: From this round on the edges to split are those that are longest in the domain.
 DRAWN = 2
-#: Insertion that makes more than so many times the vertices, and so many more, does not come to an end.
-MOST, MOST_MORE = 2, 400
+#: Insertion that makes more than so many times the vertices, and so many more, does not come to an end. It is
+#: worth some patience: solving again with new vertices takes many times as long.
+MOST, MOST_MORE = 2, 2000
 
 
 @dataclass(frozen=True)

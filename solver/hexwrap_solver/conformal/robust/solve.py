@@ -294,8 +294,8 @@ def _check_drawn(found: ConformalMap, off: float) -> None:
     """Raises ConvergenceError where boundary angles, as drawn, are not as exact as promised: small residuals
     add up along the way through a domain of very large and very small parts. off: as in ``_Flat``."""
     drawn = drawn_errors(found)
-    error = max(drawn.angle + off, drawn.turn)
-    if error > PROMISED:
+    error = np.maximum(drawn.angle + off, drawn.turn)
+    if not error <= PROMISED:  # nor if it is NaN
         raise failure(
             float(np.ptp(found.log_scale)),
             found.deck.angle,
