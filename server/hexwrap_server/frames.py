@@ -6,6 +6,7 @@ import os
 import pickle
 import signal
 import struct
+import sys
 from typing import IO, Any
 
 _LENGTH = struct.Struct("<Q")
@@ -23,7 +24,25 @@ def pipes_of_child() -> tuple[IO[bytes], IO[bytes]]:
     inlet = os.fdopen(os.dup(0), "rb")
     outlet = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # whatever libraries print must not end up between the frames
+    _leave_standard_input()
     return inlet, outlet
+
+
+def _leave_standard_input() -> None:
+    """Have nothing at standard input any more.
+
+    On Windows libraries that look at it while they are loaded, as OpenBLAS's Fortran runtime does, would wait
+    for the thread that reads from the pipe there (numpy, issue 24290).
+    """
+    nothing = os.open(os.devnull, os.O_RDONLY)
+    os.dup2(nothing, 0)
+    os.close(nothing)
+    if sys.platform == "win32":
+        import ctypes
+        import msvcrt
+
+        STD_INPUT_HANDLE = -10
+        ctypes.windll.kernel32.SetStdHandle(STD_INPUT_HANDLE, ctypes.c_void_p(msvcrt.get_osfhandle(0)))
 
 
 def write_frame(pipe: IO[bytes], message: object) -> None:

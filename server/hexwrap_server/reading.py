@@ -37,7 +37,7 @@ def read_surface(data: bytes, filename: str) -> SentMesh | NurbsSurface:
         )
     try:
         return READERS[suffix](data)
-    except SurfaceError:
+    except (SurfaceError, ImportError):  # a reader that is not installed well is no fault of the file
         raise
     except (Exception, MemoryError) as error:  # foreign readers fail in every way on broken files
         raise UnreadableFileError(

@@ -6,6 +6,7 @@ loads anything large, which takes seconds on a busy machine: it is to leave with
 
 from __future__ import annotations
 
+import logging
 import os
 import queue
 import sys
@@ -17,6 +18,7 @@ from hexwrap_server.frames import pipes_of_child, read_frame, write_frame
 
 #: What is to be done, about what, with what: see ``scribe.Desk``.
 Order = tuple[str, Any, bytes]
+log = logging.getLogger("hexwrap.scribe")
 
 
 def main() -> None:
@@ -37,10 +39,14 @@ def main() -> None:
 
 
 def _listen(inlet: IO[bytes], orders: queue.SimpleQueue[Order]) -> None:
-    while (head := read_frame(inlet)) is not None:
-        kind, name, size = head
-        data = inlet.read(size)
-        if len(data) < size:
-            break
-        orders.put((kind, name, data))
-    os._exit(0)
+    try:
+        while (head := read_frame(inlet)) is not None:
+            kind, name, size = head
+            data = inlet.read(size)
+            if len(data) < size:
+                break
+            orders.put((kind, name, data))
+    except Exception:  # such as MemoryError: nothing that comes later can be understood
+        log.exception("what the worker says cannot be read")
+    finally:
+        os._exit(0)

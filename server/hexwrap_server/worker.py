@@ -264,9 +264,13 @@ def _say(outlet: IO[bytes], answer: tuple[Any, ...]) -> None:
 
 
 def _listen(inlet: IO[bytes], calls: queue.SimpleQueue[Call]) -> None:
-    while (call := read_frame(inlet)) is not None:
-        calls.put((call[0], call[1]))
-    os._exit(0)
+    try:
+        while (call := read_frame(inlet)) is not None:
+            calls.put((call[0], call[1]))
+    except Exception:  # such as MemoryError: nothing that comes later can be understood
+        log.exception("what the server says cannot be read")
+    finally:
+        os._exit(0)
 
 
 def _answer(function: str, arguments: tuple[Any, ...], report: Report) -> tuple[Any, ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import io
+import sys
 import zipfile
 from collections.abc import Callable
 from contextlib import suppress
@@ -293,3 +294,9 @@ def test_npz_with_faces_of_another_shape_is_refused(faces: np.ndarray) -> None:
 def test_npz_without_faces_is_refused() -> None:
     with pytest.raises(UnreadableFileError, match="'faces'"):
         read_surface(archive(vertices=npy(tube()[0])), "a.npz")
+
+
+def test_a_reader_that_is_missing_is_not_the_fault_of_the_file(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "trimesh.exchange.ply", None)
+    with pytest.raises(ImportError):
+        read_surface(b"ply", "tower.ply")

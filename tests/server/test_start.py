@@ -1,15 +1,48 @@
-"""Processes load what they need, when they need it: a server and its workers start in the time of that."""
+"""Processes load what they need, when they need it: a server and its workers start in the time of that, and
+they listen before."""
 
 from __future__ import annotations
 
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import pytest
 
+from hexwrap_server.frames import write_frame
+
 #: Libraries of single file formats and pictures.
 FORMATS = {"matplotlib", "ezdxf", "trimesh"}
+
+
+#: The life of a scribe whose loading takes a minute.
+SLOW_SCRIBE = """
+import sys, time
+class Slow:
+    def find_spec(self, name, path=None, target=None):
+        if name == "hexwrap_server.scribe":
+            time.sleep(60)
+sys.meta_path.insert(0, Slow())
+from hexwrap_server.scribe_main import main
+main()
+"""
+
+
+def environment() -> dict[str, str]:
+    return os.environ | {"PYTHONPATH": os.pathsep.join(os.path.abspath(p or ".") for p in sys.path)}
+
+
+@contextmanager
+def child(program: str) -> Iterator[subprocess.Popen[bytes]]:
+    pipe = subprocess.PIPE
+    command = [sys.executable, "-c", program, "CRITICAL"]
+    with subprocess.Popen(command, stdin=pipe, stdout=pipe, env=environment()) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
 
 
 @pytest.mark.parametrize(
@@ -23,11 +56,10 @@ FORMATS = {"matplotlib", "ezdxf", "trimesh"}
     ],
 )
 def test_what_is_not_loaded_at_the_start(module: str, not_loaded: set[str]) -> None:
-    paths = os.pathsep.join(os.path.abspath(p or ".") for p in sys.path)
     program = f"import sys, hexwrap_server.{module}; print(*{{name.split('.')[0] for name in sys.modules}})"
     ran = subprocess.run(
         [sys.executable, "-c", program],
-        env=os.environ | {"PYTHONPATH": paths},
+        env=environment(),
         capture_output=True,
         text=True,
         check=True,
@@ -35,3 +67,34 @@ def test_what_is_not_loaded_at_the_start(module: str, not_loaded: set[str]) -> N
     loaded = set(ran.stdout.split())
     assert "hexwrap_server" in loaded
     assert not loaded & not_loaded
+
+
+def test_a_scribe_leaves_with_its_worker_while_it_loads() -> None:
+    with child(SLOW_SCRIBE) as process:
+        assert process.stdin is not None
+        process.stdin.close()
+        assert process.wait(timeout=30) == 0
+
+
+@pytest.mark.parametrize("name", ["scribe_main", "worker"])
+def test_who_cannot_be_spoken_to_leaves(name: str) -> None:
+    """Three words are announced, and one of them is larger than any memory."""
+    with child(f"from hexwrap_server.{name} import main; main()") as process:
+        assert process.stdin is not None
+        if name == "worker":
+            process.stdin.write((2**62).to_bytes(8, "little"))
+            process.stdin.flush()
+        else:
+            write_frame(process.stdin, ("part", "map", 2**62))
+        assert process.wait(timeout=30) == 0
+
+
+def test_standard_input_is_left_to_nobody() -> None:
+    """On Windows a library that looks at it while it is loaded waits for the thread that reads there."""
+    program = (
+        "import os; from hexwrap_server.frames import pipes_of_child; inlet, outlet = pipes_of_child(); "
+        "outlet.write(os.read(0, 9) + b', ' + inlet.read()); outlet.flush()"
+    )
+    with child(program) as process:
+        said, _ = process.communicate(b"hear me", timeout=30)
+    assert said == b", hear me"

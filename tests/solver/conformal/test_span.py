@@ -98,17 +98,20 @@ def test_bands_far_too_wide_for_their_corners_are_refused_for_the_span(
         conformal_map(surface, MODES[kind](surface, np.random.default_rng(1039)))
 
 
-@pytest.mark.parametrize(("around", "rows", "height", "kind"), AT_THE_LIMIT)
-def test_bands_at_the_limit_are_right_or_refused(around: int, rows: int, height: float, kind: str) -> None:
+def test_bands_at_the_limit_are_right_or_refused() -> None:
     """Each angle may be within 1e-9 while their sum is not, and the layout in one piece less exact than that
     of single triangles."""
-    surface = grid(around, rows, revolution(lambda s: 1 + 0 * s, lambda s: height * s))
-    condition = MODES[kind](surface, np.random.default_rng(1039))
-    try:
-        found = conformal_map(surface, condition)
-    except ConvergenceError:
-        return
-    assert faults(found, asked_angles(found, surface, condition)) == []
+    solved = 0
+    for around, rows, height, kind in AT_THE_LIMIT:
+        surface = grid(around, rows, revolution(lambda s: 1 + 0 * s, lambda s, height=height: height * s))
+        condition = MODES[kind](surface, np.random.default_rng(1039))
+        try:
+            found = conformal_map(surface, condition)
+        except ConvergenceError:
+            continue
+        assert faults(found, asked_angles(found, surface, condition)) == [], (around, rows, height, kind)
+        solved += 1
+    assert solved  # how many depends on rounding
 
 
 @pytest.mark.parametrize("height", [0.025, 0.01])

@@ -8,7 +8,7 @@ import pytest
 from hexwrap_solver.conformal import conformal_map
 from tests.solver.conformal.checks import asked_angles, faults
 from tests.solver.conformal.shared import MESHES, load
-from tests.solver.conformal.torture import MODES, TORTURE, extreme
+from tests.solver.conformal.torture import MODES, TORTURE, band, extreme
 
 #: A few seconds each; they run with the others under ``-m long``.
 SLOW = ("valence", "long_tube", "slivers")
@@ -36,6 +36,21 @@ def test_extreme_angles_are_solved(name: str, seed: int) -> None:
     condition = extreme(surface, np.random.default_rng(seed + 1000))
     found = conformal_map(surface, condition)
     assert faults(found, asked_angles(found, surface, condition)) == []
+
+
+@pytest.mark.parametrize(("seed", "mode"), [(10, "entrance"), (14, "densified"), (31, "extreme")])
+def test_bands_of_few_vertices_on_one_side_need_few_more(seed: int, mode: str) -> None:
+    """Fans of up to a hundred triangles, one of which turns over after another. Solving again with the new
+    vertices as unknowns made thousands of them."""
+    random = np.random.default_rng(seed)
+    first, second = int(random.integers(3, 8)), int(random.integers(40, 160))
+    first_angles, second_angles = (np.sort(random.uniform(0, 2 * np.pi, n)) for n in (first, second))
+    surface = band(first_angles, second_angles, random)
+    make = extreme if mode == "extreme" else MODES[mode]
+    condition = make(surface, np.random.default_rng(seed + 1))
+    found = conformal_map(surface, condition)
+    assert faults(found, asked_angles(found, surface, condition)) == []
+    assert found.inserted < 5 * len(surface.vertices)
 
 
 @pytest.mark.long
