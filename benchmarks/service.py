@@ -1,6 +1,6 @@
 """What the service adds to the solver, and what it carries.
 
-    python benchmarks/service.py [--vertices 2000 20000] [--rounds 5] [--workers 2]
+    python benchmarks/service.py [--vertices 2000 20000] [--rounds 5] [--workers 2] [--clients 1 8 50]
 
 overhead: wall time of POST /v1/solve over that of the pipeline alone, on the same new surfaces, the best of a
 few rounds in turn, and how much of it lies outside the stages. cached: a request of about 1,000 panels again.
