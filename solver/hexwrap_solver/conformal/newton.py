@@ -143,7 +143,7 @@ def _relaxed(energy: Energy, point: _Point) -> _Point:
     elimination; Cai, Keyes 2002).
     """
     for _ in range(LOCAL_STEPS):
-        among = _around(energy, np.abs(point.gradient) > LOCAL * point.residual)
+        among = around(np.abs(point.gradient) > LOCAL * point.residual, energy.rows, energy.columns)
         if len(among) > FEW * len(point.x) or point.residual <= ACCEPTED:
             break
         direction = _local_direction(energy, point, among)
@@ -154,12 +154,14 @@ def _relaxed(energy: Energy, point: _Point) -> _Point:
     return point
 
 
-def _around(energy: Energy, marked: Bools) -> Ints:
-    """The marked unknowns (n,), and those up to RINGS edges away from them."""
-    marked = marked.copy()
+def around(marked: Bools, one: Ints, other: Ints) -> Ints:
+    """The marked unknowns (n,), and those up to RINGS edges away from them. one, other: (e,) the ends of the
+    edges, −1 where it is no unknown."""
+    marked = np.append(marked, False)
     for _ in range(RINGS):
-        joined = marked[energy.rows] | marked[energy.columns]
-        marked[energy.rows[joined]] = marked[energy.columns[joined]] = True
+        joined = marked[one] | marked[other]
+        marked[one[joined]] = marked[other[joined]] = True
+        marked[-1] = False
     return np.flatnonzero(marked)
 
 

@@ -12,15 +12,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hexwrap_solver.arrays import Bools, Floats, Ints, Progress
+from hexwrap_solver.arrays import Floats, Ints, Progress
 from hexwrap_solver.conformal.energy import Energy
 from hexwrap_solver.conformal.factor import Factorisation
 from hexwrap_solver.conformal.newton import (
     CHORD_GAIN,
     CHORDS,
+    FEW,
     LAST_ROUNDINGS,
+    LOCAL_STEPS,
     ROUNDING,
     STAGNATION,
+    around,
     chords_left,
     largest,
 )
@@ -39,9 +42,8 @@ MAX_TRIALS = 40
 #: arithmetic it always is.
 LIFTS = (0.0, 1e-9, 1e-6)
 #: At first, and after a step that was cut short: where the residual is above LOCAL and the share SHARE of the
-#: largest, at no more than the share FEW of the unknowns with RINGS of their neighbours, these are brought
-#: near the solution by themselves, by at most LOCAL_STEPS steps.
-LOCAL, SHARE, RINGS, FEW, LOCAL_STEPS = 0.03, 0.03, 3, 0.25, 8
+#: largest, these unknowns and their neighbours are brought near the solution by themselves, as in ``newton``.
+LOCAL, SHARE = 0.03, 0.03
 #: Newton may overshoot, but not by so much, where the answer is of use.
 RUNAWAY = 2.0
 #: Above this the answer is not accepted. Needles of 1e-4 degrees have rounding of 1e-9 in their angles.
@@ -144,7 +146,9 @@ def _relaxed(energy: FlipEnergy, x: Floats, metric: Metric, gradient: Floats) ->
     """
     at = _Step(x, metric, gradient, False)
     for _ in range(LOCAL_STEPS):
-        among = _around(energy, np.abs(at.gradient) > max(LOCAL, SHARE * largest(at.gradient)))
+        ends = energy.plain.dof[energy.mesh.origin]  # flips change them
+        large = np.abs(at.gradient) > max(LOCAL, SHARE * largest(at.gradient))
+        among = around(large, ends[::2], ends[1::2])
         if not 0 < len(among) <= FEW * len(x):
             break
         direction = np.zeros(len(x))
@@ -154,18 +158,6 @@ def _relaxed(energy: FlipEnergy, x: Floats, metric: Metric, gradient: Floats) ->
             return _Step(at.x, *energy.at(at.x), False)
         at = step
     return at
-
-
-def _around(energy: FlipEnergy, here: Bools) -> Ints:
-    """The marked unknowns (n,), and those up to RINGS edges away from them."""
-    ends = energy.plain.dof[energy.mesh.origin]
-    marked = np.append(here, False)
-    one, other = ends[::2], ends[1::2]
-    for _ in range(RINGS):
-        joined = marked[one] | marked[other]
-        marked[one[joined]] = marked[other[joined]] = True
-        marked[-1] = False
-    return np.flatnonzero(marked)
 
 
 def descend(energy: FlipEnergy, start: Floats, span: float, progress: Progress) -> Descent:
