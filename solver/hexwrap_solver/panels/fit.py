@@ -145,9 +145,9 @@ def _fit_watertight(
     notes = (
         *(STUCK_NOTE if stuck else ()),
         *collapsed_note(shapes),
-        *_crossing_note(crossing_themselves(shapes, center, normal)),
+        *_crossing_note(crossing_themselves(shapes, center, normal), settings.weights, pattern.kind),
         *_far_note(
-            surface.tree.nearest(moved).distance / mean_edges(shapes).mean(), settings.weights.surface
+            surface.tree.nearest(moved).distance / mean_edges(shapes).mean(), settings.weights, pattern.kind
         ),
     )
     return FittedPanels(
@@ -179,24 +179,32 @@ def collapsed_note(shapes: Ragged) -> tuple[str, ...]:
     )
 
 
-def _crossing_note(crossing: Bools) -> tuple[str, ...]:
+def _crossing_note(crossing: Bools, weights: Weights, kind: str) -> tuple[str, ...]:
     count = int(crossing.sum())
     if not count:
         return ()
+    less = "less weight on surface, for " if weights.surface else ""
+    quads = "" if kind == "quad" else "quads, which seldom do, or for "
     return (
-        f"Watertight panels whose outline crosses itself: {count}; ask for quads with little weight on"
-        " surface, which seldom do, or for split panels, which cannot.",
+        f"Watertight panels whose outline crosses itself: {count}; ask for {less}{quads}split panels, which"
+        " cannot.",
     )
 
 
-def _far_note(away: Floats, weight: float) -> tuple[str, ...]:
-    """away: (p,) distances of the corners from the surface / mean edge; weight: of surface."""
+def _far_note(away: Floats, weights: Weights, kind: str) -> tuple[str, ...]:
+    """away: (p,) distances of the corners from the surface / mean edge."""
     if away.max(initial=0.0) <= FAR:
         return ()
-    nearer = f"a weight of {HOLD:g} on surface holds them nearer, at the cost of less even shapes, and "
+    flat_quads = kind == "quad" and weights.planarity > 0
+    ways = []
+    if weights.surface < HOLD:
+        cost = "in waves where flat quads do not follow it" if flat_quads else "with less even shapes"
+        ways.append(f"a weight of {HOLD:g} on surface holds them nearer, {cost}; ")
+    if flat_quads:
+        ways.append("quads that need not be flat (planarity 0, surface 1) follow it smoothly; ")
     return (
         f"Watertight panels leave the surface by up to {away.max():.0%} of their mean edge,"
-        f" {away.mean():.0%} on average; {nearer if weight < HOLD else ''}split panels stay beside it.",
+        f" {away.mean():.0%} on average; {''.join(ways)}split panels stay beside it.",
     )
 
 

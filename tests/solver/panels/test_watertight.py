@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from hexwrap_solver.arrays import Ragged
+from hexwrap_solver.conformal import conformal_map
+from hexwrap_solver.conformal.types import BoundaryCondition
 from hexwrap_solver.panels import fit, fit_panels, rationalize
 from hexwrap_solver.panels.energy.cell_matrix import CellMatrix
 from hexwrap_solver.panels.energy.residuals import plane_distances, plane_slopes
@@ -14,6 +16,9 @@ from hexwrap_solver.panels.planar import crossing_themselves
 from hexwrap_solver.panels.polygons import edge_lengths, mean_edges, means
 from hexwrap_solver.panels.regular import corners
 from hexwrap_solver.panels.types import PanelSettings, Weights
+from hexwrap_solver.pattern import lay_pattern
+from hexwrap_solver.pattern.types import PatternSettings
+from tests.solver.conformal.annuli import bump
 from tests.solver.panels.cells import catenoid, grid_map, hex_pattern, inverted, quad_pattern, torus
 
 
@@ -76,6 +81,20 @@ def test_flatness_is_not_bought_with_more_than_it_costs(make):
     assert (np.diff(curve) < 0).all()
 
 
+@pytest.mark.parametrize(("chart", "center"), [(torus, (0.5, 0.1, 4.0)), (catenoid, (0.7, 0.2, 3.0))])
+def test_quads_become_flat_without_waves(chart, center):
+    """Where lines of the net are no conjugate directions, flat quads are nearest in waves like bellows: there
+    neighbours move as far apart as they move at all."""
+    pattern = quad_pattern(inverted(chart, center), 40, 12, 0.1)
+    length = np.full(pattern.n_cells, pattern.edge_length)
+    moved, _ = minimise_watertight(pattern, length, Weights(), None)
+    face = pattern.faces.values.reshape(-1, 4)
+    movement = moved - pattern.vertices
+    apart = np.linalg.norm(np.roll(movement[face], -1, axis=1) - movement[face], axis=2)
+    assert np.abs(plane_distances(moved[face], length)).max() < 1e-9
+    assert apart.max() < 0.5 * np.linalg.norm(movement, axis=1).max()
+
+
 def test_a_mesh_that_no_step_improves_is_told(monkeypatch):
     pattern, cmap = hex_pattern(torus, 16, 4), grid_map(torus, 40, 24, -0.1, 1.2)
     for curve, told in (([1.0, 1.0], True), ([1.0, 0.5, 0.4], False), ([0.0, 0.0], False)):
@@ -99,6 +118,24 @@ def test_panels_that_leave_the_surface_are_told_and_held_nearer_by_its_weight():
             assert ("a weight of 50" in told[0]) == (surface == 0)
     assert away[0.0] > 0.1
     assert away[50.0] < away[0.0] / 2
+
+
+def test_flat_quads_are_told_how_to_follow_the_surface():
+    """What the note promises is true."""
+    cmap = conformal_map(bump(48, 24), BoundaryCondition())
+    pattern = lay_pattern(cmap, PatternSettings(kind="quad", around=40))
+
+    def away(weights: Weights) -> tuple[float, bool, bool]:
+        panels = rationalize(cmap, pattern, PanelSettings(mode="watertight", weights=weights))
+        distance = cmap.surface.tree.nearest(panels.polygons.values).distance.max()
+        told = " ".join(note for note in panels.notes if "leave the surface" in note)
+        return distance / panels.edge_length.mean(), "weight of 50" in told, "planarity 0, surface 1" in told
+
+    flat, held, smooth = map(away, (Weights(), Weights(surface=50.0), Weights(planarity=0.0, surface=1.0)))
+    assert flat[1:] == (True, True)
+    assert held[1:] == (False, True)
+    assert smooth[1:] == (False, False)
+    assert smooth[0] < 0.02 < held[0] < flat[0] / 2
 
 
 def test_panels_that_cross_themselves_are_counted():

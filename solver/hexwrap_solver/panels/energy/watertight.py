@@ -45,6 +45,11 @@ NUDGE = 0.03
 #: Weight of the squared movement / ℓ²: energies that only know shapes would move the mesh by whole edges.
 ANCHOR = 10.0
 
+#: The same for quads that become flat, and the weight of the squared differences of the movement along edges
+#: / ℓ². Near any surface quads can become flat by waves from row to row, like bellows; smooth nets of flat
+#: quads may lie further away. (Hexagons on a saddle become flat by moving apart, and so they do without.)
+QUAD_ANCHOR, EVENNESS = 1.0, 10.0
+
 #: Damping relative to 1/ℓ², how it changes after a good and after a bad step, and its least value.
 DAMPING, EASE, TIGHTEN, LEAST_DAMPING = 1e-3, 0.2, 8.0, 1e-9
 
@@ -57,11 +62,13 @@ MOST_CORRECTIONS = 5
 
 @dataclass(frozen=True)
 class _Group:
-    """Cells with the same number of corners. corner: (q, p) pattern vertices; length: (q,) targets."""
+    """Cells with the same number of corners. corner: (q, p) pattern vertices; length: (q,) targets; edge:
+    (q, p, 3) the cells' edges."""
 
     corner: Ints
     length: Floats
     regular: bool
+    edge: Floats
 
 
 @dataclass(frozen=True)
@@ -91,11 +98,11 @@ def minimise_watertight(
 
     length: (cells,) target edge lengths. Angles count in whole cells only. Damped Gauss–Newton with a weak
     anchor. Where planarity has a weight, the distances from the faces' planes are added, weighing more
-    from stage to stage, until faces are flat.
+    from stage to stage, until faces are flat; and quads are to move evenly.
     """
     weights, factor = bounded(weights)
-    problem = _Problem(pattern, length, weights, surface)
     flat = weights.planarity > 0
+    problem = _Problem(pattern, length, weights, surface, even=flat and pattern.kind == "quad")
     state = problem.at(pattern.vertices, 0.0)
     curve = [state.asked]
     damping = DAMPING
@@ -185,18 +192,25 @@ class _Problem:
 
     Its parts are the groups of cells with the same number p of corners, whose last p residuals are the
     distances from their planes; and, where the surface counts, the vertices' distances from it. unit: mean
-    target length.
+    target length. even: whether differences of the movement count.
     """
 
     def __init__(
-        self, pattern: Pattern, length: Floats, weights: Weights, surface: TriangleTree | None
+        self,
+        pattern: Pattern,
+        length: Floats,
+        weights: Weights,
+        surface: TriangleTree | None,
+        *,
+        even: bool,
     ) -> None:
         self._groups = _groups(pattern, length)
         self._weights = weights
         self._surface = surface
         self._start = pattern.vertices
         self.unit = float(length.mean())
-        self._anchor = np.sqrt(ANCHOR) / self.unit
+        self._even = even
+        self._anchor = np.sqrt(QUAD_ANCHOR if even else ANCHOR) / self.unit
         self._corners = [group.corner for group in self._groups]
         if surface is not None:
             self._corners.append(np.arange(len(pattern.vertices))[:, None])
@@ -215,7 +229,7 @@ class _Problem:
         try:
             for g in self._groups:
                 corner = points[g.corner]
-                shape = residuals(corner, g.length, self._weights, angles=g.regular)
+                shape = self._shape(g, corner)
                 plane = root * plane_distances(corner, g.length)
                 residual.append(np.concatenate([shape, plane], axis=1))
                 asked, planes = asked + _square(shape), planes + _square(plane)
@@ -227,6 +241,24 @@ class _Problem:
             asked += _square(away)
         return _State(points, tuple(residual), pull, asked, planes)
 
+    def _shape(self, g: _Group, corner: Floats) -> Floats:
+        """(q, r) what is asked of the cells' shapes."""
+        shape = residuals(corner, g.length, self._weights, angles=g.regular)
+        if not self._even:
+            return shape
+        change = (_edges(corner) - g.edge) * (np.sqrt(EVENNESS) / g.length)[:, None, None]
+        return np.concatenate([change.reshape(len(change), -1), shape], axis=1)
+
+    def _shape_slopes(self, g: _Group, corner: Floats) -> Floats:
+        """(q, r, p, 3) derivatives of it by the corners."""
+        shape = jacobian(corner, g.length, self._weights, angles=g.regular)
+        if not self._even:
+            return shape
+        p = corner.shape[1]
+        step = np.einsum("kc,xy->kxcy", np.roll(np.eye(p), 1, axis=1) - np.eye(p), np.eye(3))
+        change = step.reshape(3 * p, p, 3) * (np.sqrt(EVENNESS) / g.length)[:, None, None, None]
+        return np.concatenate([change, shape], axis=1)
+
     def bend(self, points: Floats) -> float:
         """Greatest distance of a corner from its face's plane / ℓ."""
         return float(max(np.abs(plane_distances(points[g.corner], g.length)).max() for g in self._groups))
@@ -236,7 +268,7 @@ class _Problem:
         self._slopes = []
         for g in self._groups:
             corner = state.points[g.corner]
-            shape = jacobian(corner, g.length, self._weights, angles=g.regular)
+            shape = self._shape_slopes(g, corner)
             plane = np.sqrt(flatness) * plane_slopes(corner, g.length)
             slope = np.concatenate([shape, plane], axis=1)
             self._slopes.append(slope.reshape(*slope.shape[:2], -1))
@@ -269,6 +301,10 @@ class _Problem:
         return root * value[:, None], root * slope[:, None]
 
 
+def _edges(corner: Floats) -> Floats:
+    return np.asarray(np.roll(corner, -1, axis=1) - corner)
+
+
 def _square(residual: Floats) -> float:
     return 0.5 * float(np.vdot(residual, residual))
 
@@ -282,6 +318,6 @@ def _groups(pattern: Pattern, length: Floats) -> list[_Group]:
         for even in (False, True):
             chosen = np.flatnonzero((faces.lengths == count) & (regular == even))
             if len(chosen):
-                corner = faces.values[faces.offsets[chosen][:, None] + np.arange(count)]
-                groups.append(_Group(corner.astype(np.int64), length[chosen], even))
+                corner = faces.values[faces.offsets[chosen][:, None] + np.arange(count)].astype(np.int64)
+                groups.append(_Group(corner, length[chosen], even, _edges(pattern.vertices[corner])))
     return groups
