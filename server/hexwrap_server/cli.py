@@ -25,7 +25,7 @@ from hexwrap_server.files import WRITERS, Meta, check_wanted, write
 from hexwrap_server.files.text import length
 from hexwrap_server.finished import map_in_result
 from hexwrap_server.local import Task, UsageError, only_map, solve_here, task
-from hexwrap_server.options import add_request_options, is_option_at_fault
+from hexwrap_server.options import add_request_options, as_options, is_option_at_fault
 from hexwrap_server.problems import FormError
 from hexwrap_server.settings import Settings, add_arguments
 from hexwrap_server.summary import print_summary
@@ -54,7 +54,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _refuse(2, str(error))
     except FormError as error:
         status = 2 if is_option_at_fault(asked, [pointer for pointer, _ in error.faults]) else 1
-        return _refuse(status, error.detail, *(f"{place}: {detail}" for place, detail in error.faults[1:]))
+        told = as_options(asked, error.faults) if error.faults else error
+        return _refuse(status, told.detail, *(f"{place}: {detail}" for place, detail in told.faults[1:]))
     except HexwrapError as error:
         return _refuse(1, error.detail)
     except KeyboardInterrupt:
@@ -162,7 +163,7 @@ def _solve(asked: argparse.Namespace) -> int:
     solution, timings = solve_with_progress(todo, asked.quiet)
     meta = Meta(todo.name or "hexwrap", timings, tuple(asked.sheet) if asked.sheet else None)
     console = Console(quiet=asked.quiet, soft_wrap=True)
-    parts = ("map", "pattern", "panels", "sizes", "quality", "timings")
+    parts = ("mesh", "map", "pattern", "panels", "sizes", "quality", "timings")
     print_summary(console, meta.name, {name: wire.part(solution, name, timings) for name in parts})
     for out, kind in kinds.items():
         save(out, write(kind, solution, meta))

@@ -147,6 +147,12 @@ def is_option_at_fault(arguments: argparse.Namespace, pointers: Iterable[str]) -
     return any(_within(at, place) or (at and _within(place, at)) for at in pointers for place in given)
 
 
+def as_options(arguments: argparse.Namespace, faults: Iterable[tuple[str, str]]) -> FormError:
+    """The same faults, with options named where they came from one."""
+    given = {"/" + "/".join(o.path): o.flag for o in OPTIONS if hasattr(arguments, _name(o))}
+    return FormError([(given.get(pointer, pointer), detail) for pointer, detail in faults])
+
+
 def readme_rows() -> str:
     """The options as rows of the README's table."""
     rows = [(o.flag, ".".join(o.path), _help(o, Body)) for o in OPTIONS]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import PurePath
 
@@ -40,7 +41,9 @@ def read_surface(data: bytes, filename: str) -> SentMesh | NurbsSurface:
     except (SurfaceError, ImportError):  # a reader that is not installed well is no fault of the file
         raise
     except (Exception, MemoryError) as error:  # foreign readers fail in every way on broken files
+        comma = re.search(r"'-?\d+,\d+'", str(error))
+        advice = "write numbers with a decimal point instead of a comma" if comma else "export it again"
         raise UnreadableFileError(
             f"The file {PurePath(filename).name} cannot be read as {suffix[1:].upper()} "
-            f"({type(error).__name__}: {str(error)[:200]}): export it again."
+            f"({type(error).__name__}: {str(error)[:200]}): {advice}."
         ) from error

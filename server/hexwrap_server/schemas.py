@@ -6,10 +6,11 @@ which ``true`` is no number and an unknown field is a fault.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 from math import isfinite, pi
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, Literal, TypeVar, get_args
 
 import numpy as np
 from pydantic import (
@@ -23,17 +24,21 @@ from pydantic import (
     WithJsonSchema,
     model_validator,
 )
+from pydantic_core import ErrorDetails
 
 from hexwrap_server.bulk import Fault, faces, numbers, table
 from hexwrap_server.problems import FormError
 from hexwrap_server.requests import SentSurface, Wanted
-from hexwrap_solver.conformal.types import BoundaryCondition
+from hexwrap_solver.conformal.types import ANGLE_UNITS, AngleUnit, BoundaryCondition
 from hexwrap_solver.panels.types import ComponentSettings, PanelSettings, Weights
 from hexwrap_solver.pattern.types import PatternSettings
 from hexwrap_solver.surface.types import MeshSettings, NurbsSurface, SentMesh
 
+#: Steps from the body to a section of it.
+Path = tuple[str, ...]
+#: Longer texts are not shown in problems.
+MOST_SHOWN = 60
 QUANTA = {"hex": pi / 3, "triangle": pi / 3, "quad": pi / 2}
-ANGLE_UNITS = {"rad": 1.0, "deg": pi / 180, "pi": pi}
 ROTATIONS = ("edge", "vertex", "u", "v")
 
 
@@ -87,7 +92,7 @@ class Angle(Model):
 class Boundary(Model):
     mode: Literal["straight", "angles", "isometric"] = "straight"
     angles: Annotated[list[Angle], Field(max_length=10_000)] = []
-    angle_unit: Literal["rad", "deg", "pi"] = "rad"
+    angle_unit: AngleUnit = "rad"
     quantum: Literal["auto", "hex", "triangle", "quad", "none"] = "auto"
     spread: Literal["even", "optimal"] = "even"
 
@@ -285,12 +290,12 @@ def _boundary(body: Body) -> BoundaryCondition:
     quantum = QUANTA.get(name)
     if asked.mode != "angles":
         return BoundaryCondition(mode=asked.mode, quantum=quantum, spread=asked.spread)
-    unit = ANGLE_UNITS[asked.angle_unit]
     return BoundaryCondition(
         mode="angles",
         vertices=np.array([-1 if a.vertex is None else a.vertex for a in asked.angles], dtype=np.int64),
         points=np.array([a.point or [np.nan] * 3 for a in asked.angles], dtype=float).reshape(-1, 3),
-        angles=np.array([a.angle * unit for a in asked.angles], dtype=float),
+        angles=np.array([a.angle * ANGLE_UNITS[asked.angle_unit] for a in asked.angles], dtype=float),
+        unit=asked.angle_unit,
         quantum=quantum,
         spread=asked.spread,
     )
@@ -361,10 +366,52 @@ def _validated(model: type[M], given: object, root: str) -> M:
         return model.model_validate(given)
     except ValidationError as error:
         faults = [
-            (root + _pointer(given, e["loc"], e["type"]), e["msg"].removeprefix("Value error, "))
-            for e in error.errors(include_input=False, include_url=False, include_context=False)
+            (root + _pointer(given, e["loc"], e["type"]), _sentence(model, e))
+            for e in error.errors(include_url=False, include_context=False)
         ]
         raise FormError(faults) from None
+
+
+def _sentence(model: type[BaseModel], error: ErrorDetails) -> str:
+    """What is wrong, what was sent, and what would be right."""
+    if error["type"] == "extra_forbidden":
+        return _unknown(model, error["loc"])
+    text, sent = error["msg"].removeprefix("Value error, "), error["input"]
+    if sent is None or isinstance(sent, (bool, int, float)):
+        return f"{text}, not {str(sent).lower().replace('none', 'null')}"
+    return f"{text}, not '{sent}'" if isinstance(sent, str) and len(sent) <= MOST_SHOWN else text
+
+
+def _unknown(model: type[BaseModel], place: tuple[int | str, ...]) -> str:
+    """A field that there is not; but perhaps elsewhere, or under a name like it."""
+    *above, name = (str(step) for step in place)
+    sections = dict(_sections(model))
+    here = sections.get(tuple(step for step in above if not step.isdigit()), model)
+    text = f"unknown field; known here: {', '.join(repr(known) for known in here.model_fields)}"
+    homes = ["/".join(("", *path)) for path, section in sections.items() if name in section.model_fields]
+    like = get_close_matches(name, here.model_fields, 1)
+    if homes:
+        return f"{text}; '{name}' belongs to {' or '.join(home or 'the body itself' for home in homes)}"
+    return f"{text}; did you mean '{like[0]}'?" if like else text
+
+
+def _sections(model: type[BaseModel], path: Path = ()) -> Iterator[tuple[Path, type[BaseModel]]]:
+    """The model, and those of its fields that are models themselves or lists of them, by their paths."""
+    yield path, model
+    for name, field in model.model_fields.items():
+        for kind in _kinds(field.annotation):
+            if isinstance(kind, type) and issubclass(kind, BaseModel):
+                yield from _sections(kind, (*path, name))
+
+
+def _kinds(annotation: Any) -> Iterator[Any]:
+    """The types that an annotation is made of."""
+    parts = get_args(annotation)
+    if parts:
+        for part in parts:
+            yield from _kinds(part)
+    else:
+        yield annotation
 
 
 def _pointer(given: object, place: tuple[int | str, ...], kind: str) -> str:

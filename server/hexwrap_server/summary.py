@@ -36,7 +36,7 @@ def print_summary(console: Console, name: str, result: dict[str, Any]) -> None:
     console.print(table)
     if result["panels"] is not None:
         console.print(_sizes(result["sizes"]))
-    for note in result["quality"]["notes"]:
+    for note in (*result["mesh"]["repairs"], *result["quality"]["notes"]):
         console.print(Text(f"• {note}"))
 
 

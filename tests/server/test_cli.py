@@ -118,8 +118,8 @@ def refusal(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[i
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--around", "0"], "/pattern/around"),
-        (["--around", "many"], "/pattern/around"),
+        (["--around", "0"], "--around"),
+        (["--around", "many"], "--around"),
         (["--edge-range", "2", "1"], "min ≤ max"),
         (["--angle", "12"], "give VERTEX=ANGLE or X,Y,Z=ANGLE"),
         (["--around", "8", "--edge-length", "2"], "give either 'around' or 'edge_length'"),
@@ -233,3 +233,23 @@ def test_a_file_that_cannot_come_of_the_request_is_refused_before_the_work(
     status, told = refusal([*arguments, option, "none"], capsys)
     assert status == 1
     assert f"panels.png shows panels, but the request has {words}" in told
+
+
+def test_faults_of_options_name_the_option(
+    tube: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["solve", str(tube), "-o", str(tmp_path / "x.json"), "--sizes", "0", "--around", "0"]
+    status, told = refusal(arguments, capsys)
+    assert status == 2
+    assert "--sizes: " in told
+    assert "--around: " in told
+    assert "/panels" not in told
+
+
+def test_repairs_are_told(tube: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    lines = tube.read_text().splitlines()
+    turned = lines[-1].split()
+    lines[-1] = " ".join([turned[0], *turned[:0:-1]])
+    tube.write_text("\n".join(lines))
+    assert main(["solve", str(tube), "--around", "12", "-o", str(tmp_path / "x.obj")]) == 0
+    assert "• 1 face was turned over" in capsys.readouterr().out

@@ -300,3 +300,8 @@ def test_a_reader_that_is_missing_is_not_the_fault_of_the_file(monkeypatch: pyte
     monkeypatch.setitem(sys.modules, "trimesh.exchange.ply", None)
     with pytest.raises(ImportError):
         read_surface(b"ply", "tower.ply")
+
+
+def test_decimal_commas_are_told() -> None:
+    with pytest.raises(UnreadableFileError, match="decimal point instead of a comma"):
+        read_surface(b"v 1,5 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "tower.obj")

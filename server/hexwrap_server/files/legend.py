@@ -64,7 +64,7 @@ def _legend(axes: Axes, height: int, panels: Panels, meta: Meta) -> None:
         _bar(axes, top, rows * ROW - 20, panels)
     if cut:
         y = top + ROW * (rows + 0.5)
-        _hexagon(axes, y, colours.UNSIZED)
+        _swatch(axes, y, panels, colours.UNSIZED)
         axes.text(64, y, "of no size class", size=17, color=GREY, va="center")
         axes.text(WIDTH - 60, y, f"{cut:,}", size=17, color=GREY, va="center", ha="right")
 
@@ -74,15 +74,17 @@ def _swatches(axes: Axes, top: float, panels: Panels) -> None:
     counts, words = panels.class_count.tolist(), text.lengths(panels.class_length.tolist())
     for i, colour in enumerate(colours.size_colours(len(words))):
         y = top + ROW * (i + 0.5)
-        _hexagon(axes, y, colour)
+        _swatch(axes, y, panels, colour)
         axes.text(64, y, words[i], size=17, color=INK, va="center")
         axes.text(WIDTH - 60, y, f"{counts[i]:,}", size=17, color=GREY, va="center", ha="right")
 
 
-def _hexagon(axes: Axes, y: float, colour: str) -> None:
+def _swatch(axes: Axes, y: float, panels: Panels, colour: str) -> None:
+    """A polygon of as many corners as most panels have, standing on a side."""
     from matplotlib.patches import RegularPolygon
 
-    axes.add_patch(RegularPolygon((22, y), 6, radius=20, orientation=np.pi / 6, color=colour))
+    p = int(np.bincount(panels.polygons.lengths, minlength=7)[3:7].argmax()) + 3
+    axes.add_patch(RegularPolygon((22, y), p, radius=20, orientation=np.pi / p, color=colour))
 
 
 def _bar(axes: Axes, top: float, length: float, panels: Panels) -> None:

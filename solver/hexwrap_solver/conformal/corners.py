@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 
 from hexwrap_solver.arrays import Bools, Floats, Ints
 from hexwrap_solver.conformal.boundary import nearest_multiple
-from hexwrap_solver.conformal.types import BoundaryCondition
+from hexwrap_solver.conformal.types import ANGLE_UNITS, AngleUnit, BoundaryCondition
 from hexwrap_solver.errors import BoundaryError, GaussBonnetError
 from hexwrap_solver.surface.types import Surface
 
@@ -23,7 +23,7 @@ def boundary_angles(surface: Surface, condition: BoundaryCondition) -> tuple[Flo
     Raises BoundaryError (vertices or angles that cannot be used), GaussBonnetError (equation (1) fails).
     """
     angles = np.zeros(0) if condition.angles is None else np.asarray(condition.angles, dtype=float)
-    _check_angles(angles)
+    _check_angles(angles, condition.unit)
     vertices = _place(surface, condition, len(angles))
     target = np.full(len(surface.vertices), np.pi)
     target[vertices] = angles
@@ -31,7 +31,7 @@ def boundary_angles(surface: Surface, condition: BoundaryCondition) -> tuple[Flo
     listed[vertices] = True
     sums = [float((np.pi - target[loop]).sum()) for loop in surface.loops]
     if abs(sum(sums)) > GAUSS_BONNET_TOLERANCE:
-        raise _gauss_bonnet_error(surface, vertices, angles, sums)
+        raise _gauss_bonnet_error(surface, vertices, angles, sums, condition.unit)
     return _close(surface, target, listed, sums, condition.quantum)
 
 
@@ -39,13 +39,19 @@ def _field(i: int, name: str) -> tuple[str | int, ...]:
     return ("boundary", "angles", int(i), name)
 
 
-def _check_angles(angles: Floats) -> None:
+def _told(angle: float, unit: AngleUnit, digits: int = 6) -> str:
+    """As the request would have it."""
+    return f"{angle / ANGLE_UNITS[unit]:.{digits}g}" + {"rad": " rad", "deg": "°", "pi": " π"}[unit]
+
+
+def _check_angles(angles: Floats, unit: AngleUnit) -> None:
     bad = np.flatnonzero(~(np.isfinite(angles) & (angles > 0)))
     if len(bad):
         i = bad[0]
         raise BoundaryError(
-            f"Boundary angle {i} is {angles[i]:g} rad, but the angle sum at a vertex is a sum of triangle "
-            f"angles and must be a positive number; {len(bad)} of the {len(angles)} listed angles are not.",
+            f"Boundary angle {i} is {_told(angles[i], unit)}, but the angle sum at a vertex is a sum of "
+            f"triangle angles and must be a positive number; {len(bad)} of the {len(angles)} listed angles "
+            "are not.",
             field=_field(i, "angle"),
         )
 
@@ -160,7 +166,7 @@ def _rest_per_loop(sums: list[float], quantum: float | None) -> Floats | None:
 
 
 def _gauss_bonnet_error(
-    surface: Surface, vertices: Ints, angles: Floats, sums: list[float]
+    surface: Surface, vertices: Ints, angles: Floats, sums: list[float], unit: AngleUnit
 ) -> BoundaryError | GaussBonnetError:
     """What is missing, and an example that would close it."""
     missing = sum(sums)  # angles must grow by this much in total
@@ -170,43 +176,47 @@ def _gauss_bonnet_error(
         i = int(angles.argmax())
         raise BoundaryError(
             f"The listed boundary angles are too large for any surface: their curvatures π − θ add up to "
-            f"{(np.pi - angles).sum():.6g} rad, and even with angles of 0 at all the other {unlisted} "
-            f"boundary vertices the sum over both loops, equation (1), would be {least:.6g} rad, not 0; the "
-            f"largest is {angles[i]:.6g} rad at vertex {surface.input_vertex[vertices[i]]}.",
+            f"{_told((np.pi - angles).sum(), unit)}, and even with angles of 0 at all the other {unlisted} "
+            f"boundary vertices the sum over both loops, equation (1), would be {_told(least, unit)}, not 0; "
+            f"the largest is {_told(angles[i], unit)} at vertex {surface.input_vertex[vertices[i]]}.",
             vertices=[surface.input_vertex[vertices[i]]],
             field=_field(i, "angle"),
         )
-    example, sentence = _repair(surface, vertices, angles, missing, unlisted)
+    example, sentence = _repair(surface, vertices, angles, missing, unlisted, unit)
+    degrees = "" if unit == "deg" else f" ({np.degrees(missing):.6g}°)"
     return GaussBonnetError(
-        f"The boundary curvatures π − θ add up to {sums[0]:.6g} rad on loop 0 and {sums[1]:.6g} rad on "
-        f"loop 1; equation (1) wants the two sums to cancel, but together they make {missing:.6g} rad "
-        f"({np.degrees(missing):.6g}°), so the angles must add up to {abs(missing):.6g} rad "
-        f"{'more' if missing > 0 else 'less'}: {sentence}.",
+        f"The boundary curvatures π − θ add up to {_told(sums[0], unit)} on loop 0 and "
+        f"{_told(sums[1], unit)} on loop 1; equation (1) wants the two sums to cancel, but together they "
+        f"make {_told(missing, unit)}{degrees}, so the angles must add up to "
+        f"{_told(abs(missing), unit)} {'more' if missing > 0 else 'less'}: {sentence}.",
         vertices=surface.input_vertex[vertices],
-        data={"loop_sums": sums, "missing": missing, "example": example},
+        data={"loop_sums": sums, "missing": missing, "example": example, "example_unit": unit},
     )
 
 
 def _repair(
-    surface: Surface, vertices: Ints, angles: Floats, missing: float, unlisted: int
+    surface: Surface, vertices: Ints, angles: Floats, missing: float, unlisted: int, unit: AngleUnit
 ) -> tuple[list[dict[str, float | int]], str]:
-    """A list of angles that satisfies equation (1), as near to the given one as one change allows."""
+    """A list of angles, in the unit, that satisfies equation (1), as near to the given one as one change
+    allows."""
     repaired, changed = angles.copy(), surface.input_vertex[vertices]
     possible = np.flatnonzero((angles + missing > 0.1 * np.pi) & (angles + missing < 3 * np.pi))
     if len(possible):
         i = int(possible[np.abs(angles[possible] + missing - np.pi).argmin()])
         repaired[i] += missing
         sentence = (
-            f"for example {repaired[i]:.6f} instead of {angles[i]:.6g} at vertex {changed[i]} would close it"
+            f"for example {_told(repaired[i], unit, 8)} instead of {_told(angles[i], unit)} at vertex "
+            f"{changed[i]} would close it"
         )
     else:
-        repaired, changed, sentence = _repair_by_others(surface, vertices, angles, missing, unlisted)
+        repaired, changed, sentence = _repair_by_others(surface, vertices, angles, missing, unlisted, unit)
+    repaired = repaired / ANGLE_UNITS[unit]
     example = [{"vertex": int(v), "angle": float(a)} for v, a in zip(changed, repaired, strict=True)]
     return example, sentence
 
 
 def _repair_by_others(
-    surface: Surface, vertices: Ints, angles: Floats, missing: float, unlisted: int
+    surface: Surface, vertices: Ints, angles: Floats, missing: float, unlisted: int, unit: AngleUnit
 ) -> tuple[Floats, Ints, str]:
     """Further vertices share what is missing, as few as keep their angles between π/2 and 3π/2."""
     boundary = np.concatenate(surface.loops)
@@ -219,7 +229,7 @@ def _repair_by_others(
     angle = np.pi + missing / count
     named = ", ".join(str(v) for v in surface.input_vertex[chosen][:6])
     sentence = (
-        f"for example angles of {angle:.6f} at {count} more boundary "
+        f"for example angles of {_told(angle, unit, 8)} at {count} more boundary "
         f"{'vertex' if count == 1 else 'vertices'} ({named}{', …' if count > 6 else ''}) would close it"
     )
     return (

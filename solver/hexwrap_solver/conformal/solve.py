@@ -18,6 +18,8 @@ from hexwrap_solver.conformal.span import MAX_SPAN, check_reach, check_span
 from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap, Deck, Targets
 from hexwrap_solver.surface.types import Surface
 
+#: Cone angles this near to a multiple of the quantum are one, radians.
+NOISE = 1e-9
 NO_ANGLES = (
     "The boundary's mode is angles, but its list of angles is empty: every boundary angle is 180°, as with"
     " straight."
@@ -66,7 +68,7 @@ def _isometric(surface: Surface, condition: BoundaryCondition, progress: Progres
     second = _map(surface, targets, first.u, _part(progress, 0.5), flips=not plain.holds)
     second = _scaled(second, -_mean_on_boundary(second.surface, second.log_scale))
     second = with_inserted(second, inserted)
-    return replace(second, notes=(_rounding_note(found, rounded), *second.notes))
+    return replace(second, notes=(*_rounding_notes(found, rounded), *second.notes))
 
 
 def _part(progress: Progress, begin: float) -> Progress:
@@ -74,10 +76,12 @@ def _part(progress: Progress, begin: float) -> Progress:
     return lambda fraction, what: progress(begin + fraction / 2, what)
 
 
-def _rounding_note(found: float, rounded: float) -> str:
+def _rounding_notes(found: float, rounded: float) -> tuple[str, ...]:
+    if abs(found - rounded) <= NOISE:
+        return ()
     shape = "a cylinder" if rounded == 0 else f"a cone angle of {np.degrees(rounded):.6g}°"
     return (
-        f"The isometric boundary has a cone angle of {np.degrees(found):.4g}°; the domain was given {shape}."
+        f"The isometric boundary has a cone angle of {np.degrees(found):.4g}°; the domain was given {shape}.",
     )
 
 

@@ -12,6 +12,10 @@ import numpy as np
 from hexwrap_solver.arrays import Complexes, Floats, Ints
 from hexwrap_solver.surface.types import Surface
 
+AngleUnit = Literal["rad", "deg", "pi"]
+#: Radians of one unit.
+ANGLE_UNITS: dict[AngleUnit, float] = {"rad": 1.0, "deg": np.pi / 180, "pi": np.pi}
+
 
 @dataclass(frozen=True)
 class BoundaryCondition:
@@ -20,7 +24,8 @@ class BoundaryCondition:
     mode ``straight``: every boundary angle is π. ``angles``: the listed ones, π elsewhere.
     ``isometric``: boundary lengths kept up to scale, the cone angle rounded to a multiple of quantum.
     vertices: (k,) *sent* vertex indices, −1 where points gives a place instead. points: (k, 3).
-    angles: (k,) radians. quantum: π/3, π/2, or None to leave the cone angle as it comes.
+    angles: (k,) radians. unit: in which problems tell of them and give an example.
+    quantum: π/3, π/2, or None to leave the cone angle as it comes.
     spread: how ``isometric`` distributes the rounding: ``even`` (the paper) or ``optimal`` (u constant on
     each loop).
     """
@@ -29,6 +34,7 @@ class BoundaryCondition:
     vertices: Ints | None = None
     points: Floats | None = None
     angles: Floats | None = None
+    unit: AngleUnit = "rad"
     quantum: float | None = None
     spread: Literal["even", "optimal"] = "even"
 

@@ -24,6 +24,9 @@ from hexwrap_solver.panels.types import Panels, Quality
 from hexwrap_solver.pattern.types import Pattern
 from hexwrap_solver.surface.types import Surface
 
+#: A share of the surface without cells that is told.
+BARE = 0.03
+
 
 def measure(
     cmap: ConformalMap, pattern: Pattern | None, panels: Panels | None, progress: Progress = no_progress
@@ -39,7 +42,7 @@ def measure(
     if pattern is None or panels is None:
         return quality
     progress(0.1, "measuring panels")
-    polygons = panels.polygons
+    polygons, cell_area = panels.polygons, float(fan_areas(_cells(pattern)).sum())
     edges = half_edges(pattern)
     between = gaps(pattern, edges, panels)
     angle = interior_angles(polygons, panels.normal)
@@ -60,8 +63,9 @@ def measure(
         convex=row_maxima(angle, polygons.offsets) <= np.pi + 1e-9,
         congruence=congruence_classes(polygons, panels.normal),
         overlaps=_count_overlaps(pattern, edges, panels),
-        coverage=_coverage(pattern, panels),
+        coverage=float(fan_areas(polygons).sum()) / cell_area,
         movement=_movement(pattern, panels),
+        notes=quality.notes + _bare_note(pattern, cell_area / float(area.sum())),
     )
 
 
@@ -83,9 +87,16 @@ def _count_overlaps(pattern: Pattern, edges: HalfEdges, panels: Panels) -> int:
     return len(overlapping_pairs(panels.polygons, panels.normal, mean_edges(panels.polygons), pairs))
 
 
-def _coverage(pattern: Pattern, panels: Panels) -> float:
-    cells = Ragged(pattern.vertices[pattern.faces.values.astype(np.int64)], pattern.faces.offsets)
-    return float(fan_areas(panels.polygons).sum() / fan_areas(cells).sum())
+def _cells(pattern: Pattern) -> Ragged:
+    return Ragged(pattern.vertices[pattern.faces.values.astype(np.int64)], pattern.faces.offsets)
+
+
+def _bare_note(pattern: Pattern, share: float) -> tuple[str, ...]:
+    """share: area of the cells / area of the surface."""
+    if share >= 1 - BARE:
+        return ()
+    trim = "; with boundary 'trim' cells reach its edges" if pattern.whole.all() else ""
+    return (f"The cells take up {share:.0%} of the surface, and coverage is a share of the cells{trim}.",)
 
 
 def _movement(pattern: Pattern, panels: Panels) -> float:

@@ -171,7 +171,8 @@ def _range_notes(settings: PanelSettings, limit: Floats, outside: Ints) -> tuple
     if len(outside):
         notes.append(
             f"{len(outside)} panels cannot reach the least allowed edge length {low:g}"
-            f" (the smallest allows {limit.min():g}); they keep lengths below it."
+            f" (the smallest allows {limit.min():g}, the largest {limit.max():g}); they keep lengths below"
+            " it. Allow shorter edges, or ask for fewer cells around."
         )
     clipped = int((limit > high).sum())
     if clipped:

@@ -71,8 +71,9 @@ def lay_pattern(cmap: ConformalMap, settings: PatternSettings, progress: Progres
             pattern = again
         if abs(pattern.edge_length / wanted - 1) > ASKED:
             notes.append(
-                f"The mean edge length is {pattern.edge_length:.6g} instead of {wanted:.6g}: the nearest at "
-                "which the pattern closes up."
+                f"The mean edge length is {pattern.edge_length:.6g} instead of {wanted:.6g}, so that the "
+                f"pattern closes up with little distortion ({pattern.around} cells around); others may be "
+                "had with around."
             )
     return replace(pattern, notes=(*notes, *pattern.notes))
 

@@ -140,9 +140,11 @@ def _wrong_topology(loops: list[Ints], euler: int, names: SentNames) -> NotAnnul
     lengths = _enumerate([f"{len(loop)} edges at vertex {names.vertex[loop[0]]}" for loop in loops])
     if not loops:
         data["reason"] = "closed"
+        cut = {0: "cut two openings into it", 1: "cut it once all the way around its tube"}
+        many = f"cut or fill its {genus} handles until a tube with two ends is left"
         text = (
             f"The surface is closed: it has no boundary (Euler characteristic {euler}); a tube has two open "
-            "ends, so cut two openings into it."
+            f"ends, so {cut.get(genus, many)}."
         )
     elif len(loops) != 2:
         data["reason"] = "loops"

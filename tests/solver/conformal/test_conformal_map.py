@@ -114,6 +114,13 @@ def test_a_rounded_cone_angle_is_told() -> None:
     assert "a cylinder" in cylinder.notes[0]
 
 
+def test_a_cone_angle_that_needs_no_rounding_is_no_news() -> None:
+    tube = grid(12, 10, revolution(lambda s: 1 + 0.3 * np.sin(np.pi * s), lambda s: 2 * s))
+    cmap = conformal_map(tube, BoundaryCondition("isometric", quantum=np.pi / 3))
+    assert cmap.kind == "cylinder"
+    assert cmap.notes == ()
+
+
 def test_a_long_tube_on_a_cone_has_a_map() -> None:
     """A tube 160 times as long as around, on a cone: one end is e^167 times as large as the other."""
     tube = grid(8, 200, revolution(lambda s: 0.02 + 0 * s, lambda s: 20 * s))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,7 +11,7 @@ from hypothesis import strategies as st
 
 from hexwrap_solver.conformal import conformal_map
 from hexwrap_solver.conformal.corners import GAUSS_BONNET_TOLERANCE, boundary_angles
-from hexwrap_solver.conformal.types import BoundaryCondition
+from hexwrap_solver.conformal.types import ANGLE_UNITS, AngleUnit, BoundaryCondition
 from hexwrap_solver.errors import BoundaryError, GaussBonnetError
 from hexwrap_solver.surface.types import Surface
 from tests.solver.conformal.annuli import bump
@@ -80,6 +82,21 @@ def test_gauss_bonnet_names_both_sums_what_is_missing_and_an_example_that_closes
     for figure in ("-1.0472", "1.5708", "0.523599", "more"):
         assert figure in caught.value.detail
     assert_closes(SURFACE, data["example"])
+
+
+@pytest.mark.parametrize(
+    ("unit", "told"), [("deg", ("-60°", "90°", "30°")), ("pi", ("-0.333333 π", "0.5 π"))]
+)
+def test_gauss_bonnet_speaks_the_unit_of_the_request(unit: AngleUnit, told: tuple[str, ...]) -> None:
+    asked = listed((3, 4 * np.pi / 3), (int(TOP[0]), np.pi / 2))
+    with pytest.raises(GaussBonnetError) as caught:
+        boundary_angles(SURFACE, replace(asked, unit=unit))
+    assert all(figure in caught.value.detail for figure in told)
+    assert " rad" not in caught.value.detail
+    example, data = caught.value.data["example"], caught.value.data
+    assert data["example_unit"] == unit
+    scaled = [{**entry, "angle": entry["angle"] * ANGLE_UNITS[unit]} for entry in example]
+    assert_closes(SURFACE, scaled)
 
 
 @pytest.mark.parametrize(

@@ -268,3 +268,14 @@ def test_panels_far_below_what_their_cells_allow_are_told(cost, told):
     assert told in made.notes[-1]
     apart = quantize(fitted_with(limit), PanelSettings(size_cost=cost, sizes=4, edge_range=(8e-3, 1.0)))
     assert (apart.edge_length[apart.limit > 8e-3] > 8e-3).all()
+
+
+def test_surface_without_cells_is_told() -> None:
+    """Four rows of squares on a cylinder, which they cover, or of which they cover a third."""
+    pattern = quad_pattern(cylinder, 40, 4)
+    rows = 4 * 2 * np.pi / 40
+    for height, told in ((rows, False), (3 * rows, True)):
+        cmap = grid_map(cylinder, 120, 30, 0.0, height)
+        notes = measure(cmap, pattern, rationalize(cmap, pattern, PanelSettings())).notes
+        assert any("take up 33% of the surface" in note and "'trim'" in note for note in notes) == told
+        assert any("take up" in note for note in notes) == told
