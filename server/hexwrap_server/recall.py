@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+from math import inf, nextafter
 from typing import Any
 
 from hexwrap_server.requests import Wanted
 from hexwrap_server.schemas import QUANTA
-from hexwrap_solver.conformal.types import BoundaryCondition
+from hexwrap_solver.conformal.types import ANGLE_UNITS, BoundaryCondition
 
 
 def request_document(name: str, surface_id: str, wanted: Wanted) -> dict[str, Any]:
@@ -24,11 +25,20 @@ def _boundary(asked: BoundaryCondition) -> dict[str, Any]:
     quantum = next((kind for kind, value in QUANTA.items() if value == asked.quantum), "none")
     document: dict[str, Any] = {"mode": asked.mode, "quantum": quantum, "spread": asked.spread}
     if asked.angles is not None and asked.vertices is not None and asked.points is not None:
-        rows = zip(asked.vertices.tolist(), asked.points.tolist(), asked.angles.tolist(), strict=True)
+        angles = [_in_unit(angle, ANGLE_UNITS[asked.unit]) for angle in asked.angles.tolist()]
+        rows = zip(asked.vertices.tolist(), asked.points.tolist(), angles, strict=True)
+        document["angle_unit"] = asked.unit
         document["angles"] = [
             {"vertex": v, "angle": angle} if v >= 0 else {"point": p, "angle": angle} for v, p, angle in rows
         ]
     return document
+
+
+def _in_unit(angle: float, unit: float) -> float:
+    """The number that was asked for, or one that comes to the same radians."""
+    near = angle / unit
+    tries = (round(near, 9), near, nextafter(near, inf), nextafter(near, 0.0))
+    return next((value for value in tries if value * unit == angle), near)
 
 
 def _without(table: dict[str, Any], name: str) -> dict[str, Any]:

@@ -52,6 +52,13 @@ def test_an_unknown_sample_is_a_problem_that_names_those_there_are(live: Live) -
                 "angles": [{"vertex": 0, "angle": 240}, {"point": [-3.9, 0, 0], "angle": 120}],
             }
         },
+        {
+            "boundary": {
+                "mode": "angles",
+                "angle_unit": "pi",
+                "angles": [{"vertex": 0, "angle": 1.3333333}, {"vertex": 3, "angle": 0.6666667}],
+            }
+        },
         {"panels": {"sizes": 3, "components": {"depth": 0.1}, "weights": {"surface": 0.5}}, "support": True},
     ],
 )
@@ -61,6 +68,10 @@ def test_a_recalled_request_leads_to_the_same_work(live: Live, changes: dict[str
     recalled = live.get(f"/v1/jobs/{first['id']}/request").json()
     again = live.post("/v1/jobs", json=recalled).json()
     assert len({live.service.manager.get(job["id"]).identity for job in (first, again)}) == 1
+    asked = changes.get("boundary", {})
+    if isinstance(asked, dict) and "angles" in asked:  # in the words it was asked in
+        assert recalled["boundary"]["angle_unit"] == asked["angle_unit"]
+        assert [a["angle"] for a in recalled["boundary"]["angles"]] == [a["angle"] for a in asked["angles"]]
 
 
 def test_a_preview_shows_a_file_as_it_stands_even_one_that_would_be_refused(live: Live) -> None:
