@@ -282,7 +282,8 @@ def test_angles_are_set_by_clicking_and_the_balance_closes(browser, server: Serv
         assert "balanced" in page.locator("#balance").inner_text()
         job = shown(page, before)
         request = fetched(server, f"/v1/jobs/{job}/request")
-        assert [round(np.degrees(a["angle"])) for a in request["boundary"]["angles"]] == [240, 120]
+        assert request["boundary"]["angle_unit"] == "pi"
+        assert [round(180 * a["angle"]) for a in request["boundary"]["angles"]] == [240, 120]
 
 
 def test_cancel_stops_the_job(browser, server: Server, tmp_path: Path) -> None:
