@@ -11,9 +11,7 @@ from typing import Any, Literal, Union, get_args, get_origin
 from pydantic import BaseModel
 
 from hexwrap_server.problems import FormError
-from hexwrap_server.schemas import Body, Meshing
-
-Path = tuple[str, ...]
+from hexwrap_server.schemas import Body, Meshing, Path
 
 
 @dataclass(frozen=True)
@@ -141,16 +139,26 @@ def asked_meshing(arguments: argparse.Namespace) -> dict[str, Any]:
 
 def is_option_at_fault(arguments: argparse.Namespace, pointers: Iterable[str]) -> bool:
     """Whether a fault that was found in the request came from an option."""
-    given = ["/" + "/".join(o.path) for o in OPTIONS if hasattr(arguments, _name(o))]
-    given += ["/surface/mesh/" + o.path[0] for o in MESHING if hasattr(arguments, _name(o))]
-    given += ["/boundary/angles"] if hasattr(arguments, "angles") else []
+    given = _given(arguments)
     return any(_within(at, place) or (at and _within(place, at)) for at in pointers for place in given)
 
 
 def as_options(arguments: argparse.Namespace, faults: Iterable[tuple[str, str]]) -> FormError:
     """The same faults, with options named where they came from one."""
-    given = {"/" + "/".join(o.path): o.flag for o in OPTIONS if hasattr(arguments, _name(o))}
-    return FormError([(given.get(pointer, pointer), detail) for pointer, detail in faults])
+    given = _given(arguments)
+
+    def name(pointer: str) -> str:
+        return next((flag for place, flag in given.items() if _within(pointer, place)), pointer)
+
+    return FormError([(name(pointer), detail) for pointer, detail in faults])
+
+
+def _given(arguments: argparse.Namespace) -> dict[str, str]:
+    """Pointers to the fields that were asked for by options, and the options."""
+    paths = [(o, "/".join(("", *o.path))) for o in OPTIONS]
+    paths += [(o, f"/surface/mesh/{o.path[0]}") for o in MESHING]
+    given = {pointer: o.flag for o, pointer in paths if hasattr(arguments, _name(o))}
+    return given | ({"/boundary/angles": "--angle"} if hasattr(arguments, "angles") else {})
 
 
 def readme_rows() -> str:

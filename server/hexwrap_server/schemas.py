@@ -6,9 +6,11 @@ which ``true`` is no number and an unknown field is a fault.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
+from functools import cache
 from math import isfinite, pi
 from typing import Annotated, Any, Literal, TypeVar, get_args
 
@@ -27,7 +29,7 @@ from pydantic import (
 from pydantic_core import ErrorDetails
 
 from hexwrap_server.bulk import Fault, faces, numbers, table
-from hexwrap_server.problems import FormError
+from hexwrap_server.problems import MOST_LISTED, FormError
 from hexwrap_server.requests import SentSurface, Wanted
 from hexwrap_solver.conformal.types import ANGLE_UNITS, AngleUnit, BoundaryCondition
 from hexwrap_solver.panels.types import ComponentSettings, PanelSettings, Weights
@@ -366,8 +368,11 @@ def _validated(model: type[M], given: object, root: str) -> M:
         return model.model_validate(given)
     except ValidationError as error:
         faults = [
-            (root + _pointer(given, e["loc"], e["type"]), _sentence(model, e))
-            for e in error.errors(include_url=False, include_context=False)
+            (
+                root + _pointer(given, e["loc"], e["type"]),
+                _sentence(model, e) if i < MOST_LISTED else e["msg"],
+            )
+            for i, e in enumerate(error.errors(include_url=False, include_context=False))
         ]
         raise FormError(faults) from None
 
@@ -377,15 +382,16 @@ def _sentence(model: type[BaseModel], error: ErrorDetails) -> str:
     if error["type"] == "extra_forbidden":
         return _unknown(model, error["loc"])
     text, sent = error["msg"].removeprefix("Value error, "), error["input"]
-    if sent is None or isinstance(sent, (bool, int, float)):
-        return f"{text}, not {str(sent).lower().replace('none', 'null')}"
-    return f"{text}, not '{sent}'" if isinstance(sent, str) and len(sent) <= MOST_SHOWN else text
+    if sent is not None and not isinstance(sent, (bool, int, float, str)):
+        return text
+    shown = json.dumps(sent, ensure_ascii=False)
+    return f"{text}, not {shown}" if len(shown) <= MOST_SHOWN else text
 
 
 def _unknown(model: type[BaseModel], place: tuple[int | str, ...]) -> str:
     """A field that there is not; but perhaps elsewhere, or under a name like it."""
     *above, name = (str(step) for step in place)
-    sections = dict(_sections(model))
+    sections = _sections(model)
     here = sections.get(tuple(step for step in above if not step.isdigit()), model)
     text = f"unknown field; known here: {', '.join(repr(known) for known in here.model_fields)}"
     homes = ["/".join(("", *path)) for path, section in sections.items() if name in section.model_fields]
@@ -395,13 +401,15 @@ def _unknown(model: type[BaseModel], place: tuple[int | str, ...]) -> str:
     return f"{text}; did you mean '{like[0]}'?" if like else text
 
 
-def _sections(model: type[BaseModel], path: Path = ()) -> Iterator[tuple[Path, type[BaseModel]]]:
+@cache
+def _sections(model: type[BaseModel]) -> dict[Path, type[BaseModel]]:
     """The model, and those of its fields that are models themselves or lists of them, by their paths."""
-    yield path, model
+    found: dict[Path, type[BaseModel]] = {(): model}
     for name, field in model.model_fields.items():
         for kind in _kinds(field.annotation):
             if isinstance(kind, type) and issubclass(kind, BaseModel):
-                yield from _sections(kind, (*path, name))
+                found |= {(name, *path): section for path, section in _sections(kind).items()}
+    return found
 
 
 def _kinds(annotation: Any) -> Iterator[Any]:

@@ -244,6 +244,8 @@ def test_faults_of_options_name_the_option(
     assert "--sizes: " in told
     assert "--around: " in told
     assert "/panels" not in told
+    arguments = ["solve", str(tube), "-o", str(tmp_path / "x.json"), "--edge-range", "1", "nan"]
+    assert "--edge-range: " in refusal(arguments, capsys)[1]  # the fault is in one of its numbers
 
 
 def test_repairs_are_told(tube: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

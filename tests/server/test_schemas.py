@@ -6,7 +6,8 @@ from typing import Any
 
 import pytest
 
-from hexwrap_server.problems import FormError
+from hexwrap_server import schemas
+from hexwrap_server.problems import MOST_LISTED, FormError
 from hexwrap_server.schemas import parse_request
 
 SURFACE = {"vertices": [[0, 0, 0]], "faces": []}
@@ -29,7 +30,7 @@ def refused(body: dict[str, Any]) -> dict[str, str]:
         ({"panels": {"weights": {"surfaces": 1}}}, "/panels/weights/surfaces", "did you mean 'surface'?"),
         ({"panels": {"sizes": 0}}, "/panels/sizes", "greater than or equal to 1, not 0"),
         ({"panels": {"sizes": 1.5}}, "/panels/sizes", "not 1.5"),
-        ({"pattern": {"kind": "pentagon"}}, "/pattern/kind", "'hex', 'triangle' or 'quad', not 'pentagon'"),
+        ({"pattern": {"kind": "pentagon"}}, "/pattern/kind", "'hex', 'triangle' or 'quad', not \"pentagon\""),
         ({"panels": {"joint": None}}, "/panels/joint", "not null"),
         ({"panels": {"weights": {"edge": True}}}, "/panels/weights/edge", "not true"),
     ],
@@ -38,5 +39,15 @@ def test_what_was_sent_and_what_would_be_right(body: dict[str, Any], pointer: st
     assert words in refused(body)[pointer]
 
 
-def test_long_texts_are_not_repeated() -> None:
+def test_long_values_are_not_repeated() -> None:
     assert "xxx" not in refused({"name": "x" * 300})["/name"]
+    assert "000" not in refused({"panels": {"sizes": 10**80}})["/panels/sizes"].removesuffix("1000")
+
+
+def test_only_faults_that_are_listed_are_put_into_words(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A body may hold a million names that there are not."""
+    worded = []
+    monkeypatch.setattr(schemas, "_sentence", lambda model, error: worded.append(error) or error["msg"])
+    with pytest.raises(FormError, match="1999 more faults") as caught:
+        parse_request({"surface": SURFACE, "panels": {f"name{i}": 1 for i in range(2000)}}, 10, 10)
+    assert len(worded) == len(caught.value.faults) == MOST_LISTED

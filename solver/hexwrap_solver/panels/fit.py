@@ -94,7 +94,7 @@ def fit_panels(
 def _fit_split(
     surface: Surface, pattern: Pattern, settings: PanelSettings, progress: Progress
 ) -> FittedPanels:
-    cells = _corner_points(pattern)
+    cells = pattern.cells
     p = CORNERS[pattern.kind]
     regular: Bools = pattern.whole & (pattern.faces.lengths == p)
     points = _table(cells, regular, p)
@@ -135,7 +135,7 @@ def _fit_watertight(
     surface: Surface, pattern: Pattern, settings: PanelSettings, progress: Progress
 ) -> FittedPanels:
     """All cells, trimmed ones too, as polygons over shared corners."""
-    target = target_lengths(_corner_points(pattern), settings)
+    target = target_lengths(pattern.cells, settings)
     tree = surface.tree if settings.weights.surface > 0 else None
     moved, energy = minimise_watertight(pattern, target, settings.weights, tree, progress)
     shapes = Ragged(moved[pattern.faces.values.astype(np.int64)], pattern.faces.offsets)
@@ -160,7 +160,7 @@ def _fit_watertight(
         normal=normal,
         limit=mean_edges(shapes),
         whole=pattern.whole,
-        cell_area=fan_areas(_corner_points(pattern)),
+        cell_area=fan_areas(pattern.cells),
         energy=energy,
         notes=WATERTIGHT_NOTES + notes,
     )
@@ -206,10 +206,6 @@ def _far_note(away: Floats, weights: Weights, kind: str) -> tuple[str, ...]:
         f"Watertight panels leave the surface by up to {away.max():.0%} of their mean edge,"
         f" {away.mean():.0%} on average; {''.join(ways)}split panels stay beside it.",
     )
-
-
-def _corner_points(pattern: Pattern) -> Ragged:
-    return Ragged(pattern.vertices[pattern.faces.values.astype(np.int64)], pattern.faces.offsets)
 
 
 def _table(cells: Ragged, chosen: Bools, p: int) -> Floats:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hexwrap_solver.arrays import Floats, Progress, Ragged, no_progress
+from hexwrap_solver.arrays import Floats, Progress, no_progress
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.panels.congruence import congruence_classes
 from hexwrap_solver.panels.gaps import gaps
@@ -42,7 +42,7 @@ def measure(
     if pattern is None or panels is None:
         return quality
     progress(0.1, "measuring panels")
-    polygons, cell_area = panels.polygons, float(fan_areas(_cells(pattern)).sum())
+    polygons, cell_area = panels.polygons, float(fan_areas(pattern.cells).sum())
     edges = half_edges(pattern)
     between = gaps(pattern, edges, panels)
     angle = interior_angles(polygons, panels.normal)
@@ -87,10 +87,6 @@ def _count_overlaps(pattern: Pattern, edges: HalfEdges, panels: Panels) -> int:
     return len(overlapping_pairs(panels.polygons, panels.normal, mean_edges(panels.polygons), pairs))
 
 
-def _cells(pattern: Pattern) -> Ragged:
-    return Ragged(pattern.vertices[pattern.faces.values.astype(np.int64)], pattern.faces.offsets)
-
-
 def _bare_note(pattern: Pattern, share: float) -> tuple[str, ...]:
     """share: area of the cells / area of the surface."""
     if share >= 1 - BARE:
@@ -103,8 +99,7 @@ def _movement(pattern: Pattern, panels: Panels) -> float:
     """How far shared corners stand from the pattern's; 0 for split panels, which share none."""
     if panels.mode == "split":
         return 0.0
-    places = pattern.vertices[pattern.faces.values.astype(np.int64)]
-    return float(np.linalg.norm(panels.polygons.values - places, axis=1).max(initial=0.0))
+    return float(np.linalg.norm(panels.polygons.values - pattern.cells.values, axis=1).max(initial=0.0))
 
 
 def stretch_ratio(cmap: ConformalMap) -> tuple[Floats, Floats]:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
 from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints, Ragged
 
 Kind = Literal["hex", "triangle", "quad"]
@@ -68,6 +70,11 @@ class Pattern:
     @property
     def n_cells(self) -> int:
         return self.faces.n_rows
+
+    @property
+    def cells(self) -> Ragged:
+        """The corners of the cells on the surface."""
+        return Ragged(self.vertices[self.faces.values.astype(np.int64)], self.faces.offsets)
 
     def labels(self) -> list[str]:
         """Ring and place, as ``R03-P017``; at least two and three digits."""

@@ -47,7 +47,7 @@ def residuals(points: Points, length: Floats, weights: Weights, *, angles: bool 
     if angles:
         p = points.shape[1]
         parts.append(np.sqrt(weights.angle) * (corner_angles(points) - np.pi * (p - 2) / p))
-    parts.append(np.sqrt(weights.edge) * (_norm(_ahead(points)) / length[:, None] - 1))
+    parts.append(np.sqrt(weights.edge) * (_norm(edges_of(points)) / length[:, None] - 1))
     return np.concatenate(parts, axis=1)
 
 
@@ -115,7 +115,7 @@ def planarity(points: Points, length: Floats) -> Points:
 
 def corner_angles(points: Points) -> Points:
     """(q, p) angle between the two edges at each corner, 0…π."""
-    u, v = -_behind(points), _ahead(points)
+    u, v = -_behind(points), edges_of(points)
     cross, dot = np.cross(u, v), np.einsum("qkd,qkd->qk", u, v)
     return np.asarray(2 * np.arctan(_norm(cross) / (_norm(u) * _norm(v) + dot)))
 
@@ -136,7 +136,7 @@ def _planarity_derivative(points: Floats, length: Floats) -> Floats:
 
 def _angle_derivative(points: Floats) -> Floats:
     q, p, _ = points.shape
-    u, v = -_behind(points), _ahead(points)
+    u, v = -_behind(points), edges_of(points)
     lu, lv = _norm(u)[..., None], _norm(v)[..., None]
     u, v = u / lu, v / lv
     cosine = np.einsum("qkd,qkd->qk", u, v)[..., None]
@@ -152,7 +152,7 @@ def _angle_derivative(points: Floats) -> Floats:
 
 def _edge_derivative(points: Floats, length: Floats) -> Floats:
     q, p, _ = points.shape
-    edge = _ahead(points)
+    edge = edges_of(points)
     along = edge / (_norm(edge) * length[:, None])[..., None]
     derivative = np.zeros((q, p, p, 3))
     rows = np.arange(p)
@@ -168,7 +168,8 @@ def _tetrahedra(points: Points) -> tuple[Points, Points, Points]:
     return a, b, c
 
 
-def _ahead(points: Points) -> Points:
+def edges_of(points: Points) -> Points:
+    """(q, p, 3) from each corner to the next."""
     return np.roll(points, -1, axis=1) - points
 
 

@@ -10,6 +10,7 @@ from hexwrap_solver.arrays import Floats, Ints, Progress, Ragged, no_progress
 from hexwrap_solver.panels.energy.cell_matrix import CellMatrix
 from hexwrap_solver.panels.energy.residuals import (
     bounded,
+    edges_of,
     jacobian,
     plane_distances,
     plane_slopes,
@@ -246,7 +247,7 @@ class _Problem:
         shape = residuals(corner, g.length, self._weights, angles=g.regular)
         if not self._even:
             return shape
-        change = (_edges(corner) - g.edge) * (np.sqrt(EVENNESS) / g.length)[:, None, None]
+        change = (edges_of(corner) - g.edge) * (np.sqrt(EVENNESS) / g.length)[:, None, None]
         return np.concatenate([change.reshape(len(change), -1), shape], axis=1)
 
     def _shape_slopes(self, g: _Group, corner: Floats) -> Floats:
@@ -301,10 +302,6 @@ class _Problem:
         return root * value[:, None], root * slope[:, None]
 
 
-def _edges(corner: Floats) -> Floats:
-    return np.asarray(np.roll(corner, -1, axis=1) - corner)
-
-
 def _square(residual: Floats) -> float:
     return 0.5 * float(np.vdot(residual, residual))
 
@@ -319,5 +316,5 @@ def _groups(pattern: Pattern, length: Floats) -> list[_Group]:
             chosen = np.flatnonzero((faces.lengths == count) & (regular == even))
             if len(chosen):
                 corner = faces.values[faces.offsets[chosen][:, None] + np.arange(count)].astype(np.int64)
-                groups.append(_Group(corner, length[chosen], even, _edges(pattern.vertices[corner])))
+                groups.append(_Group(corner, length[chosen], even, edges_of(pattern.vertices[corner])))
     return groups
