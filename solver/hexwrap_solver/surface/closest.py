@@ -90,7 +90,7 @@ class TriangleTree:
         return found
 
     def farthest(self, points: Floats, row: Ints, rows: int, near: Ints | None = None) -> Floats:
-        """(rows,) the greatest distance from the mesh among the points of each row, exactly; 0 without points.
+        """(rows,) the greatest distance from the mesh among the points of each row, exactly; 0 for none.
 
         points: (k, 3), finite. row: (k,) row of each. near: (k,) a triangle believed to be near each point.
         Its distance bounds the point's own from above, so that most points need not be searched for.
