@@ -8,10 +8,10 @@ import numpy as np
 
 from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints
 from hexwrap_solver.conformal.types import ConformalMap
-from hexwrap_solver.pattern.cells import reverse_links
-from hexwrap_solver.pattern.links import Links
-from hexwrap_solver.pattern.nodes import Layout, Nodes
-from hexwrap_solver.pattern.rim import (
+from hexwrap_solver.pattern.lay.cells import reverse_links
+from hexwrap_solver.pattern.lay.edges import Links
+from hexwrap_solver.pattern.lay.nodes import Layout, Nodes
+from hexwrap_solver.pattern.trim.boundary import (
     Chords,
     Crossings,
     Rim,

@@ -9,9 +9,9 @@ import numpy as np
 from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.domain.locate import runs
-from hexwrap_solver.pattern.links import Links
-from hexwrap_solver.pattern.nodes import Layout, Nodes
-from hexwrap_solver.pattern.walk import walk
+from hexwrap_solver.pattern.lay.edges import Links
+from hexwrap_solver.pattern.lay.nodes import Layout, Nodes
+from hexwrap_solver.pattern.lay.trace import walk
 
 #: A boundary vertex at which the boundary turns by less (radians) is no corner of a cut cell.
 STRAIGHT = 1e-7

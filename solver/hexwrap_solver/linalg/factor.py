@@ -17,8 +17,8 @@ from scipy.linalg.blas import dgemv, dsyrk, dtrsm, dtrsv
 from scipy.linalg.lapack import dpotrf
 
 from hexwrap_solver.arrays import Floats, Ints
-from hexwrap_solver.conformal.dissection import Dissection, dissect
-from hexwrap_solver.conformal.workspace import borrow
+from hexwrap_solver.linalg.dissection import Dissection, dissect
+from hexwrap_solver.linalg.workspace import borrow
 
 #: Blocks of at least this many entries are added run by run, where their places come in few runs without
 #: holes: the index arrays of so many single entries would not stay in the processor's cache.

@@ -16,23 +16,23 @@ from hexwrap_solver.domain.interpolate import surface_weights
 from hexwrap_solver.domain.lift import points_at
 from hexwrap_solver.domain.locate import barycentric
 from hexwrap_solver.errors import PatternError
-from hexwrap_solver.pattern.arrangement import Points
-from hexwrap_solver.pattern.cells import (
+from hexwrap_solver.pattern.lattice import LATTICES, Lattice
+from hexwrap_solver.pattern.lay.cells import (
     Cells,
     awkward_cells,
     largest_part,
     manifold_corners,
     only_whole_cells,
 )
-from hexwrap_solver.pattern.lattice import LATTICES, Lattice
-from hexwrap_solver.pattern.links import link_nodes
-from hexwrap_solver.pattern.nodes import Layout, find_nodes
-from hexwrap_solver.pattern.place import Placing
-from hexwrap_solver.pattern.placement import Placement, anchor_vertex, edge_angle
-from hexwrap_solver.pattern.rings import places, rows_from, turns_around, winding
-from hexwrap_solver.pattern.rotation import with_rotation
-from hexwrap_solver.pattern.size import ASKED, fitting_number
-from hexwrap_solver.pattern.trim import TooCoarse, Trimmed, trim
+from hexwrap_solver.pattern.lay.edges import link_nodes
+from hexwrap_solver.pattern.lay.labels import places, rows_from, turns_around, winding
+from hexwrap_solver.pattern.lay.nodes import Layout, find_nodes
+from hexwrap_solver.pattern.place.choose import Placing
+from hexwrap_solver.pattern.place.placement import Placement, anchor_vertex, edge_angle
+from hexwrap_solver.pattern.place.rotation import with_rotation
+from hexwrap_solver.pattern.place.size import ASKED, fitting_number
+from hexwrap_solver.pattern.trim.arrangement import Points
+from hexwrap_solver.pattern.trim.trim import TooCoarse, Trimmed, trim
 from hexwrap_solver.pattern.types import Pattern, PatternSettings
 from hexwrap_solver.surface.normals import with_tangents
 from hexwrap_solver.surface.projection import project, start_parameters

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexwrap_solver.arrays import Complexes, Floats
-from hexwrap_solver.pattern.deform import System
-from hexwrap_solver.pattern.sides import Lines, Sides
+from hexwrap_solver.pattern.place.deform import System
+from hexwrap_solver.pattern.place.sides import Lines, Sides
 
 #: Moves that are solved for together: a compromise of time and memory.
 TOGETHER = 8

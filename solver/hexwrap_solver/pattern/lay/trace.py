@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexwrap_solver.arrays import Bools, Complexes, Ints
-from hexwrap_solver.pattern.nodes import Layout, edge_distances
+from hexwrap_solver.pattern.lay.nodes import Layout, edge_distances
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.sparse import csr_array, diags_array
 
 from hexwrap_solver.arrays import Bools, Floats, Ints
-from hexwrap_solver.conformal.factor import Factorisation
+from hexwrap_solver.linalg.factor import Factorisation
 
 #: Added to the diagonal, relative to it, so that rounding cannot make the matrix indefinite.
 RIDGE = 1e-13

@@ -14,8 +14,8 @@ import numpy as np
 from scipy import sparse
 
 from hexwrap_solver.arrays import Complexes, Floats, Ints
-from hexwrap_solver.conformal.normal_matrix import NormalMatrix
 from hexwrap_solver.conformal.types import ConformalMap
+from hexwrap_solver.linalg.normal_matrix import NormalMatrix
 from hexwrap_solver.pattern.lattice import Motion
 
 #: Weight of sizes against angles.

@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import connected_components
 
 from hexwrap_solver.arrays import Bools, Ints, Ragged
 from hexwrap_solver.pattern.lattice import Lattice, Motion
-from hexwrap_solver.pattern.links import Links
+from hexwrap_solver.pattern.lay.edges import Links
 
 
 @dataclass(frozen=True)

@@ -12,10 +12,10 @@ import numpy as np
 
 from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged
 from hexwrap_solver.conformal.types import ConformalMap
-from hexwrap_solver.pattern.arrangement import HalfEdges, Points, arrangement
-from hexwrap_solver.pattern.cells import Cells, reverse_links, whole_cells
-from hexwrap_solver.pattern.links import Links
-from hexwrap_solver.pattern.nodes import Layout, Nodes
+from hexwrap_solver.pattern.lay.cells import Cells, reverse_links, whole_cells
+from hexwrap_solver.pattern.lay.edges import Links
+from hexwrap_solver.pattern.lay.nodes import Layout, Nodes
+from hexwrap_solver.pattern.trim.arrangement import HalfEdges, Points, arrangement
 
 #: Pieces smaller than this part of a cell are joined to a cut neighbour, or dropped where there is none.
 SLIVER = 0.05

@@ -10,9 +10,9 @@ import numpy as np
 from hexwrap_solver.arrays import Complexes, Floats, Ints
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.pattern.lattice import Lattice, Motion
-from hexwrap_solver.pattern.placement import BEARABLE, Placement, anchor_vertex, edge_angle, is_straight
-from hexwrap_solver.pattern.rows import Rows, rows_along
-from hexwrap_solver.pattern.size import edges_around, fitting_number, size_spread, width_per_cell
+from hexwrap_solver.pattern.place.placement import BEARABLE, Placement, anchor_vertex, edge_angle, is_straight
+from hexwrap_solver.pattern.place.rows import Rows, rows_along
+from hexwrap_solver.pattern.place.size import edges_around, fitting_number, size_spread, width_per_cell
 from hexwrap_solver.pattern.types import PatternSettings
 
 #: Of the numbers of cells around that come near what is asked, this many are compared.

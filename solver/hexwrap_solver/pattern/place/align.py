@@ -9,13 +9,13 @@ import numpy as np
 
 from hexwrap_solver.arrays import Complexes, Floats, Ints
 from hexwrap_solver.conformal.types import ConformalMap
-from hexwrap_solver.pattern.deform import System, deform, distortion_of
 from hexwrap_solver.pattern.lattice import Lattice, Motion
-from hexwrap_solver.pattern.placement import Placement, edge_angle
-from hexwrap_solver.pattern.rows import Rows, rows_along
-from hexwrap_solver.pattern.sides import Lines, Sides, lines_of, sides_of
-from hexwrap_solver.pattern.size import edges_around, size_spread, wanted_edge, width_per_cell
-from hexwrap_solver.pattern.strain import Strain
+from hexwrap_solver.pattern.place.deform import System, deform, distortion_of
+from hexwrap_solver.pattern.place.placement import Placement, edge_angle
+from hexwrap_solver.pattern.place.rows import Rows, rows_along
+from hexwrap_solver.pattern.place.sides import Lines, Sides, lines_of, sides_of
+from hexwrap_solver.pattern.place.size import edges_around, size_spread, wanted_edge, width_per_cell
+from hexwrap_solver.pattern.place.strain import Strain
 from hexwrap_solver.pattern.types import PatternSettings
 
 #: Scales tried, from the smallest to the largest admissible.

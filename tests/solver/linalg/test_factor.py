@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from hexwrap_solver.arrays import Floats, Ints
 from hexwrap_solver.conformal.boundary import constant_on_loops, straight
-from hexwrap_solver.conformal.dissection import LEAF, dissect
 from hexwrap_solver.conformal.energy import Energy
-from hexwrap_solver.conformal.factor import Factorisation
+from hexwrap_solver.linalg.dissection import LEAF, dissect
+from hexwrap_solver.linalg.factor import Factorisation
 from tests.solver.conformal.annuli import bump
 
 

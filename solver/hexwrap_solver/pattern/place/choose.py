@@ -8,11 +8,11 @@ from functools import cached_property
 import numpy as np
 
 from hexwrap_solver.conformal.types import ConformalMap
-from hexwrap_solver.pattern.align import Straightening, place_by_sides, turn_between_loops
-from hexwrap_solver.pattern.cone import place_on_cone, place_on_flat_ring
-from hexwrap_solver.pattern.cylinder import place_on_cylinder
 from hexwrap_solver.pattern.lattice import Lattice
-from hexwrap_solver.pattern.placement import (
+from hexwrap_solver.pattern.place.align import Straightening, place_by_sides, turn_between_loops
+from hexwrap_solver.pattern.place.cone import place_on_cone, place_on_flat_ring
+from hexwrap_solver.pattern.place.cylinder import place_on_cylinder
+from hexwrap_solver.pattern.place.placement import (
     BEARABLE,
     Placement,
     check_phase,
@@ -21,7 +21,7 @@ from hexwrap_solver.pattern.placement import (
     quantized,
     quantum_turns,
 )
-from hexwrap_solver.pattern.sides import has_corners, is_polygon
+from hexwrap_solver.pattern.place.sides import has_corners, is_polygon
 from hexwrap_solver.pattern.types import PatternSettings
 
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from hexwrap_solver.arrays import Bools, Ints
 from hexwrap_solver.domain.locate import runs
-from hexwrap_solver.pattern.nodes import Layout, Nodes, edge_distances
-from hexwrap_solver.pattern.walk import walk
+from hexwrap_solver.pattern.lay.nodes import Layout, Nodes, edge_distances
+from hexwrap_solver.pattern.lay.trace import walk
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,10 @@ import numpy as np
 from hexwrap_solver.arrays import Complexes
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.errors import PatternError
-from hexwrap_solver.pattern.cone import boundary_direction
 from hexwrap_solver.pattern.lattice import Lattice
-from hexwrap_solver.pattern.placement import anchor_vertex
-from hexwrap_solver.pattern.size import face_areas
+from hexwrap_solver.pattern.place.cone import boundary_direction
+from hexwrap_solver.pattern.place.placement import anchor_vertex
+from hexwrap_solver.pattern.place.size import face_areas
 from hexwrap_solver.pattern.types import PatternSettings
 from hexwrap_solver.surface.projection import parameter_corners
 

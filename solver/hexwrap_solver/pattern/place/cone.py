@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexwrap_solver.conformal.types import ConformalMap
-from hexwrap_solver.pattern.deform import System, deform, distortion_of
 from hexwrap_solver.pattern.lattice import Lattice, Motion
-from hexwrap_solver.pattern.placement import Placement, anchor_vertex, edge_angle
-from hexwrap_solver.pattern.size import ASKED, edges_around, wanted_edge, width_per_cell
+from hexwrap_solver.pattern.place.deform import System, deform, distortion_of
+from hexwrap_solver.pattern.place.placement import Placement, anchor_vertex, edge_angle
+from hexwrap_solver.pattern.place.size import ASKED, edges_around, wanted_edge, width_per_cell
 from hexwrap_solver.pattern.types import PatternSettings
 
 #: A translation g shorter than this part of the circumference is none.
