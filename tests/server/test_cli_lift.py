@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from hexwrap_server.cli.main import main
-from hexwrap_server.input.curves import READERS, Curve, DrawingError, read_curves, refined, write_curves
+from hexwrap_server.errors import DrawingError
+from hexwrap_server.input.curves import READERS, Curve, read_curves, refined, write_curves
 from hexwrap_server.input.finished_map import map_in_result
 from hexwrap_server.jobs.lift_curves import flatten_curves, lift_curves, one_piece
 from hexwrap_server.output.writers import Meta, write

@@ -10,8 +10,8 @@ from typing import Any, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel
 
+from hexwrap_server.errors import FormError
 from hexwrap_server.input.schemas import Body, Meshing, Path
-from hexwrap_server.problems import FormError
 
 
 @dataclass(frozen=True)

@@ -17,19 +17,14 @@ from typing import Any
 import numpy as np
 import rhino3dm
 
+from hexwrap_server.errors import DrawingError
 from hexwrap_server.output.drawing import encode
 from hexwrap_solver.arrays import Floats
-from hexwrap_solver.errors import HexwrapError
 
 #: Arcs and splines become polylines about this close to them, in parts of the drawing's size.
 FLATNESS = 1e-4
 #: Points taken on a curve of a Rhino file that is no polyline.
 SAMPLES = 200
-
-
-class DrawingError(HexwrapError):
-    slug = "drawing"
-    title = "The drawing cannot be read"
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from hexwrap_server.cli.local import UsageError
+from hexwrap_server.errors import UsageError
 from hexwrap_solver.conformal.types import ConformalMap, Deck
 from hexwrap_solver.surface import Surface
 from hexwrap_solver.surface.topology import vertex_normals

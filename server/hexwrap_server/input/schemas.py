@@ -28,9 +28,9 @@ from pydantic import (
 )
 from pydantic_core import ErrorDetails
 
+from hexwrap_server.errors import MOST_LISTED, FormError
 from hexwrap_server.input.arrays import Fault, faces, numbers, table
 from hexwrap_server.input.requests import SentSurface, Wanted
-from hexwrap_server.problems import MOST_LISTED, FormError
 from hexwrap_solver.conformal.types import ANGLE_UNITS, AngleUnit, BoundaryCondition
 from hexwrap_solver.panels.types import ComponentSettings, PanelSettings, Weights
 from hexwrap_solver.pattern.types import PatternSettings

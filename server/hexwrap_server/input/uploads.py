@@ -1,4 +1,4 @@
-"""Uploaded files, read in a worker process under its limits."""
+"""Uploaded files: raw, or the one file of a multipart form."""
 
 from __future__ import annotations
 
@@ -10,68 +10,29 @@ from typing import Any
 import python_multipart
 from python_multipart.exceptions import FormParserError
 
-from hexwrap_server.input.requests import CacheSettings, Intake, SentSurface
+from hexwrap_server.errors import UploadError
 from hexwrap_server.input.surface_files import read_surface
-from hexwrap_server.jobs.work import checked
-from hexwrap_server.jobs.worker import Report
-from hexwrap_server.problems import FormError, body_is_the_surface
-from hexwrap_solver.surface.types import MeshSettings, NurbsSurface, SentMesh
+from hexwrap_solver.surface.types import NurbsSurface, SentMesh
 
 
-class UploadError(FormError):
-    slug = "upload"
-    title = "The upload cannot be read"
-
-
-class TooManyVerticesError(FormError):
-    slug = "too-many-vertices"
-    title = "The surface has too many vertices"
-
-
-@body_is_the_surface(is_file=True)
-def read_upload(
-    report: Report,
-    body: bytes,
-    content_type: str,
-    name: str,
-    max_vertices: int,
-    max_bytes: int,
-    caching: CacheSettings,
-) -> Intake:
-    """A file sent raw (with its name) or in a form → checked surface. Raises UploadError, SurfaceError."""
-    read = sent_file(body, content_type, name, max_vertices, max_bytes)
-    if isinstance(read, NurbsSurface):
-        meshing = MeshSettings(max_vertices=max_vertices)
-        return checked(report, SentSurface(nurbs=read, meshing=meshing), caching)
-    return checked(report, SentSurface(mesh=read), caching)
-
-
-def sent_file(
-    body: bytes, content_type: str, name: str, max_vertices: int, max_bytes: int
-) -> SentMesh | NurbsSurface:
-    """What a file, sent raw or in a form, holds, within the limits. Raises UploadError, SurfaceError."""
+def sent_file(body: bytes, content_type: str, name: str, max_mib: float) -> SentMesh | NurbsSurface:
+    """What a file, sent raw or in a form, holds. Raises UploadError, SurfaceError."""
     if content_type.lower().startswith("multipart/"):
         name, body = only_file(body, content_type)
-    _no_bomb(body, max_bytes)
-    read = read_surface(body, name)
-    if not isinstance(read, NurbsSurface) and len(read.vertices) > max_vertices:
-        raise TooManyVerticesError(
-            f"The file holds {len(read.vertices)} vertices, this server takes at most {max_vertices}; send a "
-            "coarser mesh, or start the server with a larger --max-vertices."
-        )
-    return read
+    _no_bomb(body, max_mib)
+    return read_surface(body, name)
 
 
-def _no_bomb(body: bytes, max_bytes: int) -> None:
+def _no_bomb(body: bytes, max_mib: float) -> None:
     """An archive may not unpack to more than a body may have."""
     if not zipfile.is_zipfile(io.BytesIO(body)):
         return
     with contextlib.suppress(zipfile.BadZipFile), zipfile.ZipFile(io.BytesIO(body)) as archive:
         unpacked = sum(member.file_size for member in archive.infolist())
-        if unpacked > max_bytes:
+        if unpacked > max_mib * 2**20:
             raise UploadError(
-                f"The archive would unpack to {unpacked} bytes, this server takes at most {max_bytes}; send "
-                "a coarser mesh, or start the server with a larger --max-body-mib."
+                f"The archive would unpack to {unpacked} bytes, this server takes at most {max_mib:g} MiB; "
+                "send a coarser mesh, or start the server with a larger --max-body-mib."
             )
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexwrap_server.cli.local import UsageError
+from hexwrap_server.errors import UsageError
 from hexwrap_server.input.curves import Curve, refined
 from hexwrap_solver.arrays import Complexes, Floats
 from hexwrap_solver.conformal.types import ConformalMap, Deck
