@@ -17,7 +17,7 @@ SUBDIVISIONS = 3
 
 
 def brep_of(geometry: Any, tolerance: float) -> Brep:
-    """A polysurface, surface or extrusion. tolerance: the file's, in its units. Raises UnreadableFileError."""
+    """A polysurface, surface or extrusion. tolerance: the file's. Raises UnreadableFileError."""
     brep = _as_brep(geometry)
     if brep is None or len(brep.Faces) == 0:
         raise UnreadableFileError(
