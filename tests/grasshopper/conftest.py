@@ -57,7 +57,7 @@ def unpack(path: Path, form: components.Form, folder: Path) -> None:
 
 
 SERVE = (
-    "from hexwrap_server.app import serve; from hexwrap_server.settings import Settings; "
+    "from hexwrap_server.http.app import serve; from hexwrap_server.settings import Settings; "
     "serve(Settings.from_environment())"
 )
 
