@@ -115,7 +115,7 @@ def _require_increment(allowed: Floats, panel: Ints, increment: float) -> None:
         raise PanelsError(
             f"The increment {increment:g} is longer than {len(nothing)} panels may be (the smallest allows"
             f" {allowed.min():g}); ask for a smaller increment or larger cells.",
-            field=("panels", "increment"),
+            field=("increment",),
             data={"panels": nothing[:100].tolist()},
         )
 
