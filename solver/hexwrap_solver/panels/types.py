@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged
 from hexwrap_solver.errors import SettingError
+from hexwrap_solver.panels.facing import Facing
 from hexwrap_solver.setting import Setting
 
 
@@ -35,19 +36,26 @@ class ComponentSettings:
 class PanelSettings:
     """How panels are rationalized (paper, section 5).
 
-    sizes: fewer where more would be alike. size_cost: ``area`` (least uncovered area) or ``worst`` (least
-    greatest loss). Raises SettingError for an ``edge_range`` out of order.
+    sizes: fewer where more would be alike; ``fewest``: as few as leave no joint wider than ``max_gap``; None:
+    one length per panel. size_cost: ``area`` (least uncovered area) or ``worst`` (least greatest loss).
+    Raises SettingError for an ``edge_range`` out of order.
     """
 
     mode: Annotated[Literal["split", "watertight"], Setting("individual panels, or one watertight mesh")] = (
         "split"
     )
     sizes: Annotated[
-        int | None,
+        int | Literal["fewest"] | None,
         Setting(
-            "number of edge lengths, fewer where some would be alike; none: one per panel", ge=1, le=1000
+            "number of edge lengths, fewer where some would be alike; 'fewest': as few as max_gap allows; "
+            "'none': one per panel",
+            ge=1,
+            le=1000,
         ),
     ] = 11
+    max_gap: Annotated[
+        float | None, Setting("widest joint wanted; wider ones are counted", ge=0, unit="length", rare=True)
+    ] = None
     size_cost: Annotated[Literal["area", "worst"], Setting("what the sizes are best for", rare=True)] = "area"
     edge_range: Annotated[
         tuple[float, float] | None, Setting("allowed edge lengths", unit="length", rare=True)
@@ -85,11 +93,15 @@ class TradeOff:
 
     sizes: (k,) numbers of classes 1…; uncovered: (k,) fraction of the cells' area left open;
     worst_gap: (k,) greatest mean gap of a panel to its cell, model units.
+    joint_mean, joint_max: (k,) mean and greatest width of the joints between neighbours, model units, as they
+    would be were all facing edges parallel.
     """
 
     sizes: Ints
     uncovered: Floats
     worst_gap: Floats
+    joint_mean: Floats
+    joint_max: Floats
 
 
 @dataclass(frozen=True)
@@ -101,7 +113,8 @@ class FittedPanels:
     around the centre at edge length 1, of the r regular panels in order. shapes: polygons of the others in
     order. center, normal: (q, 3). limit: (q,) greatest edge length (mean edge of the others). whole: (q,).
     cell_area: (q,) of the panels' cells. energy, notes: as in ``Panels``. spare_limit, spare_center: another
-    choice of limit and center without overlap, which few classes may suit better.
+    choice of limit and center without overlap, which few classes may suit better. facing: edges of
+    neighbouring panels, None for watertight ones.
     """
 
     mode: Literal["split", "watertight"]
@@ -118,6 +131,7 @@ class FittedPanels:
     notes: tuple[str, ...] = ()
     spare_limit: Floats | None = None
     spare_center: Floats | None = None
+    facing: Facing | None = None
 
 
 @dataclass(frozen=True)
