@@ -1,4 +1,5 @@
-"""The form of a request, derived from the annotated settings: what is accepted, its JSON Schema, the way back.
+"""The form of a request, derived from the annotated settings: what is accepted, its JSON Schema, the way
+back.
 
 Each dataclass of settings becomes a strict pydantic model, in which ``true`` is not a number and an unknown
 field is a fault; what the model has accepted becomes the dataclass again.
@@ -6,29 +7,23 @@ field is a fault; what the model has accepted becomes the dataclass again.
 
 from __future__ import annotations
 
-import json
 import types
 from collections.abc import Iterator
 from dataclasses import MISSING, Field, dataclass, fields, is_dataclass, replace
-from difflib import get_close_matches
 from functools import cache
 from math import inf, nextafter
 from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import pydantic
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, FiniteFloat, ValidationError
-from pydantic_core import ErrorDetails
 
-from hexwrap_server.problems import MOST_LISTED, FormError
+from hexwrap_server.input.faults import Path, faults, pointer
+from hexwrap_server.problems import FormError
 from hexwrap_solver.conformal.types import ANGLE_UNITS
 from hexwrap_solver.pipeline import SolveSettings
 from hexwrap_solver.setting import Setting
 
-#: Steps from the body to a field of it.
-Path = tuple[str, ...]
 T = TypeVar("T")
-#: Longer texts are not shown in problems.
-MOST_SHOWN = 60
 
 
 @dataclass(frozen=True)
@@ -55,7 +50,9 @@ class Leaf:
     @property
     def is_free(self) -> bool:
         """Whether there are other values than the choices."""
-        return any(get_origin(part) is not Literal and part is not type(None) for part in _parts(self.annotation))
+        return any(
+            get_origin(part) is not Literal and part is not type(None) for part in _parts(self.annotation)
+        )
 
     @property
     def is_list(self) -> bool:
@@ -63,18 +60,26 @@ class Leaf:
         return any(get_args(part)[-1:] == (...,) for part in _parts(self.annotation))
 
     @property
+    def entry(self) -> str:
+        """The field that the entries of such a list are about: the one without a default."""
+        (section,) = (get_args(part)[0] for part in _parts(self.annotation))
+        return next(f.name for f in fields(section) if f.default is MISSING)
+
+    @property
     def numbers(self) -> int:
         """How many values it takes."""
-        return max(len(get_args(part)) if get_origin(part) is tuple else 1 for part in _parts(self.annotation))
+        return max(
+            len(get_args(part)) if get_origin(part) is tuple else 1 for part in _parts(self.annotation)
+        )
 
 
 def read(kind: type[T], given: object, root: str = "") -> T:
-    """A JSON value as settings. root: JSON pointer to the value. Raises FormError with a pointer per fault."""
-    model = model_of(kind)
+    """A JSON value as settings. root: JSON pointer to the value. Raises FormError, a pointer per fault."""
+    model = model_of(kind)  # type: ignore[arg-type]
     try:
         found: T = _built(kind, model.model_validate(given))
     except ValidationError as error:
-        raise FormError(_faults(model, given, root, error)) from None
+        raise FormError(faults(model, given, root, error)) from None
     except ValueError as error:
         raise FormError.at(root, str(error)) from None
     return _in_radians(found)
@@ -109,9 +114,7 @@ def model_of(kind: type) -> type[BaseModel]:
                 json_schema_extra={name: value for name, value in extra.items() if value is not None},
             ),
         )
-    return pydantic.create_model(
-        kind.__name__, __config__=ConfigDict(strict=True, extra="forbid"), **members
-    )
+    return pydantic.create_model(kind.__name__, __config__=ConfigDict(strict=True, extra="forbid"), **members)
 
 
 def leaves(kind: type, root: Path = ()) -> Iterator[Leaf]:
@@ -142,28 +145,20 @@ def values(settings: Any, root: tuple[str | int, ...] = ()) -> Iterator[tuple[st
             yield pointer(path), setting_of(hints[f.name]), value
 
 
+def is_nullable(kind: type, name: str) -> bool:
+    """Whether a field may be null."""
+    return type(None) in _parts(get_type_hints(kind, include_extras=True)[name])
+
+
 def setting_of(annotation: Any) -> Setting:
     """What an annotation says of its field."""
     return next(extra for extra in get_args(annotation) if isinstance(extra, Setting))
 
 
-def pointer(path: tuple[str | int, ...]) -> str:
-    """The JSON pointer of a path."""
-    return "".join(f"/{escaped(str(step))}" for step in path)
-
-
-def escaped(step: str) -> str:
-    """A name as a step of a JSON pointer."""
-    return step.replace("~", "~0").replace("/", "~1")
-
-
-# -------------------------------------------------------------------------------- from dataclasses to models
-
-
 def _open_fields(kind: type) -> list[Field[Any]]:
     """Those that a request may set."""
     hints = get_type_hints(kind, include_extras=True)
-    return [f for f in fields(kind) if not setting_of(hints[f.name]).limit]  # type: ignore[arg-type]
+    return [f for f in fields(kind) if not setting_of(hints[f.name]).limit]
 
 
 def _parts(annotation: Any) -> tuple[Any, ...]:
@@ -198,9 +193,9 @@ def _accepted(annotation: Any, setting: Setting) -> Any:
         return Annotated[model_of(part), AfterValidator(lambda given: _built(part, given))]  # type: ignore[arg-type]
     if get_origin(part) is tuple:
         *_, last = of = get_args(part)
-        entry = _accepted(of[0], setting)
+        rows = types.GenericAlias(list, (_accepted(of[0], setting),))
         least, most = (0, setting.most) if last is ... else (len(of), len(of))
-        return Annotated[list[entry], pydantic.Field(min_length=least, max_length=most), AfterValidator(tuple)]  # type: ignore[valid-type]
+        return Annotated[rows, pydantic.Field(min_length=least, max_length=most), AfterValidator(tuple)]
     if part is int:
         return Annotated[int, bounds, BeforeValidator(_whole_number)]
     if part is float:
@@ -234,9 +229,6 @@ def _inlined(schema: dict[str, Any]) -> dict[str, Any]:
 
     resolved: dict[str, Any] = resolve(schema)
     return resolved
-
-
-# ------------------------------------------------------------------------------------ radians, and the way back
 
 
 def _in_radians(settings: T, factor: float = 1.0) -> T:
@@ -279,87 +271,3 @@ def _in_unit(angle: float, unit: float) -> float:
     near = angle / unit
     tries = (round(near, 9), near, nextafter(near, inf), nextafter(near, 0.0))
     return next((value for value in tries if value * unit == angle), near)
-
-
-# -------------------------------------------------------------------------------------------- faults in words
-
-
-def _faults(
-    model: type[BaseModel], given: object, root: str, error: ValidationError
-) -> list[tuple[str, str]]:
-    """Pointer and sentence of each fault; what the members of a union say of one value is one fault."""
-    places: dict[str, list[ErrorDetails]] = {}
-    for e in error.errors(include_url=False, include_context=False):
-        places.setdefault(root + _pointer(given, e["loc"], e["type"]), []).append(e)
-    return [
-        (place, _sentence(model, found) if i < MOST_LISTED else found[0]["msg"])
-        for i, (place, found) in enumerate(places.items())
-    ]
-
-
-def _sentence(model: type[BaseModel], errors: list[ErrorDetails]) -> str:
-    """What is wrong, what was sent, and what would be right."""
-    error = errors[0]
-    if error["type"] == "extra_forbidden":
-        return _unknown(model, error["loc"])
-    first, *others = dict.fromkeys(_message(e) for e in errors)
-    text = ", or ".join([first, *(other.removeprefix("Input should be ") for other in others)])
-    sent = error["input"]
-    if sent is not None and not isinstance(sent, (bool, int, float, str)):
-        return text
-    shown = json.dumps(sent, ensure_ascii=False)
-    return f"{text}, not {shown}" if len(shown) <= MOST_SHOWN else text
-
-
-def _message(error: ErrorDetails) -> str:
-    if error["type"] == "model_type":
-        return "Input should be an object"
-    return error["msg"].removeprefix("Value error, ")
-
-
-def _unknown(model: type[BaseModel], place: tuple[int | str, ...]) -> str:
-    """A field that does not exist; but perhaps elsewhere, or under a name like it."""
-    *above, name = (str(step) for step in place)
-    sections = _sections(model)
-    here = sections.get(tuple(step for step in above if not step.isdigit()), model)
-    text = f"unknown field; known here: {', '.join(repr(known) for known in here.model_fields)}"
-    homes = ["/".join(("", *path)) for path, section in sections.items() if name in section.model_fields]
-    like = get_close_matches(name, here.model_fields, 1)
-    if homes:
-        return f"{text}; '{name}' belongs to {' or '.join(home or 'the body itself' for home in homes)}"
-    return f"{text}; did you mean '{like[0]}'?" if like else text
-
-
-@cache
-def _sections(model: type[BaseModel]) -> dict[Path, type[BaseModel]]:
-    """The model, and those of its fields that are models themselves or lists of them, by their paths."""
-    found: dict[Path, type[BaseModel]] = {(): model}
-    for name, field in model.model_fields.items():
-        for kind in _kinds(field.annotation):
-            if isinstance(kind, type) and issubclass(kind, BaseModel):
-                found |= {(name, *path): section for path, section in _sections(kind).items()}
-    return found
-
-
-def _kinds(annotation: Any) -> Iterator[Any]:
-    """The types that an annotation is made of."""
-    parts = get_args(annotation)
-    if parts:
-        for part in parts:
-            yield from _kinds(part)
-    else:
-        yield annotation
-
-
-def _pointer(given: object, place: tuple[int | str, ...], kind: str) -> str:
-    """pydantic names the branches of unions in its paths; a JSON pointer holds only what was sent."""
-    parts = []
-    at: Any = given
-    for i, step in enumerate(place):
-        try:
-            at = at[step]
-        except (KeyError, IndexError, TypeError):
-            if not (kind == "missing" and i == len(place) - 1):
-                continue
-        parts.append(escaped(str(step)))
-    return "".join(f"/{part}" for part in parts)
