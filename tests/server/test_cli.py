@@ -10,11 +10,13 @@ import pytest
 import rhino3dm
 
 from hexwrap_server import __version__, samples
-from hexwrap_server.cli import ENDINGS, file_kind, main, make_parser
-from hexwrap_server.files import WRITERS
-from hexwrap_server.local import task
-from hexwrap_server.options import ANGLES, OPTIONS, SUPPORT, field_paths
-from hexwrap_server.schemas import parse_request
+from hexwrap_server.cli.local import task
+from hexwrap_server.cli.main import ENDINGS, file_kind, main, make_parser
+from hexwrap_server.cli.options import OPTIONS
+from hexwrap_server.input.form import Body, leaves
+from hexwrap_server.input.schemas import parse_request
+from hexwrap_server.output.writers import WRITERS
+from hexwrap_solver.surface.types import SurfaceSettings
 
 TUBE_ROWS, TUBE_COLUMNS = 9, 24
 
@@ -43,7 +45,9 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_every_field_of_a_request_has_an_option() -> None:
-    assert sorted([*(option.path for option in OPTIONS), ANGLES, SUPPORT]) == sorted(field_paths())
+    settings = [*leaves(Body), *leaves(SurfaceSettings, ("surface",))]
+    assert [option.path for option in OPTIONS] == [leaf.path for leaf in settings]
+    assert len({option.flag for option in OPTIONS}) == len(OPTIONS)
 
 
 def test_every_file_of_the_service_has_an_ending() -> None:
@@ -227,7 +231,7 @@ def test_a_file_that_cannot_come_of_the_request_is_refused_before_the_work(
     words: str,
 ) -> None:
     monkeypatch.setattr(
-        "hexwrap_server.cli.solve_with_progress", lambda *_: pytest.fail("solved all the same")
+        "hexwrap_server.cli.main.solve_with_progress", lambda *_: pytest.fail("solved all the same")
     )
     arguments = ["solve", str(tube), "-q", "-o", str(tmp_path / "x.json"), "-o", str(tmp_path / "x.png")]
     status, told = refusal([*arguments, option, "none"], capsys)

@@ -29,9 +29,7 @@ def check_settings(settings: MeshSettings) -> None:
     for name in ("max_edge", "tolerance"):
         value = getattr(settings, name)
         if value is not None and not (np.isfinite(value) and value > 0):
-            raise NurbsDataError(
-                f"mesh.{name} is {value}: it must be positive.", field=("surface", "mesh", name)
-            )
+            raise NurbsDataError(f"mesh.{name} is {value}: it must be positive.", field=(name,))
 
 
 def bounded(settings: MeshSettings, nurbs: NurbsSurface) -> MeshSettings:

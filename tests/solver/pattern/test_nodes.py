@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from hexwrap_solver.errors import PatternError
-from hexwrap_solver.pattern import nodes
 from hexwrap_solver.pattern.lattice import LATTICES
-from hexwrap_solver.pattern.lay import layout_of
-from hexwrap_solver.pattern.place import Placing
+from hexwrap_solver.pattern.lay import nodes
+from hexwrap_solver.pattern.lay_pattern import layout_of
+from hexwrap_solver.pattern.place.choose import Placing
 from hexwrap_solver.pattern.types import PatternSettings
 from tests.solver.pattern import annuli
 
@@ -27,7 +27,7 @@ def test_links_that_lead_one_way_only_are_refused():
     """Instead of being followed for ever: 0 is known, 1 knows 0, and nobody leads from 0 to 1."""
     one = np.array([1])
     with pytest.raises(PatternError, match="Rounding"):
-        nodes._turns(np.array([0]), one, 0 * one, one, 2)
+        nodes._seen_from(np.array([0]), one, 0 * one, np.zeros((1, 4), dtype=int), LATTICES["hex"], 2)
 
 
 def test_nodes_beyond_all_integers_are_refused():

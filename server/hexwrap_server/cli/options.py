@@ -1,0 +1,211 @@
+"""Every setting of a request as an option of the command line. What values mean is for ``form`` to judge."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from hexwrap_server.input.faults import Path, pointer
+from hexwrap_server.input.form import Body, Leaf, is_nullable, leaves
+from hexwrap_server.problems import FormError
+from hexwrap_solver.surface.types import SurfaceSettings
+
+#: Flags that are neither the setting's name nor, for the first setting of a section, the section's.
+FLAGS: dict[Path, str] = {
+    ("boundary", "angles"): "--angle",
+    ("pattern", "boundary"): "--cells",
+    ("panels", "weights", "planarity"): "--weight-planarity",
+    ("panels", "weights", "angle"): "--weight-angle",
+    ("panels", "weights", "edge"): "--weight-edge",
+    ("panels", "weights", "surface"): "--weight-surface",
+}
+#: Settings of which a request gives one.
+SIZES: tuple[Path, Path] = (("pattern", "around"), ("pattern", "edge_length"))
+PLACES = "PLACE is an index of the sent mesh or X,Y,Z (any number of times)"
+
+
+@dataclass(frozen=True)
+class Option:
+    """flag: on the command line. is_first: of a section that may be null, which 'none' makes it."""
+
+    flag: str
+    leaf: Leaf
+    is_first: bool
+
+    @property
+    def path(self) -> Path:
+        return self.leaf.path
+
+    @property
+    def name(self) -> str:
+        """In the namespace of parsed arguments."""
+        return "option_" + "_".join(self.path)
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """Words that are accepted, where nothing else is."""
+        if self.leaf.is_free:
+            return ()
+        return (*self.leaf.choices, "none") if self.is_first else self.leaf.choices
+
+    @property
+    def help(self) -> str:
+        """What it does, with its default."""
+        text, default = self.leaf.setting.help, self.leaf.default
+        if self.leaf.is_list:
+            return f"{text}; {PLACES}"
+        if self.is_first:
+            text += "; 'none' leaves it out"
+        if default is None or default is False or default == "":
+            return text
+        shown = default if isinstance(default, tuple) else (default,)
+        return f"{text} (default: {' '.join(f'{x:g}' if isinstance(x, float) else str(x) for x in shown)})"
+
+
+def _options() -> Iterator[Option]:
+    seen = set()
+    for leaf in (*leaves(Body), *leaves(SurfaceSettings, ("surface",))):
+        section, name = leaf.path[0], leaf.path[-1]
+        is_first = len(leaf.path) == 2 and section != "surface" and section not in seen
+        seen.add(section)
+        flag = FLAGS.get(leaf.path, f"--{section if is_first else name}".replace("_", "-"))
+        yield Option(flag, leaf, is_first and is_nullable(Body, section))
+
+
+OPTIONS = tuple(_options())
+
+
+def add_request_options(parser: argparse.ArgumentParser) -> None:
+    """All of them, with choices and defaults in the help.
+
+    What is not given leaves no attribute, because ``--sizes none`` is not the same as silence.
+    """
+    group = parser.add_argument_group("request (defaults as of the service, or what the request file says)")
+    for option in OPTIONS:
+        common: dict[str, Any] = {"dest": option.name, "default": argparse.SUPPRESS, "help": option.help}
+        if option.leaf.is_list:
+            group.add_argument(
+                option.flag, action="append", metavar=f"PLACE={option.leaf.entry.upper()}", **common
+            )
+        elif option.leaf.default is False:
+            group.add_argument(option.flag, action="store_true", **common)
+        elif option.words:
+            group.add_argument(option.flag, choices=option.words, **common)
+        else:
+            n, of = option.leaf.numbers, str if isinstance(option.leaf.default, str) else _value
+            word = _metavar(option.leaf)
+            group.add_argument(
+                option.flag,
+                nargs=n if n > 1 else None,
+                type=of,
+                metavar=(word,) * n if n > 1 else word,
+                **common,
+            )
+
+
+def asked_body(arguments: argparse.Namespace, body: dict[str, Any]) -> dict[str, Any]:
+    """The request body with what was asked on the command line. Raises FormError for a malformed --angle."""
+    asked = dict(body)
+    given = {o.path: (o, getattr(arguments, o.name)) for o in _given(arguments) if o.path[0] != "surface"}
+    for size, other in (SIZES, SIZES[::-1]):
+        if (
+            size in given and given[size][1] is not None
+        ):  # takes the place of the size that the request may have
+            _put(asked, other, None)
+    for path, (option, value) in given.items():
+        if option.is_first and value in ("none", None):
+            asked[path[0]] = None
+        elif option.leaf.is_list:
+            _put(asked, path, [_entry(option, text) for text in value])
+        else:
+            _put(asked, path, value)
+    if ("boundary", "angles") in given and isinstance(asked["boundary"], dict):
+        asked["boundary"].setdefault("mode", "angles")
+    return asked
+
+
+def asked_surface(arguments: argparse.Namespace, surface: dict[str, Any]) -> dict[str, Any]:
+    """A surface with the settings asked for beside it; sizes of meshes only where it is a NURBS surface."""
+    asked = dict(surface)
+    for option in _given(arguments):
+        section, *path = option.path
+        if section == "surface" and (path[0] != "mesh" or "nurbs" in surface):
+            _put(asked, tuple(path), getattr(arguments, option.name))
+    return asked
+
+
+def is_option_at_fault(arguments: argparse.Namespace, pointers: Iterable[str]) -> bool:
+    """Whether a fault that was found in the request came from an option."""
+    given = [pointer(option.path) for option in _given(arguments)]
+    return any(_within(at, place) or (at and _within(place, at)) for at in pointers for place in given)
+
+
+def as_options(arguments: argparse.Namespace, faults: Iterable[tuple[str, str]]) -> FormError:
+    """The same faults, with options named where they came from one."""
+    given = {pointer(option.path): option.flag for option in _given(arguments)}
+
+    def name(at: str) -> str:
+        return next((flag for place, flag in given.items() if _within(at, place)), at)
+
+    return FormError([(name(at), detail) for at, detail in faults])
+
+
+def table() -> str:
+    """The options as rows of the documentation's table."""
+    rows = []
+    for option in OPTIONS:
+        words = "" if option.leaf.is_free else ", ".join(f"`{word}`" for word in option.leaf.choices)
+        rows.append(f"| `{option.flag}` | `{'.'.join(option.path)}` | {option.help} | {words} |")
+    return "\n".join(rows)
+
+
+def _given(arguments: argparse.Namespace) -> list[Option]:
+    return [option for option in OPTIONS if hasattr(arguments, option.name)]
+
+
+def _within(at: str, section: str) -> bool:
+    return at == section or at.startswith(f"{section}/")
+
+
+def _metavar(leaf: Leaf) -> str:
+    if isinstance(leaf.default, str) and not leaf.choices:
+        return "TEXT"
+    return "LENGTH" if leaf.setting.unit == "length" else "VALUE" if leaf.choices else "N"
+
+
+def _value(text: str) -> object:
+    """A number where it reads as one, null for 'none', else the word."""
+    if text.lower() in ("none", "null"):
+        return None
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return text
+
+
+def _entry(option: Option, text: str) -> dict[str, object]:
+    """An entry of a list: a place, and the number that is wanted there."""
+    place, sign, number = text.rpartition("=")
+    parts = place.split(",")
+    if not sign or len(parts) not in (1, 3):
+        word = option.leaf.entry.upper()
+        example = f"VERTEX={word} or X,Y,Z={word}, such as {option.flag} 12=2.0944"
+        raise FormError.at(pointer(option.path), f"{option.flag} {text}: give {example}")
+    where = {"vertex": _value(place)} if len(parts) == 1 else {"point": [_value(part) for part in parts]}
+    return {**where, option.leaf.entry: _value(number)}
+
+
+def _put(body: dict[str, Any], path: Path, value: object) -> None:
+    """Set a field, without changing the sections of the body that was given; what is no section stays, to be
+    refused."""
+    for step in path[:-1]:
+        section = body.get(step)
+        if not isinstance(section, dict | None):
+            return
+        body[step] = dict(section or {})
+        body = body[step]
+    body[path[-1]] = value

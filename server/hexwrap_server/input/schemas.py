@@ -1,0 +1,165 @@
+"""Bodies of requests → settings of the solver. Every fault of form is found here and pointed at.
+
+Large arrays never pass through pydantic: ``arrays`` checks them whole. All else is checked by ``form``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Annotated, Any
+
+import numpy as np
+
+from hexwrap_server.input.arrays import Fault, faces, numbers, table
+from hexwrap_server.input.faults import escaped
+from hexwrap_server.input.form import Body, read, values
+from hexwrap_server.input.requests import SentSurface
+from hexwrap_server.problems import FormError
+from hexwrap_solver.conformal.types import BoundaryCondition
+from hexwrap_solver.pipeline import SolveSettings
+from hexwrap_solver.setting import Setting
+from hexwrap_solver.surface.types import MeshSettings, NurbsSurface, SentMesh, SurfaceSettings
+
+
+@dataclass(frozen=True)
+class NurbsForm:
+    """The part of a NURBS surface that is no large array."""
+
+    degree: Annotated[tuple[int, int], Setting("degrees in u and v", ge=1, le=25)]
+    closed: Annotated[tuple[bool, bool], Setting("whether it closes up in u and in v")] = (False, False)
+
+
+@dataclass(frozen=True)
+class Request:
+    """surface: as sent, or the id of one that was sent before."""
+
+    name: str
+    surface: SentSurface | str
+    wanted: SolveSettings
+
+
+def parse_request(body: object, max_vertices: int, max_panels: int) -> Request:
+    """Raises FormError with a JSON pointer for each fault."""
+    if not isinstance(body, dict):
+        raise FormError.at("", 'the body must be a JSON object such as {"surface": …}')
+    if "surface" not in body:
+        raise FormError.at("/surface", "'surface' is missing; it is the one field without a default")
+    asked = read(Body, {k: v for k, v in body.items() if k != "surface"})
+    surface = parse_surface(body["surface"], max_vertices, allow_id=True)
+    if isinstance(surface, SentSurface) and surface.mesh is not None:
+        _vertices_exist(asked.boundary.adapted(None), len(surface.mesh.vertices))
+    wanted = SolveSettings(**{f.name: getattr(asked, f.name) for f in fields(SolveSettings)})
+    if wanted.pattern is not None:
+        wanted = replace(wanted, pattern=replace(wanted.pattern, max_cells=max_panels))
+    return Request(asked.name, surface, wanted)
+
+
+def parse_surface(
+    surface: object, max_vertices: int, *, allow_id: bool = False, root: str = "/surface"
+) -> SentSurface | str:
+    """A mesh, a NURBS surface or an id. Raises FormError."""
+    if not isinstance(surface, dict):
+        raise FormError.at(root, "must be an object with 'vertices' and 'faces', or 'nurbs', or 'id'")
+    if allow_id and "id" in surface:
+        _known(surface, ("id",), root)
+        if not isinstance(surface["id"], str):
+            raise FormError.at(f"{root}/id", "must be the id that POST /v1/surfaces answered")
+        return surface["id"]
+    arrays = ("nurbs",) if "nurbs" in surface else ("vertices", "faces", "normals")
+    settings = surface_settings(surface, arrays, max_vertices, root)
+    if "nurbs" in surface:
+        return SentSurface(nurbs=_nurbs(surface["nurbs"], f"{root}/nurbs"), settings=settings)
+    for name in ("vertices", "faces"):
+        if name not in surface:
+            raise FormError.at(f"{root}/{name}", f"'{name}' is missing")
+    try:
+        return SentSurface(mesh=_mesh(surface, max_vertices, root), settings=settings)
+    except Fault as fault:
+        raise FormError.at(root + fault.pointer, fault.detail, fault.kind) from None
+
+
+def parse_points(body: object, dimension: int, most: int) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """(n, dimension) of a lift or flatten request. Raises FormError."""
+    if not isinstance(body, dict):
+        raise FormError.at("", 'the body must be a JSON object such as {"points": …}')
+    _known(body, ("points",), "")
+    if "points" not in body:
+        raise FormError.at("/points", "'points' is missing")
+    try:
+        return table(body["points"], "/points", dimension, most)
+    except Fault as fault:
+        raise FormError.at(fault.pointer, fault.detail, fault.kind) from None
+
+
+def surface_settings(
+    surface: dict[str, object], arrays: Sequence[str], max_vertices: int, root: str
+) -> SurfaceSettings:
+    """What is said beside the arrays. Raises FormError."""
+    own = [f.name for f in fields(SurfaceSettings) if f.name != "mesh" or "nurbs" in arrays]
+    _known(surface, (*arrays, *own), root)
+    settings = read(SurfaceSettings, {k: v for k, v in surface.items() if k in own}, root)
+    if "nurbs" not in arrays:
+        return settings
+    return replace(settings, mesh=replace(settings.mesh or MeshSettings(), max_vertices=max_vertices))
+
+
+def _mesh(surface: dict[str, object], max_vertices: int, root: str) -> SentMesh:
+    vertices = table(surface["vertices"], "/vertices", 3, max_vertices)
+    corners = faces(surface["faces"], "/faces", len(vertices), 4 * max_vertices)
+    normals = surface.get("normals")
+    if normals is None:
+        return SentMesh(vertices, corners)
+    directions = table(normals, "/normals", 3, max_vertices)
+    if len(directions) != len(vertices):
+        raise Fault(
+            "/normals", f"{len(directions)} normals for {len(vertices)} vertices; send one per vertex"
+        )
+    return SentMesh(vertices, corners, directions)
+
+
+def _nurbs(nurbs: object, root: str) -> NurbsSurface:
+    if not isinstance(nurbs, dict):
+        raise FormError.at(root, "must be an object with 'degree', 'knots' and 'control_points'")
+    large = ("knots", "control_points")
+    form = read(NurbsForm, {k: v for k, v in nurbs.items() if k not in large}, root)
+    for name in large:
+        if not isinstance(nurbs.get(name), list):
+            raise FormError.at(f"{root}/{name}", f"'{name}' must be a list")
+    knots, net = nurbs["knots"], nurbs["control_points"]
+    try:
+        if len(knots) != 2:
+            raise Fault("/knots", f"must be two lists of numbers, one per direction, not {len(knots)}")
+        u, v = (numbers(row, f"/knots/{i}", 10_000) for i, row in enumerate(knots))
+        points = _net(net)
+    except Fault as fault:
+        raise FormError.at(root + fault.pointer, fault.detail, fault.kind) from None
+    return NurbsSurface(form.degree, (u, v), points, form.closed)
+
+
+def _net(rows: list[Any]) -> np.ndarray[Any, np.dtype[np.float64]]:
+    if not rows or not isinstance(rows[0], list) or not rows[0] or not isinstance(rows[0][0], list):
+        raise Fault("/control_points", "must be rows of points [x, y, z] or [x, y, z, weight]")
+    width = 4 if len(rows[0][0]) == 4 else 3
+    lines = [table(row, f"/control_points/{i}", width, 100_000) for i, row in enumerate(rows)]
+    for i, line in enumerate(lines):
+        if len(line) != len(lines[0]):
+            raise Fault(f"/control_points/{i}", f"has {len(line)} points, the first row {len(lines[0])}")
+    net = np.stack(lines)
+    return net if width == 4 else np.concatenate([net, np.ones((*net.shape[:2], 1))], axis=2)
+
+
+def _vertices_exist(boundary: BoundaryCondition, n: int) -> None:
+    """Raises FormError where a boundary condition names a vertex that was not sent."""
+    for place, setting, value in values(boundary, ("boundary",)):
+        if setting.unit == "vertex" and value is not None and value >= n:
+            raise FormError.at(place, f"vertex {value} of a mesh of {n} vertices (0 to {n - 1})")
+
+
+def _known(given: dict[str, object], names: Sequence[str], root: str) -> None:
+    unknown = [name for name in given if name not in names]
+    if unknown:
+        known = ", ".join(f"'{n}'" for n in names)
+        raise FormError(
+            [(f"{root}/{escaped(name)}", f"unknown field; known here: {known}") for name in unknown]
+        )

@@ -1,0 +1,103 @@
+"""Where the lattice lies on the unrolled domain: a similarity under which g is a motion of the lattice."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hexwrap_solver.arrays import Complexes
+from hexwrap_solver.conformal.types import ConformalMap, Deck
+from hexwrap_solver.errors import NotAdaptedError, PatternError
+from hexwrap_solver.pattern.lattice import Isometry, Lattice
+from hexwrap_solver.pattern.types import PatternSettings
+
+#: Largest |k| of a cone angle k·π/3 or k·π/2.
+MAX_TURNS = 12
+#: Largest phase, cells.
+MAX_PHASE = 1e6
+#: A cone angle this near to such a multiple counts as one (angles typed with seven digits).
+NEARLY = 1e-6
+#: Nearer than this, a multiple needs no correction (see Deck).
+EXACT = 1e-9
+
+#: Worst ratio of singular values − 1 that an alignment may cost.
+BEARABLE = 0.5
+
+
+@dataclass(frozen=True)
+class Placement:
+    """place: (n,) the vertices of the (perhaps slightly stretched) domain, each in its own sheet, in lattice
+    units; motion: what g is there. rotation: angle from the boundary direction to an edge. around: cells
+    once around (middle ring on cones). distortion: worst ratio of singular values − 1 of the stretch. step:
+    around is one of its multiples.
+    """
+
+    place: Complexes
+    motion: Isometry
+    rotation: float
+    around: int
+    distortion: float
+    notes: tuple[str, ...]
+    step: int = 1
+
+
+def quantum_turns(cmap: ConformalMap, lattice: Lattice) -> int:
+    """k of the cone angle K = k · quantum. Raises NotAdaptedError (paper, definition 2)."""
+    quantum, K = lattice.quantum, cmap.deck.angle
+    k = round(K / quantum)
+    if abs(K - k * quantum) <= NEARLY and abs(k) <= MAX_TURNS:
+        return k
+    part = "π/3" if lattice.order == 6 else "π/2"
+    low = int(np.clip(np.floor(K / quantum), -MAX_TURNS, MAX_TURNS - 1))
+    nearest = [low * quantum, (low + 1) * quantum]
+    raise NotAdaptedError(
+        f"The cone angle is {K:.8f} rad, but a {lattice.kind} pattern closes up only where it is a multiple "
+        f"of {part}, up to {MAX_TURNS} of them; the nearest are {low}·{part} = {nearest[0]:.8f} and "
+        f"{low + 1}·{part} = {nearest[1]:.8f} rad: choose boundary angles that add up to one of them, or "
+        f"boundary.quantum {lattice.kind} for an isometric boundary.",
+        data={"cone_angle": K, "quantum": quantum, "nearest": nearest},
+    )
+
+
+def quantized(cmap: ConformalMap, lattice: Lattice) -> ConformalMap:
+    """The map with exactly the multiple as its cone angle. Near a multiple of 2π even the last of seven
+    digits would put an apex, far away, where there is only a translation."""
+    exact = quantum_turns(cmap, lattice) * lattice.quantum
+    if abs(cmap.deck.angle - exact) <= EXACT:
+        return cmap
+    return cmap.with_domain(deck=Deck(exact, cmap.deck.translation))
+
+
+def check_phase(settings: PatternSettings) -> None:
+    """Raises PatternError where a phase has no digits left behind the point."""
+    if not all(abs(part) <= MAX_PHASE for part in settings.phase):
+        raise PatternError(
+            f"The phase is {settings.phase[0]:.6g}, {settings.phase[1]:.6g} cells, but at most "
+            f"{MAX_PHASE:,.0f} are understood.",
+            field=("phase",),
+        )
+
+
+def anchor_vertex(cmap: ConformalMap) -> int:
+    """A boundary vertex that depends neither on numbering nor on the cut: the greatest (x, y, z)."""
+    rim = np.concatenate(cmap.surface.loops)
+    points = cmap.surface.vertices[rim]
+    unit = 1e-7 * float(np.ptp(cmap.surface.vertices, axis=0).max())
+    x, y, z = np.rint(points / unit).T
+    return int(rim[np.lexsort((z, y, x))[-1]])
+
+
+def edge_angle(lattice: Lattice, settings: PatternSettings) -> float:
+    """Angle from the boundary direction to an edge that is asked for, radians."""
+    if settings.rotation == "edge":
+        return 0.0
+    if settings.rotation == "vertex":
+        return lattice.quantum / 2
+    return float(np.deg2rad(float(settings.rotation)))
+
+
+def is_straight(lattice: Lattice, angle: float) -> bool:
+    """Whether edges or corners run along the boundary: only then it can be a lattice line."""
+    steps = 2 * angle / lattice.quantum
+    return bool(abs(steps - round(steps)) < 1e-9)

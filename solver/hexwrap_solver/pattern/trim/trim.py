@@ -1,0 +1,230 @@
+"""Cutting the pattern along the boundary.
+
+Near the boundary the edges of the pattern and the boundary itself are a plane graph, the *arrangement*: its
+points are nodes, places where an edge of the pattern meets the boundary, and corners of the boundary; its
+half-edges run along pattern edges, along pieces of them that lie between two places of the boundary
+("chords"), and along the boundary, inside and outside of it.
+
+Around each point the half-edges have an order. The half-edge that follows h, with the same face on its left,
+is the first one clockwise from the twin of h around the head of h:
+
+                    \\  next(h)
+                     \\
+        ---- h ----->  •          turning clockwise from twin(h), the first half-edge met is next(h)
+        <- twin(h) --  |
+
+so that faces are the cycles of h ↦ next(h). Those bounded by whole cells are known already, and the outside
+is no face; what remains are the cut cells. A cell that the boundary cuts into several pieces comes out as
+several. No place is ever compared with another: the order around points, the twins and the lattice isometries
+along half-edges are all that is needed, so that this works on nets that overlap themselves.
+
+Pieces smaller than SLIVER of a cell would be no panels. Taking away the half-edges that part such a piece
+from a cut neighbour joins the two, as it merges two faces of any plane graph. The corner at which the edge
+taken away met a straight piece of boundary then goes, too.
+
+A boundary loop that no edge of the pattern meets lies inside one cell, as a hole. Then that cell is left out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged
+from hexwrap_solver.pattern.lay.cells import Cells, WholeCells, sides_by_edge
+from hexwrap_solver.pattern.lay.edges import PatternEdges
+from hexwrap_solver.pattern.lay.layout import Layout
+from hexwrap_solver.pattern.lay.nodes import Nodes
+from hexwrap_solver.pattern.trim.arrangement import HalfEdges, Points, arrangement
+from hexwrap_solver.pattern.trim.boundary import Boundary
+
+#: Pieces smaller than this part of a cell are joined to a cut neighbour, or dropped where there is none.
+SLIVER = 0.05
+
+#: Faces thinner than this many times the tolerance, over the length of an edge, are rounding: a boundary that
+#: runs along pattern edges.
+NOTHING = 4.0
+
+
+class TooCoarse(Exception):
+    """A face of the arrangement goes around the surface: no edge of the pattern separates it from itself."""
+
+
+@dataclass(frozen=True)
+class Trimmed:
+    """cells with points as corners; whole: (c,) not cut; points; dropped: area left out, in cells; joined and
+    lost: how many pieces were joined to a neighbour or dropped."""
+
+    cells: Cells
+    whole: Bools
+    points: Points
+    dropped: float = 0.0
+    joined: int = 0
+    lost: int = 0
+
+
+def trim(layout: Layout, boundary: Boundary, nodes: Nodes, edges: PatternEdges, cells: WholeCells) -> Trimmed:
+    """Whole cells and the cells that the boundary cuts.
+
+    Raises TooCoarse where a face goes around the surface.
+    """
+    lattice = layout.lattice
+    side_of_edge = sides_by_edge(lattice, edges, cells)
+    used = side_of_edge >= 0
+    points, half_edges = arrangement(layout, boundary, nodes, edges, used)
+    faces = _trace(layout, half_edges, used)
+    area = _areas(layout, points, faces)
+    nothing, sliver = NOTHING * layout.tolerance * lattice.edge, SLIVER * lattice.cell_area
+    gone = _slivers(half_edges, faces, area, (nothing, sliver), _lengths(layout, points, half_edges))
+    joined = 0
+    if gone.any():
+        joined = int(((area > nothing) & (area < sliver)).sum())
+        half_edges = half_edges.without(gone)
+        faces = _trace(layout, half_edges, used)
+        linked = np.bincount(half_edges.tail[~half_edges.outer], minlength=len(points.face)) > 1
+        faces = faces.entries(~points.straight[faces.corner] | linked[faces.corner])
+        area = _areas(layout, points, faces)
+    small = area < sliver
+    lost = int((small & (area > nothing)).sum())
+    kept = faces.part(~small)
+    together = _together(layout, cells, side_of_edge, kept, half_edges, edges)
+    whole = np.arange(together.n) < cells.n
+    dropped = float(area[small].sum() / lattice.cell_area)
+    return Trimmed(together, whole, points, dropped, max(joined - lost, 0), lost)
+
+
+@dataclass(frozen=True)
+class _Faces:
+    """half_edge: per face, in order; isometry: aligned, (h, 4), from the tails' own coordinates to those of
+    the first one."""
+
+    half_edge: Ragged
+    isometry: Ints
+    corner: Ints
+
+    def part(self, keep: Bools) -> _Faces:
+        """Some of the faces."""
+        entry = np.repeat(keep, self.half_edge.lengths)
+        offsets = np.concatenate([[0], np.cumsum(self.half_edge.lengths[keep])])
+        half_edge = Ragged(self.half_edge.values[entry], offsets)
+        return _Faces(half_edge, self.isometry[entry], self.corner[entry])
+
+    def entries(self, keep: Bools) -> _Faces:
+        """All faces with some of their corners; the side before a corner left out goes on to the next."""
+        lengths = np.bincount(self.half_edge.row[keep], minlength=self.half_edge.n_rows)
+        offsets = np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
+        return _Faces(Ragged(self.half_edge.values[keep], offsets), self.isometry[keep], self.corner[keep])
+
+
+def _trace(layout: Layout, edges: HalfEdges, used: Bools) -> _Faces:
+    """Cycles of half-edges that bound neither a whole cell nor the outside, all walked at once."""
+    following = edges.next()
+    taken = edges.outer.copy()
+    named = edges.name >= 0
+    taken[named] |= used[edges.name[named]]
+    start = np.flatnonzero(~taken)
+    at, isometry = start.copy(), np.zeros((len(start), 4), dtype=np.int64)
+    walker = np.arange(len(start))
+    nothing = np.zeros(0, dtype=np.int64)
+    who, what, where = [nothing], [nothing], [np.zeros((0, 4), dtype=np.int64)]
+    finished = np.zeros(len(start), dtype=bool)
+    while len(walker):
+        who.append(walker)
+        what.append(at)
+        where.append(isometry)
+        isometry = layout.lattice.compose(isometry, edges.isometry[at])
+        at = following[at]
+        done = at == start[walker]
+        finished[walker[done]] = True
+        if (isometry[done, 3] != 0).any():
+            raise TooCoarse
+        going = ~done & (at > start[walker])  # each cycle is walked to its end from its lowest half-edge
+        walker, at, isometry = walker[going], at[going], isometry[going]
+    all_who = np.concatenate(who)
+    entry = np.flatnonzero(finished[all_who])
+    entry = entry[np.argsort(all_who[entry], kind="stable")]
+    lengths = np.bincount(all_who[entry], minlength=len(start))[finished]
+    half_edge = np.concatenate(what)[entry]
+    offsets = np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
+    return _Faces(Ragged(half_edge, offsets), np.concatenate(where)[entry], edges.tail[half_edge])
+
+
+def _areas(layout: Layout, points: Points, faces: _Faces) -> Floats:
+    """(f,) in lattice units."""
+    if not faces.half_edge.n_rows:
+        return np.zeros(0)
+    place = layout.lattice.carry(faces.isometry, points.place[faces.corner])
+    place = place - place[faces.half_edge.offsets[:-1]][faces.half_edge.row]
+    cross = (place.conj() * place[faces.half_edge.next()]).imag / 2
+    return np.asarray(np.add.reduceat(cross, faces.half_edge.offsets[:-1]))
+
+
+def _lengths(layout: Layout, points: Points, edges: HalfEdges) -> Floats:
+    """(h,) lengths of half-edges in lattice units."""
+    head = layout.lattice.carry(edges.isometry, points.place[edges.head])
+    return np.asarray(abs(head - points.place[edges.tail]))
+
+
+def _slivers(
+    edges: HalfEdges, faces: _Faces, area: Floats, between: tuple[float, float], length: Floats
+) -> Bools:
+    """Half-edges to take away, so that each small piece joins the cut neighbour with the longest border.
+
+    Of equal ones, the neighbour that follows along the boundary, so that nothing depends on numbering.
+    """
+    gone = np.zeros(len(edges.tail), dtype=bool)
+    face_of = np.full(len(edges.tail), -1, dtype=np.int64)
+    face_of[faces.half_edge.values] = faces.half_edge.row
+    small = (area > between[0]) & (area < between[1])
+    entry = np.flatnonzero(small[faces.half_edge.row])
+    half_edge = faces.half_edge.values[entry]
+    mine, other = faces.half_edge.row[entry], face_of[edges.twin[half_edge]]
+    fits = other >= 0
+    fits &= np.where(fits, area[other] >= between[1], False)
+    after_boundary = np.zeros(len(edges.tail), dtype=bool)
+    on_boundary = edges.outer[edges.twin[faces.half_edge.values]]
+    after_boundary[faces.half_edge.values[faces.half_edge.next()]] = on_boundary
+    mine, other, half_edge = mine[fits], other[fits], half_edge[fits]
+    pair, index = np.unique(np.stack([mine, other]), axis=1, return_inverse=True)
+    border, follows = (
+        np.bincount(index.ravel(), weights=w[half_edge], minlength=pair.shape[1])
+        for w in (length, after_boundary)
+    )
+    order = np.lexsort((-follows, -np.round(border, 7), pair[0]))
+    best = order[np.unique(pair[0][order], return_index=True)[1]]
+    away = half_edge[np.isin(index.ravel(), best)]
+    gone[away] = True
+    gone[edges.twin[away]] = True
+    return gone
+
+
+def _together(
+    layout: Layout,
+    whole: WholeCells,
+    side_of_edge: Ints,
+    cut: _Faces,
+    half_edges: HalfEdges,
+    edges: PatternEdges,
+) -> Cells:
+    """Whole and cut cells in one; twins are found by half-edges, or by the pattern edges they run along."""
+    lattice, size = layout.lattice, len(whole.direction)
+    half_edge = cut.half_edge.values
+    side_of_half = np.full(len(half_edges.tail), -1, dtype=np.int64)
+    side_of_half[half_edge] = size + np.arange(len(half_edge))
+    side_of_edge = side_of_edge.copy()
+    name = half_edges.name[half_edge]
+    side_of_edge[name[name >= 0]] = side_of_half[half_edge[name >= 0]]
+    reverse = edges.reverse(lattice, whole.corner.values.astype(np.int64), whole.direction)
+    twin_cut = side_of_half[half_edges.twin[half_edge]]
+    twin_name = half_edges.name[half_edges.twin[half_edge]]
+    twin_cut = np.where((twin_cut < 0) & (twin_name >= 0), side_of_edge[twin_name], twin_cut)
+    lengths = np.concatenate([whole.corner.lengths, cut.half_edge.lengths])
+    return Cells(
+        Ragged(
+            np.concatenate([whole.corner.values, cut.corner]),
+            np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64),
+        ),
+        np.concatenate([whole.isometry, cut.isometry]),
+        np.concatenate([side_of_edge[reverse], twin_cut]),
+    )
