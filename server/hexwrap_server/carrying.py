@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexwrap_server.curves import Curve, refined
+from hexwrap_server.curves import refined
 from hexwrap_server.local import UsageError
+from hexwrap_server.readers.drawing import Curve
 from hexwrap_solver.arrays import Complexes, Floats
 from hexwrap_solver.conformal.types import ConformalMap, Deck
 from hexwrap_solver.domain import flatten, lift

@@ -13,11 +13,12 @@ import numpy as np
 
 from hexwrap_server import wire
 from hexwrap_server.carrying import lift_curves
-from hexwrap_server.curves import Curve, rhino_curve
 from hexwrap_server.hops_components import COMPONENTS, LIFT, PANELS, HopsError
 from hexwrap_server.hops_values import output, read_inputs
 from hexwrap_server.parsing import loads, packed
+from hexwrap_server.readers.drawing import Curve
 from hexwrap_server.readers.rhino import convert
+from hexwrap_server.readers.rhino_curves import rhino_curve
 from hexwrap_server.requests import ParsedRequest, SentSurface, Wanted
 from hexwrap_server.schemas import Request, parse_request
 from hexwrap_server.work import solution_at
