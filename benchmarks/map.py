@@ -30,10 +30,10 @@ from scipy import sparse
 from hexwrap_solver.arrays import Ragged
 from hexwrap_solver.conformal import boundary, conformal_map
 from hexwrap_solver.conformal.energy import Energy
-from hexwrap_solver.conformal.factor import Factorisation
 from hexwrap_solver.conformal.newton import minimise
 from hexwrap_solver.conformal.robust import solve_with_flips
 from hexwrap_solver.conformal.types import BoundaryCondition
+from hexwrap_solver.linalg.factor import Factorisation
 from hexwrap_solver.surface import surface_from_mesh
 from hexwrap_solver.surface.types import SentMesh
 

@@ -14,13 +14,13 @@ import rhino3dm
 from ezdxf.document import Drawing as Document
 from scipy.spatial import cKDTree
 
-from hexwrap_server.curves import read_drawing
-from hexwrap_server.readers import drawing_dxf, rhino_model
-from hexwrap_server.readers.drawing import FLATNESS, Drawing, DrawingError
-from hexwrap_server.readers.drawing_3dm import read_3dm_drawing
-from hexwrap_server.readers.drawing_csv import read_csv
-from hexwrap_server.readers.drawing_dxf import read_dxf
-from hexwrap_server.readers.drawing_json import read_json
+from hexwrap_server.input.curves import read_drawing
+from hexwrap_server.input.readers import drawing_dxf, rhino_model
+from hexwrap_server.input.readers.drawing import FLATNESS, Drawing, DrawingError
+from hexwrap_server.input.readers.drawing_3dm import read_3dm_drawing
+from hexwrap_server.input.readers.drawing_csv import read_csv
+from hexwrap_server.input.readers.drawing_dxf import read_dxf
+from hexwrap_server.input.readers.drawing_json import read_json
 
 CASES = Path(__file__).parents[3] / "shared" / "cases" / "files"
 SQUARE = [[-7.208, -3.922], [5.832, -3.922], [5.832, 9.118], [-7.208, 9.118]]

@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hexwrap_server.readers.errors import UnreadableFileError
-from hexwrap_server.reading import read_surface
+from hexwrap_server.input.readers.errors import UnreadableFileError
+from hexwrap_server.input.surface_files import read_surface
 from hexwrap_solver.surface import SentMesh, surface_from_mesh
 from tests.server.test_reading import obj, off, ply
 from tests.solver.surface.shapes import triangles, tube
@@ -427,8 +427,8 @@ class Blocker(importlib.abc.MetaPathFinder):
             raise ImportError(f"{name} is not part of a plain installation")
 sys.meta_path.insert(0, Blocker())
 from pathlib import Path
-from hexwrap_server.reading import read_surface
-from hexwrap_server.curves import read_drawing
+from hexwrap_server.input.surface_files import read_surface
+from hexwrap_server.input.curves import read_drawing
 assert {"trimesh", "pytest"} <= outside, outside
 for path in map(Path, files):
     read_drawing(path) if path.stem == "drawing" else read_surface(path.read_bytes(), path.name)
@@ -438,8 +438,8 @@ print("read all")
 
 def test_a_plain_installation_reads_everything(tmp_path: Path) -> None:
     """The test extra must not hide a package that is missing."""
-    from hexwrap_server.curves import WRITERS, write_curves
-    from hexwrap_server.readers.drawing import Curve
+    from hexwrap_server.input.curves import WRITERS, write_curves
+    from hexwrap_server.input.readers.drawing import Curve
     from tests.server.test_reading import WRITERS as SURFACES
 
     project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8"))

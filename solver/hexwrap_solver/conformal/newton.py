@@ -14,7 +14,7 @@ import numpy as np
 
 from hexwrap_solver.arrays import Bools, Floats, Ints, Progress, no_progress
 from hexwrap_solver.conformal.energy import Corners, Energy
-from hexwrap_solver.conformal.factor import Factorisation
+from hexwrap_solver.linalg.factor import Factorisation
 
 MAX_STEPS = 60
 #: No single step may change a length by more than this factor's logarithm: broken triangles make Newton leap.

@@ -14,8 +14,8 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from hexwrap_solver.arrays import Floats, Progress, no_progress
-from hexwrap_solver.conformal.normal_matrix import NormalMatrix
 from hexwrap_solver.errors import ConvergenceError
+from hexwrap_solver.linalg.normal_matrix import NormalMatrix
 
 #: Mean complementarity gap and greatest infeasibility at which the search ends (figures are of order 1).
 TOLERANCE = 1e-7

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from hexwrap_solver.arrays import Floats, Ints, Progress, no_progress
-from hexwrap_solver.conformal.normal_matrix import NormalMatrix
+from hexwrap_solver.linalg.normal_matrix import NormalMatrix
 from hexwrap_solver.panels.halfedges import half_edges
 from hexwrap_solver.panels.types import Support
 from hexwrap_solver.pattern.types import Pattern

@@ -14,7 +14,6 @@ import numpy as np
 
 from hexwrap_solver.arrays import Floats, Ints, Progress
 from hexwrap_solver.conformal.energy import Energy
-from hexwrap_solver.conformal.factor import Factorisation
 from hexwrap_solver.conformal.newton import (
     CHORD_GAIN,
     CHORDS,
@@ -30,6 +29,7 @@ from hexwrap_solver.conformal.newton import (
 from hexwrap_solver.conformal.robust.metric import Metric, angle_sums, edge_weights, measure_delaunay
 from hexwrap_solver.conformal.robust.mirror import MirrorMesh
 from hexwrap_solver.errors import ConvergenceError
+from hexwrap_solver.linalg.factor import Factorisation
 
 MAX_STEPS = 200
 #: No single step may change u along an edge by more than this: Newton leaps where the Hessian is nearly

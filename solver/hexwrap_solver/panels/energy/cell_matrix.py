@@ -11,8 +11,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from hexwrap_solver.arrays import Floats, Ints
-from hexwrap_solver.conformal.factor import Factorisation
-from hexwrap_solver.conformal.normal_matrix import RIDGE
+from hexwrap_solver.linalg.factor import Factorisation
+from hexwrap_solver.linalg.normal_matrix import RIDGE
 
 
 class CellMatrix:

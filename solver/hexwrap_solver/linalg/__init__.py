@@ -1,0 +1,1 @@
+"""Sparse symmetric matrices of meshes: elimination order, Cholesky factorisation, normal equations."""
