@@ -182,7 +182,8 @@ def _binary_rows(body: bytes, at: int, element: _Element, order: str) -> tuple[_
 def _gathered(raw: NDArray[np.uint8], starts: Ints, kind: str) -> Floats:
     """The numbers that begin at these bytes."""
     size = np.dtype(kind).itemsize
-    return raw[starts[:, None] + np.arange(size)].view(kind)[:, 0].astype(np.float64)
+    numbers: Floats = raw[starts[:, None] + np.arange(size)].view(kind)[:, 0].astype(np.float64)
+    return numbers
 
 
 def _places(body: bytes, at: int, element: _Element, order: str) -> tuple[Ints, dict[int, Ints], int]:
