@@ -19,6 +19,7 @@ SurfaceError
     ├── NurbsDataError           degree, knots, weights or control points that define no surface
     ├── NotClosedError           closed in no direction, or not where it claims to be
     ├── PoleError                a boundary that shrinks to a point
+    ├── TrimError                a face whose boundary cannot be followed on its surface
     └── TooFineError             a mesh of more vertices than allowed
 """
 
@@ -102,6 +103,13 @@ class NotClosedError(SurfaceError):
 class PoleError(SurfaceError):
     slug = "nurbs-pole"
     title = "The NURBS surface shrinks to a point"
+
+
+class TrimError(SurfaceError):
+    """data["face"] is the face's number in the Brep."""
+
+    slug = "brep-trim"
+    title = "A face of the polysurface has a faulty boundary"
 
 
 class TooFineError(SurfaceError):

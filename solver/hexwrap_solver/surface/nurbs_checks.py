@@ -129,6 +129,20 @@ def _gap(nurbs: NurbsSurface, direction: int) -> float:
     return float(np.linalg.norm(low - high, axis=1).max())
 
 
+def closed_within(nurbs: NurbsSurface, tolerance: float) -> tuple[bool, bool]:
+    """Whether the two ends of u, of v are one line, to within the tolerance and not shrunk to a point."""
+    size = float(np.linalg.norm([np.ptp(x) for x in nurbs.control_points[..., :3].reshape(-1, 3).T]))
+    found = []
+    for direction in (0, 1):
+        width = domain(nurbs, direction)
+        low, high = (_line(nurbs, direction, x) for x in width)
+        across = _line(nurbs, direction, (width[0] + width[1]) / 2)
+        gap = float(np.linalg.norm(low - high, axis=1).max())
+        depth = float(np.linalg.norm(low - across, axis=1).max())
+        found.append(gap <= max(tolerance, TOLERANCE * size) and depth > 10 * gap)
+    return found[0], found[1]
+
+
 def _collapsed(nurbs: NurbsSurface, direction: int, tolerance: float) -> bool:
     """Whether a parameter line at an end of direction is a point."""
     lines = [_line(nurbs, direction, x) for x in domain(nurbs, direction)]
