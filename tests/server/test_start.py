@@ -14,7 +14,7 @@ import pytest
 from tests.server.patience import PATIENCE
 
 #: Libraries of single file formats and pictures.
-FORMATS = {"matplotlib", "ezdxf", "trimesh"}
+FORMATS = {"matplotlib", "ezdxf"}
 
 
 def environment() -> dict[str, str]:

@@ -19,7 +19,7 @@ from hexwrap_server.http import openapi
 from hexwrap_server.http.answers import JSON, json_response
 from hexwrap_server.http.bodies import sent_body
 from hexwrap_server.http.routes import JobId, service_of
-from hexwrap_server.input.recall import request_document
+from hexwrap_server.input.form import document
 
 STATIC = Path(__file__).parents[1] / "static"
 #: The page loads nothing from elsewhere, and says so to the browser.
@@ -68,7 +68,9 @@ async def job_request(request: Request, id: JobId) -> Response:
     work = service.store.work(job.identity)
     if work is None:
         raise not_found("request", "The request of this job is no longer kept.")
-    return json_response(request_document(job.name, work.surface, work.wanted))
+    asked = document(work.wanted)
+    surface = {"id": work.surface} | (asked.pop("surface") or {})
+    return json_response({"name": job.name, "surface": surface} | asked)
 
 
 @router.post("/v1/surfaces/preview", openapi_extra=openapi.PREVIEW)

@@ -11,7 +11,7 @@ from typing import Any
 import orjson
 
 from hexwrap_server.errors import FormError, NotJsonError
-from hexwrap_server.input.schemas import escaped
+from hexwrap_server.input.faults import escaped
 from hexwrap_solver.surface.errors import NonFiniteError
 
 

@@ -20,7 +20,7 @@ from hexwrap_server.jobs.worker import Report
 from hexwrap_server.problems import body_is_the_surface
 from hexwrap_server.settings import Settings
 from hexwrap_solver.surface import NurbsSurface, SentMesh, surface_from_nurbs
-from hexwrap_solver.surface.types import MeshSettings
+from hexwrap_solver.surface.types import MeshSettings, SurfaceSettings
 
 
 def read_request(report: Report, body: Body, settings: Settings, folder: str) -> ParsedRequest:
@@ -41,8 +41,7 @@ def read_surface(
     report: Report, body: Body, settings: Settings, folder: str, caching: CacheSettings
 ) -> Intake:
     """JSON → checked surface. Raises FormError, HttpError, SurfaceError, StorageError."""
-    sent = parse_surface(loads(body.plain(settings.max_body_mib)), settings.max_vertices, root="")
-    assert isinstance(sent, SentSurface)
+    sent = parse_surface(loads(body.plain(settings.max_body_mib)), settings.max_vertices)
     return _checked(report, sent, folder, caching)
 
 
@@ -62,7 +61,8 @@ def read_upload(
     """
     read = _file(body, settings, content_type, name)
     if isinstance(read, NurbsSurface):
-        sent = SentSurface(nurbs=read, meshing=MeshSettings(max_vertices=settings.max_vertices))
+        meshing = MeshSettings(max_vertices=settings.max_vertices)
+        sent = SentSurface(nurbs=read, settings=SurfaceSettings(meshing))
     else:
         sent = SentSurface(mesh=read)
     return _checked(report, sent, folder, caching)
@@ -92,7 +92,7 @@ def _file(body: Body, settings: Settings, content_type: str, name: str) -> SentM
 
 def _checked(report: Report, sent: SentSurface, folder: str, caching: CacheSettings) -> Intake:
     runner = CachingRunner(stages(caching), report)
-    surface = runner("surface", codec.digest(sent), lambda progress: take_in(sent))
+    surface = runner("surface", (codec.digest(sent), None), lambda progress: take_in(sent))
     loops = [surface.input_vertex[loop].tolist() for loop in surface.loops]
     answer = {
         "vertices": len(surface.vertices),

@@ -21,7 +21,7 @@ from hexwrap_server.output import wire
 from hexwrap_server.output.writers import WRITERS, Meta
 from hexwrap_solver import pipeline
 from hexwrap_solver.surface import surface_from_mesh, surface_from_nurbs
-from hexwrap_solver.surface.types import Surface
+from hexwrap_solver.surface.types import Surface, SurfaceSettings
 
 #: Finished solutions that a worker keeps for lift, flatten and files.
 KEPT_SOLUTIONS = 4
@@ -68,22 +68,17 @@ def _staged(
 ) -> pipeline.Solution:
     """sent: asked only where the checked surface is not remembered."""
     return pipeline.solve(
-        lambda: take_in(sent()),
-        wanted.boundary,
-        wanted.pattern,
-        wanted.panels,
-        runner,
-        source=surface_id,
-        with_support=wanted.support,
+        lambda: take_in(sent(), wanted.surface), wanted, runner, source=(surface_id, wanted.surface)
     )
 
 
-def take_in(sent: SentSurface) -> Surface:
-    """Raises SurfaceError."""
+def take_in(sent: SentSurface, asked: SurfaceSettings | None = None) -> Surface:
+    """asked: instead of the settings that were sent along. Raises SurfaceError."""
+    settings = asked or sent.settings or SurfaceSettings()
     if sent.mesh is not None:
         return surface_from_mesh(sent.mesh)
     assert sent.nurbs is not None
-    return surface_from_nurbs(sent.nurbs, sent.meshing)
+    return surface_from_nurbs(sent.nurbs, settings.mesh)
 
 
 def result_parts(report: Report, path: str, names: list[str], timings: dict[str, float]) -> bytes:
