@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import PurePath
-from typing import Any
+from typing import Any, TypeVar
 
 from hexwrap_server.input.choose import Chosen, choose, rows
 from hexwrap_server.input.readers.errors import FileTypeError, UnreadableFileError
@@ -19,7 +19,10 @@ from hexwrap_server.input.readers.stl import read_stl
 from hexwrap_server.input.requests import SentSurface
 from hexwrap_solver.errors import SurfaceError
 from hexwrap_solver.surface import NurbsSurface, SentMesh
+from hexwrap_solver.surface.brep import Brep
 from hexwrap_solver.surface.types import MeshSettings, Origin, SurfaceSettings
+
+T = TypeVar("T")
 
 #: Suffix → reader.
 READERS: dict[str, Callable[[bytes], FileContent]] = {
@@ -63,25 +66,23 @@ def sent_surface(
     chosen = _guarded(
         data, filename, lambda _: choose(content, settings.object, settings.layer, settings.unit)
     )
-    mesh = replace(settings.mesh or MeshSettings(), max_vertices=max_vertices)
     first = chosen.used[0]
-    sent = SentSurface(
-        settings=replace(settings, object=None, layer=None, unit=settings.unit or content.unit, mesh=mesh),
-        told=chosen.told,
-        origin=Origin(first.name, first.layer, tuple(sorted(first.attributes.items()))),
-        tolerance=content.tolerance,
-    )
     geometry = chosen.geometry
-    if isinstance(geometry, SentMesh):
-        sent = replace(sent, mesh=geometry, settings=replace(sent.settings, mesh=settings.mesh))
-    elif isinstance(geometry, NurbsSurface):
-        sent = replace(sent, nurbs=geometry)
-    else:
-        sent = replace(sent, brep=geometry)
+    meshing = replace(settings.mesh or MeshSettings(), max_vertices=max_vertices)
+    sent = SentSurface(
+        mesh=geometry if isinstance(geometry, SentMesh) else None,
+        nurbs=geometry if isinstance(geometry, NurbsSurface) else None,
+        brep=geometry if isinstance(geometry, Brep) else None,
+        settings=None if isinstance(geometry, SentMesh) else replace(settings, mesh=meshing),
+        unit=settings.unit or content.unit,
+        tolerance=content.tolerance,
+        origin=Origin(first.name, first.layer, tuple(sorted(first.attributes.items()))),
+        told=chosen.told,
+    )
     return FromFile(sent, rows(content.objects, chosen.used))
 
 
-def _guarded[T](data: bytes, filename: str, read: Callable[[str], T]) -> T:
+def _guarded(data: bytes, filename: str, read: Callable[[str], T]) -> T:
     suffix = PurePath(filename).suffix.lower()
     if suffix not in READERS:
         raise FileTypeError(

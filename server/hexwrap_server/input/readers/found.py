@@ -42,8 +42,8 @@ class Found:
 
 @dataclass(frozen=True)
 class FileContent:
-    """unit: ``m``, ``cm``, ``mm``, ``ft``, ``in`` or None. tolerance: of the file, in its unit; None where the
-    format has none. others: what else is there, by kind.
+    """unit: ``m``, ``cm``, ``mm``, ``ft``, ``in`` or None. tolerance: of the file, in its unit; None where
+    the format has none. others: what else is there, by kind.
 
     mesh, owner: where the objects are faces (m,) of one table of vertices, the whole table; its vertices keep
     their numbers whatever is chosen. is_whole: the mesh is one object, and known to be one piece.

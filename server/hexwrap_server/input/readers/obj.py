@@ -47,7 +47,7 @@ def read_obj(data: bytes) -> FileContent:
 
 
 def _groups(lines: list[bytes], kinds: list[bytes], at_face: Ints) -> tuple[list[tuple[str, str]], Ints]:
-    """Name and group of every object, and the object of each face; the group alone where no object is named."""
+    """Name and group of every object (its name is the group's where it has none), and each face's object."""
     labels = []
     for marks in ((b"o ", b"o\t"), (b"g ", b"g\t")):
         at = [i for i, kind in enumerate(kinds) if kind in marks]

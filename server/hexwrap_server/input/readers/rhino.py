@@ -113,7 +113,9 @@ def convert(geometry: Any, tolerance: float = 0.0) -> Geometry:
     if isinstance(geometry, rhino3dm.SubD):
         mesh = subd_mesh(geometry)
         if mesh is None:
-            raise UnreadableFileError("The SubD cannot be subdivided: convert it with Rhino's ToNURBS command.")
+            raise UnreadableFileError(
+                "The SubD cannot be subdivided: convert it with Rhino's ToNURBS command."
+            )
         return _mesh(mesh)
     if isinstance(geometry, rhino3dm.Extrusion):
         geometry = geometry.ToBrep(True) or geometry
