@@ -23,7 +23,7 @@ from hexwrap_server.problems import FormError, body_is_the_surface
 from hexwrap_solver import pipeline
 from hexwrap_solver.errors import HexwrapError
 from hexwrap_solver.pipeline import SolveSettings
-from hexwrap_solver.surface import surface_from_mesh, surface_from_nurbs
+from hexwrap_solver.surface import surface_from_mesh, surface_from_nurbs, with_openings
 from hexwrap_solver.surface.types import Surface
 
 #: Of this worker process.
@@ -97,7 +97,7 @@ def _staged(
 def take_in(sent: SentSurface) -> Surface:
     """Raises SurfaceError."""
     if sent.mesh is not None:
-        return surface_from_mesh(sent.mesh)
+        return with_openings(surface_from_mesh(sent.mesh), sent.settings.openings)
     assert sent.nurbs is not None
     return surface_from_nurbs(sent.nurbs, sent.settings.mesh)
 
