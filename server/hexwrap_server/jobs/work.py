@@ -24,7 +24,7 @@ from hexwrap_server.problems import FormError, body_is_the_surface
 from hexwrap_solver import pipeline
 from hexwrap_solver.arrays import Ragged
 from hexwrap_solver.errors import HexwrapError
-from hexwrap_solver.surface import SentMesh, surface_from_mesh, surface_from_nurbs
+from hexwrap_solver.surface import SentMesh, surface_from_mesh, surface_from_nurbs, with_openings
 from hexwrap_solver.surface.brep import mesh_brep
 from hexwrap_solver.surface.types import Origin, Surface, SurfaceSettings
 
@@ -97,12 +97,11 @@ def take_in(sent: SentSurface, asked: SurfaceSettings | None = None) -> Surface:
     """asked: instead of the settings that were sent along. Raises SurfaceError."""
     settings = asked or sent.settings or SurfaceSettings()
     if sent.mesh is not None:
-        surface = surface_from_mesh(sent.mesh)
+        surface = with_openings(surface_from_mesh(sent.mesh), settings.openings)
     elif sent.brep is not None:
         meshed = mesh_brep(sent.brep, settings.mesh)
-        surface = surface_from_mesh(
-            SentMesh(meshed.vertices, Ragged.from_table(meshed.faces), meshed.normals)
-        )
+        mesh = SentMesh(meshed.vertices, Ragged.from_table(meshed.faces), meshed.normals)
+        surface = with_openings(surface_from_mesh(mesh), settings.openings)
     else:
         assert sent.nurbs is not None
         surface = surface_from_nurbs(sent.nurbs, settings.mesh)
