@@ -7,6 +7,7 @@
     │   ├── SettingError        settings that contradict each other
     │   ├── GaussBonnetError    boundary angles that no surface can have, equation (1)
     │   ├── BoundaryError       a boundary vertex or angle that cannot be used
+    │   ├── SingularitiesError   singularities that are missing, or that no such surface can have
     │   ├── NotAdaptedError     cone angle no multiple of the pattern's quantum, definition 2
     │   ├── PatternError        no pattern of that size, kind or place fits
     │   └── PanelsError         no panels under those conditions
@@ -85,6 +86,11 @@ class GaussBonnetError(RequestError):
 class BoundaryError(RequestError):
     slug = "boundary"
     title = "A boundary condition cannot be used"
+
+
+class SingularitiesError(RequestError):
+    slug = "singularities"
+    title = "The singularities do not suit the surface"
 
 
 class NotAdaptedError(RequestError):
