@@ -244,7 +244,8 @@ def _smoothed(patch: Patch, piece: Piece) -> Piece:
     near = np.zeros(n, dtype=bool)
     near[poor] = True
     near[piece.faces[near[piece.faces].any(axis=1)]] = True
-    near[piece.faces[piece.loose.any(axis=1)[piece.faces].any(axis=1)]] = False
+    pole = np.logical_or(*piece.loose.T)
+    near[piece.faces[pole[piece.faces].any(axis=1)]] = False
     move = np.flatnonzero(near & ~piece.fixed)
     if len(move) == 0:
         return piece

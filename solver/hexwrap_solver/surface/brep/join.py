@@ -114,8 +114,12 @@ def _divided(brep: Brep, tolerance: float) -> Brep:
         edge = brep.edges[e]
         points = evaluate_curve(edge.curve, places(edge))[0]
         reach = float(np.linalg.norm(np.diff(points, axis=0), axis=1).max()) + tolerance
-        near = {i for found in tree.query_ball_point(points, reach) for i in found}
-        other = np.array(sorted(set(ends[sorted(near)].tolist()) - {edge.start, edge.end}), dtype=np.int64)
+        near = np.unique(
+            np.concatenate(
+                [np.asarray(x, dtype=np.int64) for x in tree.query_ball_point(points, reach).tolist()]
+            )
+        )
+        other = np.setdiff1d(ends[near], [edge.start, edge.end])
         if len(other) == 0:
             continue
         t, distance = nearest_on(edge, brep.vertices[other])
