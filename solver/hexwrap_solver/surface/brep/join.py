@@ -116,7 +116,7 @@ def _divided(brep: Brep, tolerance: float) -> Brep:
         reach = float(np.linalg.norm(np.diff(points, axis=0), axis=1).max()) + tolerance
         near = np.unique(
             np.concatenate(
-                [np.asarray(x, dtype=np.int64) for x in tree.query_ball_point(points, reach).tolist()]
+                [np.asarray(x, dtype=np.int64) for x in list(tree.query_ball_point(points, reach))]
             )
         )
         other = np.setdiff1d(ends[near], [edge.start, edge.end])
