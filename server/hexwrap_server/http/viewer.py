@@ -19,7 +19,7 @@ from hexwrap_server.http import openapi
 from hexwrap_server.http.answers import JSON, json_response
 from hexwrap_server.http.bodies import sent_body
 from hexwrap_server.http.routes import JobId, service_of
-from hexwrap_server.input.form import document
+from hexwrap_server.input.form import Body, document, schema
 
 STATIC = Path(__file__).parents[1] / "static"
 #: The page loads nothing from elsewhere, and says so to the browser.
@@ -42,6 +42,12 @@ async def page() -> Response:
     return FileResponse(
         STATIC / "index.html", headers={"Content-Security-Policy": POLICY, "Cache-Control": "no-cache"}
     )
+
+
+@router.get("/v1/settings", openapi_extra=openapi.SETTINGS)
+async def settings() -> Response:
+    """JSON Schema of a request but for the arrays of its surface, with help, units and bounds: for forms."""
+    return json_response(schema(Body))
 
 
 @router.get("/v1/samples", openapi_extra=openapi.SAMPLES)

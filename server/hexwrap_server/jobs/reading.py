@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import orjson
 
-from hexwrap_server.errors import TooManyVerticesError
 from hexwrap_server.input.bodies import Body
 from hexwrap_server.input.json_text import loads
 from hexwrap_server.input.requests import CacheSettings, Intake, ParsedRequest, SentSurface
 from hexwrap_server.input.schemas import Request, parse_request, parse_surface
+from hexwrap_server.input.surface_files import FromFile
 from hexwrap_server.input.uploads import sent_file
 from hexwrap_server.jobs import codec
 from hexwrap_server.jobs.cache import CachingRunner
@@ -19,8 +20,6 @@ from hexwrap_server.jobs.work import stages, take_in
 from hexwrap_server.jobs.worker import Report
 from hexwrap_server.problems import body_is_the_surface
 from hexwrap_server.settings import Settings
-from hexwrap_solver.surface import NurbsSurface, SentMesh, surface_from_nurbs
-from hexwrap_solver.surface.types import MeshSettings, SurfaceSettings
 
 
 def read_request(report: Report, body: Body, settings: Settings, folder: str) -> ParsedRequest:
@@ -55,39 +54,31 @@ def read_upload(
     content_type: str,
     name: str,
 ) -> Intake:
-    """A file sent raw (with its name) or in a form → checked surface.
+    """A file sent raw (with its name) or in a form → checked surface, with the objects of the file.
 
-    Raises UploadError, HttpError, SurfaceError, StorageError.
+    Fields of the form choose among these, as ``surface.object`` and the like do. Raises UploadError, HttpError,
+    SurfaceError, StorageError.
     """
     read = _file(body, settings, content_type, name)
-    if isinstance(read, NurbsSurface):
-        meshing = MeshSettings(max_vertices=settings.max_vertices)
-        sent = SentSurface(nurbs=read, settings=SurfaceSettings(meshing))
-    else:
-        sent = SentSurface(mesh=read)
-    return _checked(report, sent, folder, caching)
+    intake = _checked(report, read.sent, folder, caching)
+    return replace(intake, answer=intake.answer | {"objects": read.objects})
 
 
 @body_is_the_surface(is_file=True)
 def preview(report: Report, body: Body, settings: Settings, content_type: str, name: str) -> bytes:
     """Vertices and faces of a file as JSON, unchecked. Raises UploadError, HttpError, SurfaceError."""
-    read = _file(body, settings, content_type, name)
-    if isinstance(read, NurbsSurface):
-        meshed = surface_from_nurbs(read, MeshSettings(max_vertices=settings.max_vertices))
+    sent = _file(body, settings, content_type, name).sent
+    if sent.mesh is None:
+        meshed = take_in(sent)
         vertices, faces = meshed.vertices, meshed.faces.tolist()
     else:
-        vertices, faces = read.vertices, read.faces.to_lists()
+        vertices, faces = sent.mesh.vertices, sent.mesh.faces.to_lists()
     return orjson.dumps({"vertices": vertices, "faces": faces}, option=orjson.OPT_SERIALIZE_NUMPY)
 
 
-def _file(body: Body, settings: Settings, content_type: str, name: str) -> SentMesh | NurbsSurface:
-    read = sent_file(body.plain(settings.max_body_mib), content_type, name, settings.max_body_mib)
-    if isinstance(read, SentMesh) and len(read.vertices) > settings.max_vertices:
-        raise TooManyVerticesError(
-            f"The file holds {len(read.vertices)} vertices, this server takes at most "
-            f"{settings.max_vertices}; send a coarser mesh, or start the server with a larger --max-vertices."
-        )
-    return read
+def _file(body: Body, settings: Settings, content_type: str, name: str) -> FromFile:
+    data = body.plain(settings.max_body_mib)
+    return sent_file(data, content_type, name, settings.max_vertices, settings.max_body_mib)
 
 
 def _checked(report: Report, sent: SentSurface, folder: str, caching: CacheSettings) -> Intake:
@@ -99,6 +90,8 @@ def _checked(report: Report, sent: SentSurface, folder: str, caching: CacheSetti
         "faces": len(surface.faces),
         "loops": loops,
         "repairs": list(surface.repairs),
+        "unit": surface.unit,
+        "objects": [],
     }
     return Intake(_keep(sent, folder), answer)
 

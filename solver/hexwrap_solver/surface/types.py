@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 
-from hexwrap_solver.arrays import Floats, Ints, Ragged
+from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged
 from hexwrap_solver.setting import Setting
 from hexwrap_solver.surface.closest import TriangleTree
 from hexwrap_solver.surface.topology import edge_groups, edge_lengths, half_edges, twins_of
+
+Openings = Literal["cut", "loop"]
 
 
 @dataclass(frozen=True)
@@ -47,9 +49,41 @@ class MeshSettings:
 
 @dataclass(frozen=True)
 class SurfaceSettings:
-    """How a sent surface is taken in."""
+    """How a sent surface is taken in.
+
+    openings ``cut``: loops beyond the two longest are filled smoothly, mapped as wall, and cut out again.
+    ``loop``: each is a boundary of its own.
+    """
 
     mesh: Annotated[MeshSettings | None, Setting("how a NURBS surface is meshed", rare=True)] = None
+    openings: Annotated[
+        Openings, Setting("what loops beyond the two longest are: holes to cut out, or boundaries")
+    ] = "cut"
+    unit: Annotated[
+        Literal["m", "cm", "mm", "ft", "in"] | None,
+        Setting("unit of lengths; a file's own, where it has one, if it is not given"),
+    ] = None
+    object: Annotated[
+        str | None,
+        Setting(
+            "which object of a file is meant: name, id or number; * and ? stand for any letters", most=400
+        ),
+    ] = None
+    layer: Annotated[
+        str | None,
+        Setting(
+            "which layer of a file is meant, with those below it: path or name, also with * and ?", most=400
+        ),
+    ] = None
+
+
+@dataclass(frozen=True)
+class Origin:
+    """What the surface was called where it comes from. attributes: further (key, value) pairs."""
+
+    name: str = ""
+    layer: str = ""
+    attributes: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -113,8 +147,12 @@ class Surface(Triangles):
     vertex_of_input: (n_sent,) the vertex at which each sent vertex stands, or −1 where it was dropped.
     normals: (n, 3) unit vertex normals (sent ones, the NURBS surface's, or area-weighted face normals).
     repairs: one sentence each.
+    openings: so many loops, the last ones, are openings of the wall: the map is found with them filled, and
+    they are cut out of it. patch: (m,) on a filled surface, the faces that fill openings; None if there
+    are none.
     nurbs, parameters: the NURBS surface the mesh was made from, and (n, 2) its parameters at the
     vertices (in the closed direction, parameters are in the base period); None for sent meshes.
+    unit: of lengths, None where it is not known. origin: names it came with.
     """
 
     loops: tuple[Ints, ...]
@@ -124,12 +162,21 @@ class Surface(Triangles):
     repairs: tuple[str, ...] = ()
     nurbs: NurbsSurface | None = None
     parameters: Floats | None = None
+    openings: int = 0
+    patch: Bools | None = None
+    unit: str | None = None
+    origin: Origin = field(default_factory=Origin)
 
     def knowing(self, mesh: Triangles) -> Surface:
         """The surface itself, told what is known of the same triangles by other names of their vertices."""
         known = ("edge_groups", "twin", "lengths")
         self.__dict__.update({name: mesh.__dict__[name] for name in known if name in mesh.__dict__})
         return self
+
+    @property
+    def boundary(self) -> Ints:
+        """(b,) the vertices of all loops."""
+        return np.concatenate([np.zeros(0, dtype=np.int64), *self.loops])
 
     @cached_property
     def tree(self) -> TriangleTree:
