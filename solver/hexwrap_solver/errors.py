@@ -6,6 +6,7 @@
     ├── RequestError            the surface is fine, what is asked of it is not
     │   ├── GaussBonnetError    boundary angles that no surface can have, equation (1)
     │   ├── BoundaryError       a boundary vertex or angle that cannot be used
+    │   ├── SingularitiesError   singularities that are missing, or that no such surface can have
     │   ├── NotAdaptedError     cone angle no multiple of the pattern's quantum, definition 2
     │   ├── PatternError        no pattern of that size, kind or place fits
     │   └── PanelsError         no panels under those conditions
@@ -83,6 +84,12 @@ class BoundaryError(RequestError):
     slug = "boundary"
     title = "A boundary condition cannot be used"
     default_field = ("boundary",)
+
+
+class SingularitiesError(RequestError):
+    slug = "singularities"
+    title = "The singularities do not suit the surface"
+    default_field = ("singularities",)
 
 
 class NotAdaptedError(RequestError):
