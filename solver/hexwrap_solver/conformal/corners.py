@@ -11,7 +11,9 @@ from hexwrap_solver.arrays import Bools, Floats, Ints
 from hexwrap_solver.conformal.boundary import gauss_bonnet, rounded_jointly
 from hexwrap_solver.conformal.types import (
     ANGLE_UNITS,
+    QUANTA,
     AngleUnit,
+    BoundaryAngle,
     BoundaryCondition,
     BoundaryMode,
     Cones,
@@ -63,30 +65,24 @@ def boundary_angles(
     total = gauss_bonnet(surface) - (0.0 if cones is None else float(cones.curvature.sum()))
     if abs(sum(sums) - total) > GAUSS_BONNET_TOLERANCE:
         raise _gauss_bonnet_error(surface, listed, sums, total, cones, condition)
-    return _close(surface, target, given, sums, total, condition.quantum)
+    return _close(surface, target, given, sums, total, QUANTA.get(condition.quantum))
 
 
 def _listed(surface: Surface, condition: BoundaryCondition) -> _Listed:
     """The listed angles of the whole boundary and of single loops."""
-    lists: list[tuple[Field, BoundaryCondition | LoopCondition]] = []
+    lists: list[tuple[Field, tuple[BoundaryAngle, ...]]] = []
     if condition.mode == "angles":
-        lists.append((("boundary", "angles"), condition))
+        lists.append((("angles",), condition.angles))
     lists += [
-        (("boundary", "loops", i, "angles"), single)
+        (("loops", i, "angles"), single.angles)
         for i, single in enumerate(condition.loops)
         if single.mode == "angles"
     ]
-    vertices, angles, fields = [np.zeros(0, dtype=np.int64)], [np.zeros(0)], []
-    for prefix, one in lists:
-        angle = np.zeros(0) if one.angles is None else np.asarray(one.angles, dtype=float)
-        field = [(*prefix, i) for i in range(len(angle))]
-        _check_angles(angle, condition.unit, field)
-        vertices.append(_place(surface, one, field))
-        angles.append(angle)
-        fields += field
-    placed = np.concatenate(vertices)
-    _check_distinct(surface, placed, fields)
-    return _Listed(placed, np.concatenate(angles), fields)
+    entries = tuple(entry for _, some in lists for entry in some)
+    field = [(*prefix, i) for prefix, some in lists for i in range(len(some))]
+    angle = np.array([entry.angle for entry in entries], dtype=float)
+    _check_angles(angle, condition.angle_unit, field)
+    return _Listed(_place(surface, entries, field), angle, field)
 
 
 def _modes(surface: Surface, condition: BoundaryCondition, given: Bools) -> list[BoundaryMode]:
@@ -106,11 +102,11 @@ def _loop_meant(surface: Surface, one: LoopCondition, i: int) -> int:
         loop = np.repeat(np.arange(count), [len(loop) for loop in surface.loops])
         distance = np.linalg.norm(surface.vertices[np.concatenate(surface.loops)] - one.point, axis=1)
         return int(loop[np.argmin(distance)])
-    if not 0 <= one.loop < count:
+    if one.loop is None or one.loop >= count:
         raise BoundaryError(
             f"Loop {one.loop} is asked for, but the surface has {count} boundary "
             f"{'loop' if count == 1 else 'loops'}, numbered from 0.",
-            field=("boundary", "loops", i, "loop"),
+            field=("loops", i, "loop"),
         )
     return one.loop
 
@@ -132,20 +128,22 @@ def _check_angles(angles: Floats, unit: AngleUnit, field: list[Field]) -> None:
         )
 
 
-def _place(surface: Surface, one: BoundaryCondition | LoopCondition, field: list[Field]) -> Ints:
+def _place(surface: Surface, entries: tuple[BoundaryAngle, ...], field: list[Field]) -> Ints:
     """(k,) mesh vertices the listed angles belong to."""
-    k = len(field)
-    if k and not surface.loops:
+    if entries and not surface.loops:
         raise BoundaryError(
-            f"{k} boundary angles are listed, but the surface is closed: it has no boundary.", field=field[0]
+            f"{len(entries)} boundary angles are listed, but the surface is closed: it has no boundary.",
+            field=field[0],
         )
-    sent = np.full(k, -1, dtype=np.int64) if one.vertices is None else np.asarray(one.vertices)
-    by_point = sent < 0
-    placed = np.zeros(k, dtype=np.int64)
-    placed[~by_point] = _of_sent(surface, sent, np.flatnonzero(~by_point), field)
-    if by_point.any():
-        points = np.full((k, 3), np.nan) if one.points is None else np.asarray(one.points)
-        placed[by_point] = _nearest(surface, points, np.flatnonzero(by_point), field)
+    placed = np.zeros(len(entries), dtype=np.int64)
+    sent = np.array([entry.vertex or 0 for entry in entries], dtype=np.int64)
+    points = np.array([entry.point or (np.nan,) * 3 for entry in entries], dtype=float).reshape(-1, 3)
+    is_named = np.array([entry.vertex is not None for entry in entries], dtype=bool)
+    named, by_point = np.flatnonzero(is_named), np.flatnonzero(~is_named)
+    placed[named] = _of_sent(surface, sent, named, field)
+    if len(by_point):
+        placed[by_point] = _nearest(surface, points, by_point, field)
+    _check_distinct(surface, placed, field)
     return placed
 
 
@@ -154,7 +152,7 @@ def _of_sent(surface: Surface, sent: Ints, entries: Ints, field: list[Field]) ->
     if not len(entries):
         return entries
     wanted = sent[entries]
-    unknown = entries[wanted >= len(surface.vertex_of_input)]
+    unknown = entries[(wanted < 0) | (wanted >= len(surface.vertex_of_input))]
     if len(unknown):
         raise BoundaryError(
             f"Boundary angle {field[unknown[0]][-1]} names vertex {sent[unknown[0]]}, but only vertices 0 to "
@@ -190,8 +188,7 @@ def _nearest(surface: Surface, points: Floats, entries: Ints, field: list[Field]
     bad = entries[~np.isfinite(points[entries]).all(axis=1)]
     if len(bad):
         raise BoundaryError(
-            f"Boundary angle {field[bad[0]][-1]} names neither a vertex nor a point with three finite "
-            "coordinates.",
+            f"The point of boundary angle {field[bad[0]][-1]} has coordinates that are not finite numbers.",
             field=(*field[bad[0]], "point"),
         )
     boundary = np.concatenate(surface.loops)
@@ -259,7 +256,7 @@ def _gauss_bonnet_error(
     condition: BoundaryCondition,
 ) -> BoundaryError | GaussBonnetError | SingularitiesError:
     """What is missing, and an example that would close it."""
-    unit, vertices, angles = condition.unit, listed.vertex, listed.angle
+    unit, vertices, angles = condition.angle_unit, listed.vertex, listed.angle
     if not surface.loops or (not len(angles) and (len(surface.loops) == 1 or cones is not None)):
         return _topology_error(surface, total, cones)
     missing = sum(sums) - total  # angles must grow by this much in total
@@ -294,6 +291,7 @@ def _gauss_bonnet_error(
         f"The boundary curvatures π − θ add up to {told}; {wanted}, so the angles must add up to "
         f"{_told(abs(missing), unit)} {'more' if missing > 0 else 'less'}: {sentence}.",
         vertices=surface.input_vertex[vertices],
+        field=("angles",),
         data={"loop_sums": sums, "missing": missing, "example": example, "example_unit": unit},
     )
 
@@ -309,8 +307,8 @@ def _topology_error(
     if cones:
         return SingularitiesError(
             f"The singularities have indices that add up to {int(cones.index.sum())}, but "
-            f"{'a closed surface needs' if not loops else 'straight boundaries need'} {wanted} in multiples of "
-            f"{np.degrees(quantum):.4g}° (Gauss–Bonnet): add or change singularities until they do"
+            f"{'a closed surface needs' if not loops else 'straight boundaries need'} {wanted}, in multiples "
+            f"of {np.degrees(quantum):.4g}° (Gauss–Bonnet): add or change singularities until they do"
             f"{', or ask for an isometric boundary' if loops else ''}.",
             data={**data, "indices": int(cones.index.sum())},
         )
@@ -324,7 +322,7 @@ def _topology_error(
         "A surface with one boundary loop cannot have a straight boundary: its boundary must turn by 360° in "
         "all. Ask for an isometric boundary, list corners (mode angles; for example four of 90°, or six of "
         f"120°), or place singularities whose indices add up to {wanted}.",
-        field=("boundary", "mode"),
+        field=("mode",),
         data={"loop_sums": [0.0], "missing": -total},
     )
 

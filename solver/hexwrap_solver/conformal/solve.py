@@ -17,6 +17,7 @@ from hexwrap_solver.conformal.orientation import faithful, positive
 from hexwrap_solver.conformal.robust import FlatMetric, metric_with_flips, solve_with_flips, with_inserted
 from hexwrap_solver.conformal.span import MAX_SPAN, check_reach, check_span, cone_angle_of
 from hexwrap_solver.conformal.types import (
+    QUANTA,
     BoundaryCondition,
     Cones,
     ConformalMap,
@@ -56,7 +57,7 @@ def conformal_map(
         targets = boundary.targets(surface, [a for a in angles if a is not None], cones)
         found = map_to(surface, targets, cones, None, progress)
         found = scaled(found, -_mean_on_area(found.surface, found.log_scale))
-    if condition.mode == "angles" and (condition.angles is None or not len(condition.angles)):
+    if condition.mode == "angles" and not condition.angles:
         found = replace(found, notes=(NO_ANGLES, *found.notes))
     return found
 
@@ -73,7 +74,7 @@ def check_cones(surface: Surface, cones: Cones) -> None:
             f"Singularity {outside[0]} stands at vertex {sent[outside[0]]} of the boundary: singularities "
             "lie inside; list an angle there instead.",
             vertices=sent[outside],
-            field=("singularities", "at", int(outside[0])),
+            field=("at", int(outside[0])),
         )
     if len(np.unique(cones.vertex)) < len(cones):
         raise SingularitiesError("Two singularities stand at one vertex of the mesh; place them apart.")
@@ -84,7 +85,7 @@ def check_cones(surface: Surface, cones: Cones) -> None:
             f"angle of 360° around it; with a quantum of {np.degrees(cones.quantum):.4g}° it must be less "
             f"than {round(2 * np.pi / cones.quantum)}.",
             vertices=sent[sharp],
-            field=("singularities", "at", int(sharp[0]), "index"),
+            field=("at", int(sharp[0]), "index"),
         )
 
 
@@ -104,7 +105,7 @@ def _isometric(
     targets = boundary.targets(surface, asked, cones)
     total = boundary.gauss_bonnet(surface) - float(cones.curvature.sum())
     total -= sum(boundary.cone_angle(listed) for listed in angles if listed is not None)
-    quantum = condition.quantum
+    quantum = QUANTA.get(condition.quantum)
     if quantum is None or len(free) == 1:  # what Gauss–Bonnet leaves to a single loop cannot be rounded
         found = map_to(surface, targets, cones, None, progress)
         return found if quantum is None else scaled(found, -_mean_on(found, free))

@@ -5,17 +5,41 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 
 from hexwrap_solver.arrays import Complexes, Floats, Ints
 from hexwrap_solver.conformal.net import Net
+from hexwrap_solver.errors import SettingError
+from hexwrap_solver.setting import Setting
 from hexwrap_solver.surface.types import Surface
 
 AngleUnit = Literal["rad", "deg", "pi"]
 #: Radians of one unit.
 ANGLE_UNITS: dict[AngleUnit, float] = {"rad": 1.0, "deg": np.pi / 180, "pi": np.pi}
+Quantum = Literal["auto", "hex", "triangle", "quad", "none"]
+#: Names of the quanta (π/3 and π/2) that the cone angle of a pattern must be a multiple of.
+QUANTUM_OF: dict[str, Quantum] = {"hex": "hex", "triangle": "hex", "quad": "quad"}
+QUANTA: dict[Quantum, float] = {"hex": np.pi / 3, "triangle": np.pi / 3, "quad": np.pi / 2}
+
+
+@dataclass(frozen=True)
+class BoundaryAngle:
+    """A target angle sum, radians, at a boundary vertex: the one of this index in the sent mesh, or the one
+    nearest to a point. Raises SettingError unless exactly one of the two is given."""
+
+    angle: Annotated[float, Setting("target angle sum", unit="angle")]
+    vertex: Annotated[
+        int | None, Setting("boundary vertex, an index of the sent mesh", ge=0, lt=2**53, unit="vertex")
+    ] = None
+    point: Annotated[
+        tuple[float, float, float] | None, Setting("instead: the boundary vertex nearest to this point")
+    ] = None
+
+    def __post_init__(self) -> None:
+        if (self.vertex is None) == (self.point is None):
+            raise SettingError("give either 'vertex' or 'point'")
 
 
 BoundaryMode = Literal["straight", "angles", "isometric"]
@@ -23,18 +47,22 @@ BoundaryMode = Literal["straight", "angles", "isometric"]
 
 @dataclass(frozen=True)
 class LoopCondition:
-    """What one loop is asked for, instead of the mode of the whole boundary.
+    """What one loop is asked for: the one of this number, or the one nearest to a point. Raises SettingError
+    unless exactly one of the two is given."""
 
-    loop: its number in surface.loops, or −1 where ``point`` (3,) says which is meant: the one nearest to it.
-    The other fields as in BoundaryCondition.
-    """
+    mode: Annotated[BoundaryMode, Setting("what this loop becomes in the domain")]
+    loop: Annotated[int | None, Setting("number of the loop", ge=0, lt=2**31)] = None
+    point: Annotated[
+        tuple[float, float, float] | None, Setting("instead: the loop nearest to this point")
+    ] = None
+    angles: Annotated[
+        tuple[BoundaryAngle, ...],
+        Setting("target angles at vertices of this loop, for mode angles", most=10_000),
+    ] = ()
 
-    mode: BoundaryMode
-    loop: int = -1
-    point: Floats | None = None
-    vertices: Ints | None = None
-    points: Floats | None = None
-    angles: Floats | None = None
+    def __post_init__(self) -> None:
+        if (self.loop is None) == (self.point is None):
+            raise SettingError("give either 'loop' or 'point'")
 
 
 @dataclass(frozen=True)
@@ -43,24 +71,37 @@ class BoundaryCondition:
 
     mode ``straight``: every boundary angle is π. ``angles``: the listed ones, π elsewhere.
     ``isometric``: boundary lengths kept up to scale, each loop's curvature rounded to a multiple of quantum.
-    Openings (loops from the third on) on which no angle is listed are isometric in every mode: they cannot be
-    straight, for they turn by −2π.
-    vertices: (k,) *sent* vertex indices, −1 where points gives a place instead. points: (k, 3).
-    angles: (k,) radians. unit: in which problems tell of them and give an example.
-    quantum: π/3, π/2, or None to leave curvatures as they come.
+    Openings (loops from the third on) on which no angle is listed are isometric in every mode: they cannot
+    be straight, for they turn by −2π.
+    quantum: π/3, π/2 or none, by the pattern that is meant; ``auto``: that of the pattern that is laid.
     spread: how ``isometric`` distributes the rounding: ``even`` (the paper) or ``optimal`` (u constant on
-    each loop).
-    loops: conditions of single loops.
+    each loop). angle_unit: in which problems give angles; the same condition whatever it is.
     """
 
-    mode: BoundaryMode = "straight"
-    vertices: Ints | None = None
-    points: Floats | None = None
-    angles: Floats | None = None
-    unit: AngleUnit = "rad"
-    quantum: float | None = None
-    spread: Literal["even", "optimal"] = "even"
-    loops: tuple[LoopCondition, ...] = ()
+    mode: Annotated[BoundaryMode, Setting("what the boundary becomes in the domain")] = "straight"
+    angles: Annotated[
+        tuple[BoundaryAngle, ...], Setting("target angles at boundary vertices, for mode angles", most=10_000)
+    ] = ()
+    angle_unit: Annotated[AngleUnit, Setting("unit of the angles", rare=True)] = field(
+        default="rad", compare=False
+    )
+    quantum: Annotated[Quantum, Setting("what the cone angle is a multiple of", rare=True)] = "auto"
+    spread: Annotated[
+        Literal["even", "optimal"], Setting("how an isometric boundary takes up the rounding", rare=True)
+    ] = "even"
+    loops: Annotated[
+        tuple[LoopCondition, ...], Setting("conditions of single loops, instead of the mode", rare=True)
+    ] = ()
+
+    def adapted(self, kind: str | None) -> BoundaryCondition:
+        """The condition for a pattern of this kind (None: no pattern), without what has no effect on the map:
+        equal for equal maps."""
+        name = self.quantum if self.quantum != "auto" else (kind or "none")
+        return replace(
+            self,
+            quantum=QUANTUM_OF.get(name, "none"),
+            angles=self.angles if self.mode == "angles" else (),
+        )
 
 
 @dataclass(frozen=True)
@@ -195,18 +236,17 @@ class Unrolled:
         # The tail of a half-edge is the head of its twin: both must name the same copy of the vertex.
         head = np.roll(self.sheet, -1, axis=1).ravel()
         shift = np.where(inner, self.sheet.ravel() - head[twin], 0)
-        powers = np.unique(np.concatenate([shift, -shift, [0]]))
-        powers = powers[np.argsort(np.abs(powers), kind="stable")]  # the identity first
-        order = np.argsort(powers)
-        motion = order[np.searchsorted(powers[order], shift)]
+        most = int(np.abs(shift).max(initial=0))
+        powers, inverses = np.arange(1, most + 1), np.arange(most + 1, 2 * most + 1)
+        winding = np.concatenate([[0], powers, -powers])
         return Net(
             self.corners(surface.faces),
             np.where(inner, twin // 3, -1).reshape(-1, 3),
-            motion.reshape(-1, 3),
-            self.deck.angle * powers,
-            self.deck.power(powers)[1],
-            order[np.searchsorted(powers[order], -powers)],
-            powers,
+            np.where(shift >= 0, shift, most - shift).reshape(-1, 3),
+            self.deck.angle * winding,
+            self.deck.power(winding)[1],
+            np.concatenate([[0], inverses, powers]),
+            winding,
         )
 
 

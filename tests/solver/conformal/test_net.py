@@ -13,7 +13,13 @@ from hexwrap_solver.arrays import Complexes, Floats, Ints, Ragged
 from hexwrap_solver.conformal import boundary, conformal_map
 from hexwrap_solver.conformal.cut import cut_open
 from hexwrap_solver.conformal.net import Net
-from hexwrap_solver.conformal.types import BoundaryCondition, Cones, ConformalMap, LoopCondition
+from hexwrap_solver.conformal.types import (
+    BoundaryAngle,
+    BoundaryCondition,
+    Cones,
+    ConformalMap,
+    LoopCondition,
+)
 from hexwrap_solver.errors import GaussBonnetError, SingularitiesError
 from hexwrap_solver.surface import SentMesh, surface_from_mesh
 from hexwrap_solver.surface.types import Surface
@@ -170,7 +176,7 @@ def test_any_number_of_loops_and_cones(loops: int, cones: int, spread: str) -> N
     surface = holed(SPHERE, CENTRES[:loops], 0.35)
     assert len(surface.loops) == loops
     at = Cones.at(spread_points(surface, cones), np.array([1, -1, 2])[:cones], HEX)
-    found = conformal_map(surface, BoundaryCondition("isometric", quantum=HEX, spread=spread), cones=at)  # type: ignore[arg-type]
+    found = conformal_map(surface, BoundaryCondition("isometric", quantum="hex", spread=spread), cones=at)  # type: ignore[arg-type]
     assert found.kind == ("net" if loops != 2 or cones else found.kind)
     check(found)
     turns = [float((np.pi - angles).sum()) / HEX for angles in found.boundary_angles]
@@ -180,7 +186,7 @@ def test_any_number_of_loops_and_cones(loops: int, cones: int, spread: str) -> N
 def test_the_net_of_an_annulus_is_its_sheet() -> None:
     surface = bump(24, 8)
     for mode in ("straight", "isometric"):
-        check(conformal_map(surface, BoundaryCondition(mode, quantum=HEX)))  # type: ignore[arg-type]
+        check(conformal_map(surface, BoundaryCondition(mode, quantum="hex")))  # type: ignore[arg-type]
 
 
 def flat(points: Complexes) -> Floats:
@@ -212,7 +218,7 @@ def test_a_disk_with_a_cone_converges_to_a_power(k: int) -> None:
         z, faces = disk(rings)
         surface = sent(flat(z), faces)
         cones = Cones.at(np.array([0]), np.array([k]), HEX)
-        found = conformal_map(surface, BoundaryCondition("isometric", quantum=HEX), cones=cones)
+        found = conformal_map(surface, BoundaryCondition("isometric", quantum="hex"), cones=cones)
         check(found)
         radius = np.abs(surface.vertices @ [1, 1j, 0])
         inside = (radius > 0.3) & (radius < 0.9)
@@ -237,8 +243,8 @@ def test_a_flat_rectangle_maps_to_itself() -> None:
     surface = sent(
         flat(z), np.concatenate([np.stack([a, a + 1, a + 10], 1), np.stack([a, a + 10, a + 9], 1)])
     )
-    corners = np.array([0, 8, 45, 53])
-    asked = BoundaryCondition("angles", corners, angles=np.full(4, np.pi / 2), quantum=np.pi / 2)
+    corners = tuple(BoundaryAngle(np.pi / 2, v) for v in (0, 8, 45, 53))
+    asked = BoundaryCondition("angles", corners, quantum="quad")
     found = conformal_map(surface, asked)
     check(found)
     assert np.ptp(found.log_scale) < 1e-12
@@ -254,12 +260,10 @@ def test_single_loops_have_their_own_conditions() -> None:
         np.delete(tower.faces, np.flatnonzero(np.isin(tower.faces, [60, 61, 84, 85]).any(1)), 0),
     )
     door = surface.loops[2]
-    corners = surface.input_vertex[door[[0, len(door) // 4, len(door) // 2, 3 * len(door) // 4]]]
-    conditions = (
-        LoopCondition("straight", loop=0),
-        LoopCondition("angles", loop=2, vertices=corners, angles=np.full(4, 1.5 * np.pi)),
-    )
-    found = conformal_map(surface, BoundaryCondition("isometric", quantum=np.pi / 2, loops=conditions))
+    ends = door[[0, len(door) // 4, len(door) // 2, 3 * len(door) // 4]]
+    corners = tuple(BoundaryAngle(1.5 * np.pi, int(v)) for v in surface.input_vertex[ends])
+    conditions = (LoopCondition("straight", loop=0), LoopCondition("angles", loop=2, angles=corners))
+    found = conformal_map(surface, BoundaryCondition("isometric", quantum="quad", loops=conditions))
     check(found)
     turns = [float((np.pi - angles).sum()) for angles in found.boundary_angles]
     assert turns == pytest.approx([0, 0, -2 * np.pi], abs=1e-8)

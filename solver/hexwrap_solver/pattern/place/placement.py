@@ -104,7 +104,7 @@ def check_phase(settings: PatternSettings) -> None:
         raise PatternError(
             f"The phase is {settings.phase[0]:.6g}, {settings.phase[1]:.6g} cells, but at most "
             f"{MAX_PHASE:,.0f} are understood.",
-            field=("pattern", "phase"),
+            field=("phase",),
         )
 
 
