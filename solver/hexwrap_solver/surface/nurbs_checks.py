@@ -28,7 +28,7 @@ def checked(nurbs: NurbsSurface) -> tuple[NurbsSurface, list[str]]:
     check_data(nurbs)
     size = float(np.linalg.norm([np.ptp(x) for x in nurbs.control_points[..., :3].reshape(-1, 3).T]))
     check_extent(size)
-    gap = [_gap(nurbs, direction) for direction in (0, 1)]
+    gap = [end_gap(nurbs, direction) for direction in (0, 1)]
     collapsed = [_collapsed(nurbs, direction, TOLERANCE * size) for direction in (0, 1)]
     for direction in (0, 1):
         if nurbs.closed[direction] and gap[direction] > TOLERANCE * size:
@@ -124,7 +124,8 @@ def _line(nurbs: NurbsSurface, direction: int, at: float) -> Floats:
     return evaluate_points(open_surface, np.stack(pair, axis=1))
 
 
-def _gap(nurbs: NurbsSurface, direction: int) -> float:
+def end_gap(nurbs: NurbsSurface, direction: int) -> float:
+    """The greatest distance between the two ends of direction."""
     low, high = (_line(nurbs, direction, x) for x in domain(nurbs, direction))
     return float(np.linalg.norm(low - high, axis=1).max())
 
@@ -143,7 +144,11 @@ def closed_within(nurbs: NurbsSurface, tolerance: float) -> tuple[bool, bool]:
     return found[0], found[1]
 
 
+def collapsed(nurbs: NurbsSurface, direction: int, end: int, tolerance: float) -> bool:
+    """Whether the parameter line at the lower (0) or upper end (1) of direction is a point."""
+    return float(np.ptp(_line(nurbs, direction, domain(nurbs, direction)[end]), axis=0).max()) <= tolerance
+
+
 def _collapsed(nurbs: NurbsSurface, direction: int, tolerance: float) -> bool:
     """Whether a parameter line at an end of direction is a point."""
-    lines = [_line(nurbs, direction, x) for x in domain(nurbs, direction)]
-    return any(float(np.ptp(line, axis=0).max()) <= tolerance for line in lines)
+    return any(collapsed(nurbs, direction, end, tolerance) for end in (0, 1))
