@@ -20,7 +20,7 @@ from hexwrap_server.http.service import Service
 from hexwrap_server.input.requests import Intake, ParsedRequest
 from hexwrap_server.jobs.manager import JobManager
 from hexwrap_server.jobs.store import Job
-from hexwrap_server.output.wire import PARTS
+from hexwrap_server.output.wire import CORNERS, PARTS
 from hexwrap_server.problems import dumped
 
 #: Longest time that ``?wait=`` holds an answer.
@@ -286,8 +286,8 @@ def _parts(include: str | None) -> list[str] | None:
     if include is None:
         return None
     wanted = [name.strip() for name in include.split(",") if name.strip()]
-    known = [name for name in PARTS if name in wanted]
-    if not known or not set(wanted) <= set(PARTS):
+    known = [name for name in (*PARTS, CORNERS) if name in wanted]
+    if not known or len(known) < len(set(wanted)):
         raise _bad_parameter("include", f"'include' names parts of the Result: {', '.join(PARTS)}.")
     return known
 

@@ -56,8 +56,8 @@ def read_upload(
 ) -> Intake:
     """A file sent raw (with its name) or in a form → checked surface, with the objects of the file.
 
-    Fields of the form choose among these, as ``surface.object`` and the like do. Raises UploadError, HttpError,
-    SurfaceError, StorageError.
+    Fields of the form choose among these, as ``surface.object`` and the like do. Raises UploadError,
+    HttpError, SurfaceError, StorageError.
     """
     read = _file(body, settings, content_type, name)
     intake = _checked(report, read.sent, folder, caching)

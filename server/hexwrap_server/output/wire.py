@@ -21,13 +21,19 @@ from hexwrap_solver.surface.types import Surface
 
 #: The parts of a Result, in its order.
 PARTS = ("mesh", "map", "pattern", "panels", "sizes", "quality", "components", "support", "timings")
+#: Asked for beside parts: ``map`` then has ``corners``, whatever its kind.
+CORNERS = "corners"
 
 
 def result_json(
     solution: Solution, timings: dict[str, float] | None = None, include: Sequence[str] = PARTS
 ) -> bytes:
-    """The Result as JSON. include: the parts wanted."""
-    return dump({name: part(solution, name, timings or {}) for name in PARTS if name in include})
+    """The Result as JSON. include: the parts wanted; with CORNERS among them, ``map`` has ``corners``."""
+    wanted = {*include, "map"} if CORNERS in include else include
+    document = {name: part(solution, name, timings or {}) for name in PARTS if name in wanted}
+    if CORNERS in include:
+        document["map"]["corners"] = plane(solution.map.corners())
+    return dump(document)
 
 
 def part(solution: Solution, name: str, timings: dict[str, float]) -> Any:
@@ -110,8 +116,10 @@ def pattern(laid: Pattern) -> dict[str, Any]:
         "normals": flat(laid.normals),
         "uv": plane(laid.uv),
         "faces": rows(laid.faces),
-        "sheet": rows(Ragged(laid.sheet, laid.faces.offsets)),
+        "sheet": None if laid.sheet is None else rows(Ragged(laid.sheet, laid.faces.offsets)),
+        "corners": rows(Ragged(plane(laid.corners), laid.faces.offsets)) if laid.sheet is None else None,
         "whole": flat(laid.whole),
+        "index": flat(laid.index),
         "neighbours": rows(laid.neighbours),
         "ring": flat(laid.ring),
         "place": flat(laid.place),
