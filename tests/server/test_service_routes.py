@@ -220,14 +220,15 @@ def test_half_characters_are_told(client: Live) -> None:
 
 
 def test_unsolvable_surface_is_a_problem_with_its_faults(client: Live) -> None:
-    open_disk = {"vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "faces": [[0, 1, 2]]}
-    id = client.post("/v1/jobs", json={"surface": open_disk}).json()["id"]
+    corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 1, 1]]
+    fin = {"vertices": corners, "faces": [[0, 1, 2], [0, 1, 3], [0, 1, 4]]}
+    id = client.post("/v1/jobs", json={"surface": fin}).json()["id"]
     job = finished(client, id)
     assert job["status"] == "failed"
     answer = client.get(f"/v1/jobs/{id}/result")
     assert answer.status_code == 422
-    assert answer.json() == job["problem"] == client.post("/v1/solve", json={"surface": open_disk}).json()
-    assert client.post("/v1/surfaces", json=open_disk).json()["type"] == job["problem"]["type"]
+    assert answer.json() == job["problem"] == client.post("/v1/solve", json={"surface": fin}).json()
+    assert client.post("/v1/surfaces", json=fin).json()["type"] == job["problem"]["type"]
 
 
 @pytest.mark.parametrize(
