@@ -1,0 +1,268 @@
+"""Which singularities make the cells' sizes most equal: a search over the linear model.
+
+The area-weighted variance of u is a quadratic form in the indices of the singularities and the curvatures of the
+loops, so that every move of one of them is judged for all seats at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from hexwrap_solver.arrays import Bools, Floats, Ints
+from hexwrap_solver.singularities.linear import Model
+from hexwrap_solver.singularities.sizes import uncovered, uncovered_of_many
+from hexwrap_solver.singularities.types import Proposal, Rules
+
+#: States carried from one number of singularities to the next; random starts for each number.
+BEAM, STARTS = 5, 16
+#: Best seats that an addition tries per state.
+TRIED = 4
+#: Seats next to a singularity that the refinement tries, and its rounds.
+NEAR, ROUNDS = 8, 10
+#: Gains below this, relative to the variance without singularities, are rounding.
+GAIN = 1e-6
+#: Changes of the uncovered area that are none.
+SMALL = 2e-5
+
+
+@dataclass(frozen=True)
+class State:
+    """seat: indices of seats, ascending. index: k of each. loops: curvature beyond the reference's of every
+    free loop but the first."""
+
+    seat: tuple[int, ...]
+    index: tuple[int, ...]
+    loops: tuple[int, ...]
+
+    @classmethod
+    def of(cls, pairs: list[tuple[int, int]], loops: tuple[int, ...]) -> State:
+        pairs = sorted(pairs)
+        return cls(tuple(s for s, _ in pairs), tuple(k for _, k in pairs), loops)
+
+    @property
+    def pairs(self) -> list[tuple[int, int]]:
+        return list(zip(self.seat, self.index, strict=True))
+
+
+@dataclass
+class Search:
+    """The quadratic form value = constant + 2·linear·s + s·square·s, s being indices by seat and then the
+    loops' curvatures; and what the rules forbid."""
+
+    model: Model
+    rules: Rules
+    constant: float = field(init=False)
+    linear: Floats = field(init=False)
+    square: Floats = field(init=False)
+    alone: Floats = field(init=False)
+    moves: list[tuple[int, ...]] = field(init=False)
+    _moves: tuple[Floats, Floats] = field(init=False)
+    _quadratic: Floats = field(init=False)
+    _near: cKDTree = field(init=False)
+    _clear: dict[tuple[int, int], Bools] = field(init=False, default_factory=dict)
+
+    def __post_init__(self) -> None:
+        model = self.model
+        every = np.concatenate([model.response, model.loop_response], axis=1)
+        root = np.sqrt(model.weight)[:, None]
+        every = root * (every - model.weight @ every)
+        reference = root[:, 0] * (model.reference - model.weight @ model.reference)
+        self.constant = float(reference @ reference)
+        self.linear = every.T @ reference
+        self.square = every.T @ every
+        self.alone = np.diag(self.square)
+        self.moves = _loop_moves(len(model.free) - 1)
+        change = np.array(self.moves, dtype=float).reshape(len(self.moves), -1)
+        self._moves = change, change @ self.square[self.seats :, : self.seats]
+        self._quadratic = np.einsum("mf,fg,mg->m", change, self.square[self.seats :, self.seats :], change)
+        self._near = cKDTree(model.place)
+
+    @property
+    def seats(self) -> int:
+        return len(self.model.seat)
+
+    def scale(self, state: State) -> Floats:
+        """(p,) u of the patches."""
+        seat, index = list(state.seat), np.array(state.index, dtype=float)
+        u = self.model.reference + self.model.response[:, seat] @ index
+        return np.asarray(u + self.model.loop_response @ np.array(state.loops, dtype=float))
+
+    def value(self, state: State) -> float:
+        """Variance of u over the area."""
+        return self._seen(state)[0]
+
+    def _seen(self, state: State) -> tuple[float, Floats]:
+        """The value, and (q + f,) half its derivative."""
+        at = [*state.seat, *range(self.seats, self.seats + len(state.loops))]
+        s = np.array([*state.index, *state.loops], dtype=float)
+        gradient = self.linear + s @ self.square[at]
+        return float(self.constant + self.linear[at] @ s + gradient[at] @ s), gradient
+
+    def clear_of(self, seat: int, same: bool) -> Bools:
+        """(q,) seats far enough from one, for a singularity of the same sign or the other."""
+        key = (seat, int(same))
+        if key not in self._clear:
+            cells = self.rules.apart if same else self.rules.opposite
+            clear = np.ones(self.seats, dtype=bool)
+            clear[self._near.query_ball_point(self.model.place[seat], cells * self.rules.cell)] = False
+            self._clear[key] = clear
+        return self._clear[key]
+
+    def open_seats(self, state: State, k: int) -> Bools:
+        """(q,) where one more of index k may stand."""
+        clear = np.ones(self.seats, dtype=bool)
+        for seat, index in state.pairs:
+            clear &= self.clear_of(seat, index * k > 0)
+        return clear
+
+    def additions(self, state: State, k: int, most: int) -> list[tuple[float, State]]:
+        """The best ways to add a singularity of index k, loops changed along with it."""
+        found: list[tuple[float, State]] = []
+        clear = self.open_seats(state, k)
+        if not clear.any():
+            return found
+        value, gradient = self._seen(state)
+        change, more = self._moves
+        values = value + 2 * change @ gradient[self.seats :] + self._quadratic  # (moves,)
+        half = gradient[: self.seats] + more  # (moves, q)
+        all_values = values[:, None] + 2 * k * half + k * k * self.alone[: self.seats]
+        all_values[:, ~clear] = np.inf
+        best = np.argpartition(all_values.ravel(), most - 1)[:most] if most > 1 else [all_values.argmin()]
+        for i in best:
+            move, seat = divmod(int(i), self.seats)
+            if np.isfinite(all_values[move, seat]):
+                state_with = State.of([*state.pairs, (seat, k)], _plus(state.loops, self.moves[move]))
+                found.append((float(all_values[move, seat]), state_with))
+        return sorted(found, key=lambda one: (one[0], one[1].seat, one[1].loops))[:most]
+
+    def settled(self, state: State) -> tuple[float, State]:
+        """Each singularity relocated with the others held, loops changed by one, until nothing gains."""
+        value = self.value(state)
+        least = GAIN * self.constant
+        while True:
+            before = value
+            for pair in state.pairs:
+                if pair in state.pairs:
+                    rest = [other for other in state.pairs if other != pair]
+                    found = self.additions(State.of(rest, state.loops), pair[1], 1)
+                    if found and found[0][0] < value - least:
+                        value, state = found[0]
+            for move in self.moves:
+                other = State(state.seat, state.index, _plus(state.loops, move))
+                if (new := self.value(other)) < value - least:
+                    value, state = new, other
+            if value >= before - least:
+                return value, state
+
+    def refined(self, state: State) -> tuple[float, State]:
+        """Moved from seat to neighbouring seat, and loops by one, for the least uncovered area."""
+        sizes = self.rules.sizes
+        if sizes is None:
+            return 0.0, state
+        least = np.inf
+        for _ in range(ROUNDS):
+            around = [state, *self._neighbours(state)]
+            u = np.stack([self.scale(one) for one in around], axis=1)
+            values = uncovered_of_many(u, self.model.weight, sizes)
+            best = int(values.argmin())
+            least, state = float(values[best]), around[best]
+            if values[0] - least < SMALL:
+                break
+        return least, state
+
+    def _neighbours(self, state: State) -> Iterator[State]:
+        for move in self.moves:
+            if any(move):
+                yield State(state.seat, state.index, _plus(state.loops, move))
+        for i, (seat, k) in enumerate(state.pairs):
+            rest = State.of([p for j, p in enumerate(state.pairs) if j != i], state.loops)
+            clear = self.open_seats(rest, k)
+            near = np.atleast_1d(self._near.query(self.model.place[seat], min(NEAR + 1, self.seats))[1])
+            for other in near[1:]:
+                if clear[other]:
+                    yield State.of([*rest.pairs, (int(other), k)], state.loops)
+
+    def proposal(self, state: State) -> Proposal:
+        u = self.scale(state)
+        ends = list(self.model.loops)
+        for loop, more in zip(self.model.free[1:], state.loops, strict=True):
+            ends[loop] += more
+        if self.model.free:
+            ends[self.model.free[0]] -= sum(state.index) + sum(state.loops)
+        order = np.argsort(self.model.seat[list(state.seat)], kind="stable")
+        return Proposal(
+            self.model.seat[list(state.seat)][order],
+            np.array(state.index, dtype=np.int64)[order],
+            tuple(ends),
+            uncovered(u, self.model.weight, self.rules.sizes),
+            float(np.sqrt(max(self.value(state), 0.0))),
+            float(np.exp(np.ptp(u))),
+        )
+
+    def complete(self, state: State) -> bool:
+        """Whether the curvatures add up."""
+        return self.model.total is None or sum(state.index) == self.model.total
+
+
+def _plus(loops: tuple[int, ...], move: tuple[int, ...]) -> tuple[int, ...]:
+    return tuple(a + b for a, b in zip(loops, move, strict=True))
+
+
+def _loop_moves(loops: int) -> list[tuple[int, ...]]:
+    """No change, one loop by one quantum, or two loops by opposite ones."""
+    moves = [(0,) * max(loops, 0)]
+    unit = np.eye(max(loops, 0), dtype=int)
+    for i in range(loops):
+        moves += [tuple(unit[i].tolist()), tuple((-unit[i]).tolist())]
+        for j in range(loops):
+            if i != j:
+                moves.append(tuple((unit[i] - unit[j]).tolist()))
+    return moves
+
+
+def curve(search: Search) -> list[Proposal]:
+    """The best there is with 0, 1, 2, … singularities, as far as the rules allow and numbers are possible."""
+    rng = np.random.default_rng(17)
+    kinds = [k for size in range(1, search.rules.largest + 1) for k in (-size, size)]
+    start = State((), (), (0,) * max(len(search.model.free) - 1, 0))
+    beam = [search.settled(start)]
+    found = [search.proposal(search.refined(start if not beam else beam[0][1])[1])] if search.complete(start) else []
+    for _ in range(search.rules.most):
+        beam = _next(search, beam, kinds, rng)
+        if not beam:
+            break
+        whole = [search.refined(state) for _, state in beam if search.complete(state)]
+        if whole:
+            best = min(whole, key=lambda one: (one[0], one[1].seat))[1]
+            found.append(search.proposal(best))
+    return found
+
+
+def _next(
+    search: Search, beam: list[tuple[float, State]], kinds: list[int], rng: np.random.Generator
+) -> list[tuple[float, State]]:
+    """The best states with one singularity more."""
+    added = [one for _, state in beam for k in kinds for one in search.additions(state, k, TRIED)]
+    added = sorted(added, key=lambda one: one[0])[: 2 * BEAM * TRIED]
+    if not added:
+        return []
+    tried = {}
+    for _, state in added:
+        value, settled = search.settled(state)
+        tried[settled] = value
+    leading = min(tried, key=lambda state: (tried[state], state.seat))
+    for _ in range(STARTS):
+        state = State((), (), leading.loops)
+        for k in leading.index:
+            clear = np.flatnonzero(search.open_seats(state, k))
+            if len(clear):
+                state = State.of([*state.pairs, (int(rng.choice(clear)), k)], state.loops)
+        if len(state.seat) == len(leading.seat):
+            value, settled = search.settled(state)
+            tried[settled] = value
+    ranked = sorted(((value, state) for state, value in tried.items()), key=lambda one: (one[0], one[1].seat))
+    return ranked[:BEAM]
