@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 
 from hexwrap_server import samples
-from hexwrap_server.requests import SentSurface
-from hexwrap_server.schemas import parse_request
-from hexwrap_server.work import take_in
+from hexwrap_server.input.requests import SentSurface
+from hexwrap_server.input.schemas import parse_request
+from hexwrap_server.jobs.work import take_in
 from hexwrap_solver.conformal import conformal_map
 from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap
 from hexwrap_solver.errors import HexwrapError

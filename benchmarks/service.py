@@ -31,13 +31,13 @@ import httpx
 import numpy as np
 import orjson
 
-from hexwrap_server.schemas import parse_request
-from hexwrap_server.work import take_in
+from hexwrap_server.input.schemas import parse_request
+from hexwrap_server.jobs.work import take_in
 from hexwrap_solver import pipeline
 
 PROGRAM = """
 import sys
-from hexwrap_server.app import serve
+from hexwrap_server.http.app import serve
 from hexwrap_server.settings import Settings
 port, data, workers = int(sys.argv[1]), sys.argv[2], int(sys.argv[3])
 serve(Settings(port=port, data=data, workers=workers, log_level="error", max_queue=1000))

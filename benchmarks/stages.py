@@ -23,7 +23,7 @@ from typing import TypeVar
 import numpy as np
 import psutil
 
-from hexwrap_server.files import WRITERS, Meta, write
+from hexwrap_server.output.writers import WRITERS, Meta, write
 from hexwrap_solver import pipeline
 from hexwrap_solver.arrays import Progress, Ragged, no_progress
 from hexwrap_solver.conformal.types import BoundaryCondition

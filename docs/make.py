@@ -12,12 +12,12 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from hexwrap_server import samples
-from hexwrap_server.files import Meta, write
-from hexwrap_server.files.colours import panel_colours
-from hexwrap_server.files.picture import panels_scene
-from hexwrap_server.files.scene import render
-from hexwrap_server.schemas import parse_request
-from hexwrap_server.work import run_stages
+from hexwrap_server.input.schemas import parse_request
+from hexwrap_server.jobs.work import run_stages
+from hexwrap_server.output.colours import panel_colours
+from hexwrap_server.output.picture import panels_scene
+from hexwrap_server.output.scene import render
+from hexwrap_server.output.writers import Meta, write
 from hexwrap_solver.pipeline import PlainRunner, Solution
 
 HERE = Path(__file__).parent

@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 
 from hexwrap_server import samples
-from hexwrap_server.cli import make_parser
-from hexwrap_server.files import WRITERS
-from hexwrap_server.options import readme_rows
-from hexwrap_server.schemas import parse_request
-from hexwrap_server.work import run_stages
+from hexwrap_server.cli.main import make_parser
+from hexwrap_server.cli.options import readme_rows
+from hexwrap_server.input.schemas import parse_request
+from hexwrap_server.jobs.work import run_stages
+from hexwrap_server.output.writers import WRITERS
 from hexwrap_solver.pipeline import PlainRunner
 
 ROOT = Path(__file__).parents[1]

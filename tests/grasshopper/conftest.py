@@ -43,7 +43,7 @@ def unpacked(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 SERVE = (
-    "from hexwrap_server.app import serve; from hexwrap_server.settings import Settings; "
+    "from hexwrap_server.http.app import serve; from hexwrap_server.settings import Settings; "
     "serve(Settings.from_environment())"
 )
 

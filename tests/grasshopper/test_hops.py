@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import rhino3dm
 
-from hexwrap_server.hops_components import COMPONENTS, LIFT, PANELS, HopsError
-from hexwrap_server.hops_values import read_inputs
+from hexwrap_server.http.hops.components import COMPONENTS, LIFT, PANELS, HopsError
+from hexwrap_server.http.hops.values import read_inputs
 from tests.server.live import Live, running
 
 Tree = dict[str, list[dict[str, str]]]

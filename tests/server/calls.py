@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from hexwrap_server import later, logs
-from hexwrap_server.worker import Report
+from hexwrap_server import logs
+from hexwrap_server.jobs import later
+from hexwrap_server.jobs.worker import Report
 from hexwrap_solver.errors import RequestError
 
 
@@ -108,7 +109,7 @@ def unpicklable(report: Report) -> Any:
 
 def solve_after(report: Report, seconds: float, *arguments: Any) -> Any:
     """A job that takes its time first."""
-    from hexwrap_server.work import solve
+    from hexwrap_server.jobs.work import solve
 
     report("surface", 0.01, "waiting")
     time.sleep(seconds)
@@ -117,7 +118,7 @@ def solve_after(report: Report, seconds: float, *arguments: Any) -> Any:
 
 def solve_held(report: Report, stage: str, gate: str, *arguments: Any) -> Any:
     """A job that stays at a stage until there is a file."""
-    from hexwrap_server.work import solve
+    from hexwrap_server.jobs.work import solve
 
     def held(at: str, fraction: float, what: str) -> None:
         report(at, fraction, what)

@@ -12,9 +12,9 @@ from typing import Any
 import httpx
 import uvicorn
 
-from hexwrap_server.app import create_app, open_listener
-from hexwrap_server.engine import Engine
-from hexwrap_server.service import Service
+from hexwrap_server.http.app import create_app, open_listener
+from hexwrap_server.http.service import Service
+from hexwrap_server.jobs.engine import Engine
 from hexwrap_server.settings import Settings
 
 OVER = ("done", "failed", "cancelled")

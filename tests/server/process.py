@@ -16,7 +16,7 @@ import psutil
 
 PROGRAM = """
 import sys
-from hexwrap_server.app import serve
+from hexwrap_server.http.app import serve
 from hexwrap_server.settings import Settings
 serve(Settings.from_environment({"port": int(sys.argv[1]), "data": sys.argv[2], "workers": int(sys.argv[3])}))
 """

@@ -9,9 +9,9 @@ import numpy as np
 import orjson
 import pytest
 
-from hexwrap_server.parsing import NotJsonError, loads
+from hexwrap_server.input.json_text import NotJsonError, loads
+from hexwrap_server.input.schemas import parse_points, parse_request
 from hexwrap_server.problems import FormError, problem
-from hexwrap_server.schemas import parse_points, parse_request
 from tests.server.bodies import request, tube
 
 VERTICES = [[0.0, 0.0, 0.0], [1, 0, 0], [0, 1, 0], [1, 1, 0]]

@@ -10,11 +10,11 @@ import pytest
 import rhino3dm
 
 from hexwrap_server import __version__, samples
-from hexwrap_server.cli import ENDINGS, file_kind, main, make_parser
-from hexwrap_server.files import WRITERS
-from hexwrap_server.local import task
-from hexwrap_server.options import ANGLES, OPTIONS, SUPPORT, field_paths
-from hexwrap_server.schemas import parse_request
+from hexwrap_server.cli.local import task
+from hexwrap_server.cli.main import ENDINGS, file_kind, main, make_parser
+from hexwrap_server.cli.options import ANGLES, OPTIONS, SUPPORT, field_paths
+from hexwrap_server.input.schemas import parse_request
+from hexwrap_server.output.writers import WRITERS
 
 TUBE_ROWS, TUBE_COLUMNS = 9, 24
 
@@ -227,7 +227,7 @@ def test_a_file_that_cannot_come_of_the_request_is_refused_before_the_work(
     words: str,
 ) -> None:
     monkeypatch.setattr(
-        "hexwrap_server.cli.solve_with_progress", lambda *_: pytest.fail("solved all the same")
+        "hexwrap_server.cli.main.solve_with_progress", lambda *_: pytest.fail("solved all the same")
     )
     arguments = ["solve", str(tube), "-q", "-o", str(tmp_path / "x.json"), "-o", str(tmp_path / "x.png")]
     status, told = refusal([*arguments, option, "none"], capsys)

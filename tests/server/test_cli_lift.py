@@ -9,11 +9,11 @@ import ezdxf
 import numpy as np
 import pytest
 
-from hexwrap_server.carrying import flatten_curves, lift_curves, one_piece
-from hexwrap_server.cli import main
-from hexwrap_server.curves import READERS, Curve, DrawingError, read_curves, refined, write_curves
-from hexwrap_server.files import Meta, write
-from hexwrap_server.finished import map_in_result
+from hexwrap_server.cli.main import main
+from hexwrap_server.input.curves import READERS, Curve, DrawingError, read_curves, refined, write_curves
+from hexwrap_server.input.finished_map import map_in_result
+from hexwrap_server.jobs.lift_curves import flatten_curves, lift_curves, one_piece
+from hexwrap_server.output.writers import Meta, write
 from hexwrap_solver.conformal.types import Deck
 from tests.server.analytic import cylinder
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hexwrap_server.files.colours import (
+from hexwrap_server.output.colours import (
     ANCHORS,
     UNSIZED,
     encoded,
@@ -16,7 +16,7 @@ from hexwrap_server.files.colours import (
     size_colours,
     to_hex,
 )
-from hexwrap_server.files.text import angle, length, one_line
+from hexwrap_server.output.text import angle, length, one_line
 
 
 def test_the_gradient_goes_through_its_anchors() -> None:

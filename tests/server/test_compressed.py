@@ -13,7 +13,7 @@ from starlette.requests import Request
 from starlette.responses import Response, StreamingResponse
 from starlette.routing import Route
 
-from hexwrap_server.compressed import LONG_PIECE, Compressed
+from hexwrap_server.http.compressed import LONG_PIECE, Compressed
 from tests.server.bodies import request
 from tests.server.live import Live, finished, running
 

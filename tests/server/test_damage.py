@@ -12,8 +12,8 @@ from typing import Any
 
 import pytest
 
-from hexwrap_server.requests import Wanted
-from hexwrap_server.store import DamagedError, FolderInUseError, Job, Store, Work
+from hexwrap_server.input.requests import Wanted
+from hexwrap_server.jobs.store import DamagedError, FolderInUseError, Job, Store, Work
 from hexwrap_solver.conformal.types import BoundaryCondition
 from tests.server.bodies import request
 from tests.server.live import Live, finished, running
@@ -165,7 +165,7 @@ def test_the_log_of_writes_goes_into_the_database_beside_the_writing(
 
     database = tmp_path / "hexwrap.sqlite3"
     store = Store(tmp_path)
-    monkeypatch.setattr("hexwrap_server.store.CHECKPOINT", 1)
+    monkeypatch.setattr("hexwrap_server.jobs.store.CHECKPOINT", 1)
     store.check_point()
     before = database.read_bytes()
     for i in range(1500):  # SQLite alone would stop for the disk after about 300

@@ -17,8 +17,8 @@ from typing import Any
 import psutil
 import pytest
 
-from hexwrap_server.engine import nobody
-from hexwrap_server.worker import MemoryLimitError, TimeLimitError, WorkerDiedError
+from hexwrap_server.jobs.engine import nobody
+from hexwrap_server.jobs.worker import MemoryLimitError, TimeLimitError, WorkerDiedError
 from hexwrap_solver.errors import RequestError
 from tests.server.bodies import request, tube
 from tests.server.live import finished, over_first, running, until_at
@@ -45,7 +45,7 @@ async def cluster(machines: int = 2) -> AsyncIterator[Any]:
 
 @asynccontextmanager
 async def engine(made: Any) -> AsyncIterator[Any]:
-    from hexwrap_server.dask_engine import DaskEngine
+    from hexwrap_server.jobs.dask_engine import DaskEngine
 
     e = DaskEngine(made.scheduler_address)
     await e.start()
@@ -62,7 +62,7 @@ def held_by(gate: Path, scheduler: str) -> Any:
 
     However fast they are, they run when their machine is killed or they are stopped.
     """
-    from hexwrap_server.dask_engine import DaskEngine
+    from hexwrap_server.jobs.dask_engine import DaskEngine
 
     class Held(DaskEngine):
         async def run(self, function: str, *arguments: Any, **rest: Any) -> Any:
@@ -144,7 +144,7 @@ def test_killed_machine_costs_its_own_job_only(tmp_path: Path) -> None:
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.skipif(os.name == "nt", reason="kill -STOP of POSIX")
 def test_machine_that_does_not_answer_keeps_nobody(tmp_path: Path) -> None:
-    from hexwrap_server.dask_engine import DaskEngine
+    from hexwrap_server.jobs.dask_engine import DaskEngine
 
     async def story() -> None:
         async with cluster(1) as made:
@@ -171,7 +171,7 @@ def test_machine_that_does_not_answer_keeps_nobody(tmp_path: Path) -> None:
 @pytest.mark.long
 @pytest.mark.filterwarnings("ignore")
 def test_lost_scheduler_fails_its_job_and_is_found_again(tmp_path: Path) -> None:
-    from hexwrap_server.dask_engine import ClusterError, DaskEngine
+    from hexwrap_server.jobs.dask_engine import ClusterError, DaskEngine
 
     async def story() -> None:
         async with cluster(1) as made, engine(made) as e:
@@ -277,7 +277,7 @@ def test_jobs_wait_for_the_first_machine(tmp_path: Path) -> None:
 
 
 def test_waiting_for_machines_has_an_end() -> None:
-    from hexwrap_server.dask_engine import ClusterError, DaskEngine
+    from hexwrap_server.jobs.dask_engine import ClusterError, DaskEngine
 
     told: list[str] = []
     with pytest.raises(ClusterError, match=r"no machines for 0\.1 s"):
@@ -286,7 +286,7 @@ def test_waiting_for_machines_has_an_end() -> None:
 
 
 def test_scheduler_that_does_not_answer_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    from hexwrap_server import dask_engine
+    from hexwrap_server.jobs import dask_engine
 
     class Silent:
         scheduler: Any
@@ -308,7 +308,7 @@ def test_scheduler_that_does_not_answer_is_not_waited_for(monkeypatch: pytest.Mo
 
 
 def test_stopped_calls_are_not_remembered_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
-    from hexwrap_server import dask_engine
+    from hexwrap_server.jobs import dask_engine
 
     monkeypatch.setattr(dask_engine, "MOST_STOPPED", 3)
     monkeypatch.setattr(dask_engine, "_STOPPED", OrderedDict())
@@ -319,7 +319,8 @@ def test_stopped_calls_are_not_remembered_for_ever(monkeypatch: pytest.MonkeyPat
 
 NO_SCHEDULER = """
 import sys
-from hexwrap_server import cli, dask_engine
+from hexwrap_server.cli import main as cli
+from hexwrap_server.jobs import dask_engine
 dask_engine.CONNECT_SECONDS = 0.3
 words = ["serve", "--port", "0", "--engine", "dask", "--scheduler", sys.argv[1], "--data", sys.argv[2]]
 sys.exit(cli.main(words))

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from hexwrap_server import demo
-from hexwrap_server.cli import main
-from hexwrap_server.files import WRITERS
+from hexwrap_server.cli import demo
+from hexwrap_server.cli.main import main
+from hexwrap_server.output.writers import WRITERS
 from tests.server.live import running
 
 

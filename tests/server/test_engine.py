@@ -17,8 +17,8 @@ from typing import Any, TypeVar
 import psutil
 import pytest
 
-from hexwrap_server.engine import ProcessEngine, nobody
-from hexwrap_server.worker import InternalError, MemoryLimitError, TimeLimitError, WorkerDiedError
+from hexwrap_server.jobs.engine import ProcessEngine, nobody
+from hexwrap_server.jobs.worker import InternalError, MemoryLimitError, TimeLimitError, WorkerDiedError
 from hexwrap_solver.errors import RequestError
 
 T = TypeVar("T")
@@ -231,7 +231,7 @@ def test_stop_leaves_no_process_though_all_are_busy() -> None:
 
 PARENT = """
 import asyncio, sys
-from hexwrap_server.engine import ProcessEngine, nobody
+from hexwrap_server.jobs.engine import ProcessEngine, nobody
 async def main():
     e = ProcessEngine(2, preload="tests.server.calls")
     await e.start()

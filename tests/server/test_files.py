@@ -17,11 +17,13 @@ import rhino3dm
 import trimesh
 from matplotlib.image import imread
 
-from hexwrap_server import cli, routes
-from hexwrap_server.files import WRITERS, Meta, NotMadeError, SheetError, scene, text, write
-from hexwrap_server.files.dxf import object_coordinates
-from hexwrap_server.files.flat import lay_flat, pack
-from hexwrap_server.files.unrolled import Unrolled
+from hexwrap_server.cli import main as cli
+from hexwrap_server.http import routes
+from hexwrap_server.output import scene, text
+from hexwrap_server.output.dxf import object_coordinates
+from hexwrap_server.output.flat import lay_flat, pack
+from hexwrap_server.output.unrolled import Unrolled
+from hexwrap_server.output.writers import WRITERS, Meta, NotMadeError, SheetError, write
 from hexwrap_solver.arrays import Ragged
 from hexwrap_solver.panels.types import Components, Support
 from hexwrap_solver.pipeline import Solution

@@ -12,10 +12,10 @@ from typing import Any
 
 import pytest
 
-from hexwrap_server import disk, jobs
-from hexwrap_server.engine import ProcessEngine
-from hexwrap_server.requests import Order
-from hexwrap_server.store import Store
+from hexwrap_server.input.requests import Order
+from hexwrap_server.jobs import disk, manager
+from hexwrap_server.jobs.engine import ProcessEngine
+from hexwrap_server.jobs.store import Store
 from tests.server.bodies import request, tube
 from tests.server.live import Live, finished, running, until_at
 
@@ -62,7 +62,7 @@ class Held(ProcessEngine):
 
 @pytest.fixture
 def server(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Live, Full, Held]]:
-    monkeypatch.setattr(jobs, "CATCH_UP_INTERVAL", 0.1)
+    monkeypatch.setattr(manager, "CATCH_UP_INTERVAL", 0.1)
     engine = Held(1)
     with running(tmp_path, engine) as client:
         disk = Full(client.service.store._db)
@@ -174,7 +174,7 @@ def test_surfaces_and_outcomes_that_find_no_room(tmp_path: Path, monkeypatch: py
         job = finished(client, client.post("/v1/jobs", json=request()).json()["id"])
         assert (job["status"], job["problem"]["type"]) == ("failed", "/problems/storage")
         (tmp_path / "away").rename(tmp_path / "results")
-        monkeypatch.setattr("hexwrap_server.disk.os.replace", no_room)
+        monkeypatch.setattr("hexwrap_server.jobs.disk.os.replace", no_room)
         answer = client.post("/v1/jobs", json=request(surface=tube(12, 5)))
         assert (answer.status_code, answer.json()["type"]) == (503, "/problems/storage")
         assert "No space left on device" in answer.json()["detail"]
@@ -187,7 +187,7 @@ def test_database_that_is_really_full_refuses_and_goes_on(tmp_path: Path) -> Non
     pages = store._db.execute("PRAGMA page_count").fetchone()[0]
     store._db.execute(f"PRAGMA max_page_count = {pages}")
     insert = "INSERT INTO works (identity, surface, wanted, used) VALUES (?, '', ?, 0)"
-    with pytest.raises(jobs.StorageError, match="full"):
+    with pytest.raises(manager.StorageError, match="full"):
         store._write(insert, "large", bytes(10**6))
     store._write(insert, "small", b"")
     store._db.execute("PRAGMA max_page_count = 100000")

@@ -9,8 +9,8 @@ import sys
 import numpy as np
 import pytest
 
-from hexwrap_server.heap import FADE, FIRST, MOST, PAGE, PIECE, Heap, page_faults
-from hexwrap_server.worker import KEEP_MEMORY
+from hexwrap_server.jobs.heap import FADE, FIRST, MOST, PAGE, PIECE, Heap, page_faults
+from hexwrap_server.jobs.worker import KEEP_MEMORY
 
 
 def test_as_much_as_was_needed_fading_and_bounded() -> None:
@@ -44,7 +44,7 @@ def test_elsewhere_nothing_is_done() -> None:
 
 KEPT = """
 import numpy as np
-from hexwrap_server.heap import Heap, page_faults
+from hexwrap_server.jobs.heap import Heap, page_faults
 kept, heap = [], Heap()
 for fetch in (False, True):
     if fetch:

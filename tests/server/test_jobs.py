@@ -17,13 +17,13 @@ from typing import Any
 import httpx
 import pytest
 
-from hexwrap_server.engine import ProcessEngine
-from hexwrap_server.intake import read_and_keep
-from hexwrap_server.jobs import JobManager
-from hexwrap_server.metrics import Metrics
+from hexwrap_server.http.metrics import Metrics
+from hexwrap_server.jobs.engine import ProcessEngine
+from hexwrap_server.jobs.intake import read_and_keep
+from hexwrap_server.jobs.manager import JobManager
+from hexwrap_server.jobs.store import FolderInUseError, Job, Store
+from hexwrap_server.jobs.worker import WorkerDiedError
 from hexwrap_server.settings import MIB, Settings
-from hexwrap_server.store import FolderInUseError, Job, Store
-from hexwrap_server.worker import WorkerDiedError
 from tests.server.bodies import request, tube
 from tests.server.live import Live, finished, running, until_at
 

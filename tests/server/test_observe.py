@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from hexwrap_server import routes
+from hexwrap_server.http import routes
 from tests.server.live import Live, running
 
 

@@ -19,8 +19,8 @@ from schemathesis.specs.openapi.checks import (
     status_code_conformance,
 )
 
-from hexwrap_server.routes import router
-from hexwrap_server.viewer import router as viewer
+from hexwrap_server.http.routes import router
+from hexwrap_server.http.viewer import router as viewer
 from tests.server.bodies import request
 from tests.server.live import Live, running
 

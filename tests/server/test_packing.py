@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hexwrap_server import wire
-from hexwrap_server.packing import Packer
-from hexwrap_server.parts import PARTS, chosen
-from hexwrap_server.wire import result_json
-from hexwrap_server.writing import pack_rest, packing
+from hexwrap_server.jobs.packing import Packer
+from hexwrap_server.jobs.parts import PARTS, chosen
+from hexwrap_server.jobs.writing import pack_rest, packing
+from hexwrap_server.output import wire
+from hexwrap_server.output.wire import result_json
 from tests.server.analytic import cylinder
 
 

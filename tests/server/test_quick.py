@@ -11,10 +11,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hexwrap_server import quick
-from hexwrap_server.parsing import loads
+from hexwrap_server.input import quick
+from hexwrap_server.input.json_text import loads
+from hexwrap_server.input.schemas import parse_points, parse_request
 from hexwrap_server.problems import FormError
-from hexwrap_server.schemas import parse_points, parse_request
 from hexwrap_solver.arrays import Ragged
 from tests.server.bodies import request, tube
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hexwrap_server.files.raster import Camera, Polygons, draw
+from hexwrap_server.output.raster import Camera, Polygons, draw
 from hexwrap_solver.arrays import Ragged
 
 #: Looks along z from below; a unit at depth 10 is 100 samples.

@@ -16,8 +16,8 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hexwrap_server.readers.errors import FileTypeError, SeveralObjectsError, UnreadableFileError
-from hexwrap_server.reading import READERS, read_surface
+from hexwrap_server.input.readers.errors import FileTypeError, SeveralObjectsError, UnreadableFileError
+from hexwrap_server.input.surface_files import READERS, read_surface
 from hexwrap_solver.errors import SurfaceError
 from hexwrap_solver.surface import NurbsSurface, SentMesh, surface_from_mesh
 from tests.solver.surface.shapes import mesh, triangles, tube
@@ -280,7 +280,7 @@ def test_npz_with_objects_is_not_unpickled() -> None:
 
 
 def test_npz_bomb_is_refused_before_it_is_unpacked(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("hexwrap_server.readers.npz.LARGEST", 10_000)
+    monkeypatch.setattr("hexwrap_server.input.readers.npz.LARGEST", 10_000)
     with pytest.raises(UnreadableFileError, match="unpack"):
         read_surface(archive(vertices=b"\0" * 20_000), "a.npz")
 

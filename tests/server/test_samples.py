@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hexwrap_server import samples
-from hexwrap_server.reading import read_surface
+from hexwrap_server.input.surface_files import read_surface
 from hexwrap_server.samples import make
 from hexwrap_solver.surface import NurbsSurface, surface_from_nurbs
 from hexwrap_solver.surface.nurbs import domain, evaluate, evaluate_points

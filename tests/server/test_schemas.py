@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from hexwrap_server import schemas
+from hexwrap_server.input import schemas
+from hexwrap_server.input.schemas import parse_request
 from hexwrap_server.problems import MOST_LISTED, FormError
-from hexwrap_server.schemas import parse_request
 
 SURFACE = {"vertices": [[0, 0, 0]], "faces": []}
 

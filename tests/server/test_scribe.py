@@ -13,10 +13,10 @@ import httpx
 import psutil
 import pytest
 
-from hexwrap_server.disk import StorageError
-from hexwrap_server.scribe import Scribe, There
-from hexwrap_server.wire import result_json
-from hexwrap_server.writing import Writer, Written
+from hexwrap_server.jobs.disk import StorageError
+from hexwrap_server.jobs.scribe import Scribe, There
+from hexwrap_server.jobs.writing import Writer, Written
+from hexwrap_server.output.wire import result_json
 from hexwrap_solver.pipeline import Solution
 from tests.server.analytic import cylinder
 from tests.server.process import children, free_port, is_gone, served
@@ -136,7 +136,7 @@ def test_scribes_go_with_their_workers(tmp_path: Path) -> None:
         url = f"http://127.0.0.1:{port}/v1/solve"
 
         def scribes() -> list[psutil.Process]:
-            return [p for p in children(process) if "hexwrap_server.scribe_main" in " ".join(p.cmdline())]
+            return [p for p in children(process) if "jobs.scribe_main" in " ".join(p.cmdline())]
 
         for turn in range(2):  # it is started after the first job, and used for the second
             answer = httpx.post(url, json=body(turn), trust_env=False, timeout=60)

@@ -13,8 +13,8 @@ import httpx
 import numpy as np
 import pytest
 
-from hexwrap_server.bodies import _unpacked
-from hexwrap_server.security import host_name
+from hexwrap_server.http.bodies import _unpacked
+from hexwrap_server.http.security import host_name
 from tests.server.bodies import request, tube
 from tests.server.live import Live, finished, running
 

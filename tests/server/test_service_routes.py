@@ -16,8 +16,9 @@ from ezdxf.entities import LWPolyline
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hexwrap_server import quick, routes
-from hexwrap_server.service import Service
+from hexwrap_server.http import routes
+from hexwrap_server.http.service import Service
+from hexwrap_server.input import quick
 from hexwrap_server.settings import Settings
 from tests.server.bodies import request, tube
 from tests.server.live import Live, finished, running

@@ -71,7 +71,8 @@ def test_taken_port_is_told_clearly(tmp_path: Path) -> None:
 
 BROKEN = """
 import sys
-from hexwrap_server import cli, engine
+from hexwrap_server.cli import main as cli
+from hexwrap_server.jobs import engine
 async def start(self):
     raise OSError("There is no machine.")
 engine.ProcessEngine.start = start

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from hexwrap_server.service import open_store
+from hexwrap_server.http.service import open_store
+from hexwrap_server.jobs.store import FolderInUseError
 from hexwrap_server.settings import Settings, add_arguments, flag, readme_table, variable
-from hexwrap_server.store import FolderInUseError
 
 README = Path(__file__).parents[2] / "README.md"
 

@@ -17,10 +17,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from hexwrap_server import codec, later
-from hexwrap_server.cache import SHARES, CachingRunner, StageCache, size_of
-from hexwrap_server.codec import CodecError, decode, digest, encode
-from hexwrap_server.disk import StorageError, prune, write_whole
+from hexwrap_server.jobs import codec, later
+from hexwrap_server.jobs.cache import SHARES, CachingRunner, StageCache, size_of
+from hexwrap_server.jobs.codec import CodecError, decode, digest, encode
+from hexwrap_server.jobs.disk import StorageError, prune, write_whole
 from hexwrap_solver.arrays import Ragged
 from hexwrap_solver.conformal.types import BoundaryCondition, Deck
 from hexwrap_solver.pattern.types import PatternSettings

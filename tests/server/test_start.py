@@ -11,7 +11,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from hexwrap_server.frames import write_frame
+from hexwrap_server.jobs.pipes import write_frame
 
 #: Libraries of single file formats and pictures.
 FORMATS = {"matplotlib", "ezdxf", "trimesh"}
@@ -22,10 +22,10 @@ SLOW_SCRIBE = """
 import sys, time
 class Slow:
     def find_spec(self, name, path=None, target=None):
-        if name == "hexwrap_server.scribe":
+        if name == "hexwrap_server.jobs.scribe":
             time.sleep(60)
 sys.meta_path.insert(0, Slow())
-from hexwrap_server.scribe_main import main
+from hexwrap_server.jobs.scribe_main import main
 main()
 """
 
@@ -48,11 +48,11 @@ def child(program: str) -> Iterator[subprocess.Popen[bytes]]:
 @pytest.mark.parametrize(
     ("module", "not_loaded"),
     [
-        ("app", FORMATS),
-        ("work", FORMATS | {"fastapi"}),
-        ("scribe", FORMATS | {"fastapi", "pydantic"}),
-        ("worker", FORMATS | {"scipy"}),  # these two listen before they load anything large
-        ("scribe_main", FORMATS | {"scipy"}),
+        ("http.app", FORMATS),
+        ("jobs.work", FORMATS | {"fastapi"}),
+        ("jobs.scribe", FORMATS | {"fastapi", "pydantic"}),
+        ("jobs.worker", FORMATS | {"scipy"}),  # these two listen before they load anything large
+        ("jobs.scribe_main", FORMATS | {"scipy"}),
     ],
 )
 def test_what_is_not_loaded_at_the_start(module: str, not_loaded: set[str]) -> None:
@@ -79,7 +79,7 @@ def test_a_scribe_leaves_with_its_worker_while_it_loads() -> None:
 @pytest.mark.parametrize("name", ["scribe_main", "worker"])
 def test_who_cannot_be_spoken_to_leaves(name: str) -> None:
     """Three words are announced, and one of them is larger than any memory."""
-    with child(f"from hexwrap_server.{name} import main; main()") as process:
+    with child(f"from hexwrap_server.jobs.{name} import main; main()") as process:
         assert process.stdin is not None
         if name == "worker":
             process.stdin.write((2**62).to_bytes(8, "little"))
@@ -92,7 +92,7 @@ def test_who_cannot_be_spoken_to_leaves(name: str) -> None:
 def test_standard_input_is_left_to_nobody() -> None:
     """On Windows a library that looks at it while it is loaded waits for the thread that reads there."""
     program = (
-        "import os; from hexwrap_server.frames import pipes_of_child; inlet, outlet = pipes_of_child(); "
+        "import os; from hexwrap_server.jobs.pipes import pipes_of_child; inlet, outlet = pipes_of_child(); "
         "outlet.write(os.read(0, 9) + b', ' + inlet.read()); outlet.flush()"
     )
     with child(program) as process:

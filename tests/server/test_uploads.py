@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hexwrap_server.input.requests import Outcome, Wanted
+from hexwrap_server.jobs.store import Job, Store, Work
 from hexwrap_server.problems import FormError, problem
-from hexwrap_server.requests import Outcome, Wanted
-from hexwrap_server.store import Job, Store, Work
 from hexwrap_solver.conformal.types import BoundaryCondition
 from hexwrap_solver.errors import RequestError
 from tests.server.bodies import tube

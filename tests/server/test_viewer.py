@@ -70,7 +70,7 @@ class Server:
         env = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT / "solver"), str(ROOT / "server")])}
         settings = f"Settings(port={self.port}, data={str(self.data)!r}, workers=1)"
         program = (
-            "from hexwrap_server.app import serve\n"
+            "from hexwrap_server.http.app import serve\n"
             "from hexwrap_server.settings import Settings\n"
             f"serve({settings})"
         )

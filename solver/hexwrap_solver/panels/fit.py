@@ -12,6 +12,7 @@ from hexwrap_solver.errors import ConvergenceError, PanelsError
 from hexwrap_solver.panels import limits
 from hexwrap_solver.panels.best import jointly_largest
 from hexwrap_solver.panels.energy import minimise_watertight
+from hexwrap_solver.panels.facing import facing_edges
 from hexwrap_solver.panels.halfedges import HalfEdges, half_edges
 from hexwrap_solver.panels.planar import crossing_themselves
 from hexwrap_solver.panels.polygons import edge_lengths, fan_areas, mean_edges, means, row_minima, take_rows
@@ -128,6 +129,7 @@ def _fit_split(
         notes=notes + _joint_note(settings) + _dropped_note(int((~regular & ~cut).sum()), settings.joint),
         spare_limit=spare and _merge(kept, spare[0][roomy], cut, mean_edges(shapes))[face],
         spare_center=spare and _merge(kept, spare[1][roomy], cut, shape_center)[face],
+        facing=facing_edges(edges, pattern.faces.offsets[:-1], face),
     )
 
 

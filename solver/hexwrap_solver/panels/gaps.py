@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexwrap_solver.arrays import Floats, Ints
+from hexwrap_solver.arrays import Floats
+from hexwrap_solver.panels.facing import edge_ends, facing_edges, mean_normals, widths
 from hexwrap_solver.panels.halfedges import HalfEdges
 from hexwrap_solver.panels.types import Panels
 from hexwrap_solver.pattern.types import Pattern
@@ -28,51 +29,16 @@ class Gaps:
 
 def gaps(pattern: Pattern, edges: HalfEdges, panels: Panels) -> Gaps:
     """Facing edges are those that came from the same edge of the pattern."""
-    panel_of = np.full(pattern.n_cells, -1, dtype=np.int64)
-    panel_of[panels.face] = np.arange(panels.n_panels)
-    once = edges.pairs()  # both sides see the same
-    left, right = panel_of[edges.cell[once]], panel_of[edges.across[once]]
-    both = (left >= 0) & (right >= 0)
-    here, left, right = once[both], left[both], right[both]
-    there = edges.twin[here]
-    a, b = _edges_of(pattern, panels, edges.cell[here], here, left)
-    c, d = _edges_of(pattern, panels, edges.cell[there], there, right)
-    n1, n2 = panels.normal[left], panels.normal[right]
-    mean = n1 + n2
-    mean /= np.linalg.norm(mean, axis=1)[:, None]
+    facing = facing_edges(edges, pattern.faces.offsets[:-1], panels.face)
+    a, b = edge_ends(panels.polygons, facing.left, facing.start_left)
+    c, d = edge_ends(panels.polygons, facing.right, facing.start_right)
+    n1, n2 = panels.normal[facing.left], panels.normal[facing.right]
+    mean = mean_normals(facing, panels.normal)
     figures = (
-        _width(a, b, c, d, mean),
+        widths(panels.polygons, facing, mean),
         np.abs(np.einsum("hd,hd->h", (c + d - a - b) / 2, mean)),
         np.arctan2(np.linalg.norm(np.cross(n1, n2), axis=1), np.einsum("hd,hd->h", n1, n2)),
     )
     result = np.full((3, len(edges.cell)), np.nan)
-    result[:, here] = result[:, there] = figures
+    result[:, facing.here] = result[:, facing.there] = figures
     return Gaps(*result)
-
-
-def _width(a: Floats, b: Floats, c: Floats, d: Floats, mean: Floats) -> Floats:
-    """Least distance of segments ab and cd (which run opposite ways) in the plane across ``mean``."""
-    a, b, c, d = (x - np.einsum("hd,hd->h", x, mean)[:, None] * mean for x in (a, b, c, d))
-    ends = [(c, a, b), (d, a, b), (a, c, d), (b, c, d)]
-    return np.asarray(np.min([_signed_distance(*end, mean) for end in ends], axis=0))
-
-
-def _signed_distance(point: Floats, a: Floats, b: Floats, mean: Floats) -> Floats:
-    """Distance to segment ab, negative on its left (inside the polygon that runs along ab)."""
-    along, spoke = b - a, point - a
-    squared = np.einsum("hd,hd->h", along, along)
-    t = np.einsum("hd,hd->h", spoke, along) / np.where(squared > 0, squared, 1.0)
-    distance = np.linalg.norm(spoke - np.clip(t, 0.0, 1.0)[:, None] * along, axis=1)
-    inside = np.einsum("hd,hd->h", np.cross(along, spoke), mean) > 0
-    return np.asarray(np.where(inside & (t >= 0) & (t <= 1), -distance, distance))
-
-
-def _edges_of(
-    pattern: Pattern, panels: Panels, cell: Ints, half_edge: Ints, panel: Ints
-) -> tuple[Floats, Floats]:
-    """Ends of the panels' edges that came from the given half-edges."""
-    corner = half_edge - pattern.faces.offsets[cell]
-    count = panels.polygons.lengths[panel]
-    start = panels.polygons.offsets[panel]
-    points = np.asarray(panels.polygons.values, dtype=np.float64)
-    return points[start + corner], points[start + (corner + 1) % count]

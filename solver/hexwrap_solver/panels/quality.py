@@ -49,7 +49,7 @@ def measure(
     row, count, mean = polygons.row, polygons.lengths, mean_edges(polygons)
     ideal = (np.pi * (count - 2) / count)[row]
     progress(0.5, "distances to the surface")
-    away = _surface_distances(cmap.surface, panels)
+    away = _surface_distances(cmap.surface, pattern, panels)
     progress(0.9, "looking for overlaps")
     return replace(
         quality,
@@ -69,12 +69,16 @@ def measure(
     )
 
 
-def _surface_distances(surface: Surface, panels: Panels) -> Floats:
+def _surface_distances(surface: Surface, pattern: Pattern, panels: Panels) -> Floats:
     """(q,) of corners and centre: where a panel spans a ridge its middle stands farther off."""
-    points = np.concatenate([np.asarray(panels.polygons.values, dtype=np.float64), panels.center])
-    away = surface.tree.nearest(points).distance
-    corners, centers = np.split(away, [len(panels.polygons.values)])
-    return np.maximum(row_maxima(corners, panels.polygons.offsets), centers)
+    tree, polygons, n = surface.tree, panels.polygons, panels.n_panels
+    points = np.concatenate([np.asarray(polygons.values, dtype=np.float64), panels.center])
+    row = np.concatenate([polygons.row, np.arange(n)])
+    start = pattern.faces.offsets[panels.face]
+    corner = np.arange(len(polygons.values)) - polygons.offsets[polygons.row]  # a trimmed panel may have more
+    corner = np.minimum(corner, pattern.faces.lengths[panels.face][polygons.row] - 1)
+    beside = pattern.triangle[pattern.faces.values[start[polygons.row] + corner].astype(np.int64)]
+    return tree.farthest(points, row, n, np.concatenate([beside, tree.centroids.query(panels.center)[1]]))
 
 
 def _count_overlaps(pattern: Pattern, edges: HalfEdges, panels: Panels) -> int:

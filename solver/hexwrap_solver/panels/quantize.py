@@ -8,6 +8,8 @@ import numpy as np
 
 from hexwrap_solver.arrays import Floats, Ints, Ragged
 from hexwrap_solver.errors import PanelsError
+from hexwrap_solver.panels.facing import mean_normals, widths
+from hexwrap_solver.panels.fewest import SLACK, Fewest, Joints, fewest_lengths
 from hexwrap_solver.panels.sizes import (
     ALIKE,
     ALIKE_AREA,
@@ -28,14 +30,17 @@ TRADE_OFF_CLASSES = 40
 class SizeKey:
     """The settings that ``quantize`` depends on."""
 
-    sizes: int | None
+    sizes: int | str | None
+    max_gap: float | None
     size_cost: str
     edge_range: tuple[float, float] | None
     increment: float
 
     @classmethod
     def of(cls, settings: PanelSettings) -> SizeKey:
-        return cls(settings.sizes, settings.size_cost, settings.edge_range, settings.increment)
+        return cls(
+            settings.sizes, settings.max_gap, settings.size_cost, settings.edge_range, settings.increment
+        )
 
 
 def quantize(fitted: FittedPanels, settings: PanelSettings) -> Panels:
@@ -54,11 +59,16 @@ def quantize(fitted: FittedPanels, settings: PanelSettings) -> Panels:
     if not usable:
         _require_increment(limits[0], np.flatnonzero(regular), settings.increment)
     choices, limits = [choices[k] for k in usable], [limits[k] for k in usable]
-    lengths = [
-        choose_lengths(limit, settings.sizes, settings.size_cost, settings.increment, smallest)
-        for limit in limits
-    ]
-    pick = min(range(len(lengths)), key=lambda k: _loss(fitted, lengths[k], smallest, settings))
+    said: tuple[str, ...] = ()
+    if settings.sizes == "fewest":
+        length, said = _fewest(choices[0], limits[0], settings)
+        pick, lengths = 0, [length]
+    else:
+        lengths = [
+            choose_lengths(limit, settings.sizes, settings.size_cost, settings.increment, smallest)
+            for limit in limits
+        ]
+        pick = min(range(len(lengths)), key=lambda k: _loss(fitted, lengths[k], smallest, settings))
     fitted, length = choices[pick], lengths[pick]
     class_length, member, class_count = np.unique(length, return_inverse=True, return_counts=True)
     edge_length = fitted.limit.copy()
@@ -84,8 +94,63 @@ def quantize(fitted: FittedPanels, settings: PanelSettings) -> Panels:
             *fitted.notes,
             *_range_notes(settings, fitted.limit[regular], outside),
             *_size_notes(settings, limits[pick], length),
+            *said,
         ),
         outside=outside,
+    )
+
+
+def _fewest(fitted: FittedPanels, limit: Floats, settings: PanelSettings) -> tuple[Floats, tuple[str, ...]]:
+    """The fewest lengths that keep joints within ``max_gap``; of as few, those that cover most."""
+    if settings.max_gap is None:
+        raise PanelsError(
+            "Sizes are 'fewest', but no greatest joint is given: set max_gap to the widest joint that may be"
+            " left open, in the unit of the model.",
+            field=("panels", "max_gap"),
+        )
+    if fitted.facing is None or not len(limit):
+        return floor_to(limit, settings.increment), ()
+    order = np.argsort(limit, kind="stable")
+    highest = np.empty_like(limit)
+    highest[order] = level(floor_to(limit[order], settings.increment))
+    joints = _joints(fitted)
+    found = fewest_lengths(highest, joints, settings.max_gap)
+    said = _wide_note(fitted, found, settings.max_gap)
+    length, bound = found.length, np.where(found.over, np.inf, settings.max_gap * (1 + SLACK))
+    for classes in range(1, min(len(np.unique(length)), TRADE_OFF_CLASSES) + 1):
+        covering = choose_lengths(limit, classes, settings.size_cost, settings.increment)
+        if (joints.width(covering) <= bound).all():
+            return covering, said
+    return length, said
+
+
+def _joints(fitted: FittedPanels) -> Joints:
+    """The joints of the regular panels, measured on their polygons."""
+    facing, regular = fitted.facing, fitted.regular
+    assert facing is not None
+    position = np.full(len(regular), -1, dtype=np.int64)
+    position[regular] = np.arange(int(regular.sum()))
+    mean = mean_normals(facing, fitted.normal)
+    p = fitted.spokes.shape[1]
+    return Joints(
+        position[facing.left],
+        position[facing.right],
+        lambda length: widths(_polygons(fitted, length), facing, mean),
+        1 / (2 * np.tan(np.pi / p)),
+    )
+
+
+def _wide_note(fitted: FittedPanels, found: Fewest, max_gap: float) -> tuple[str, ...]:
+    if not found.over.any() or fitted.facing is None:
+        return ()
+    worst = int(np.where(found.over, found.width, -np.inf).argmax())
+    pair = (fitted.facing.left[worst], fitted.facing.right[worst])
+    x, y, z = np.mean([fitted.center[panel] for panel in pair], axis=0)
+    return (
+        f"{int(found.over.sum())} joints are wider than max_gap {max_gap:g} even where every panel has a"
+        f" length of its own, the widest {found.width[worst]:.4g}, between panels {pair[0]} and {pair[1]} at"
+        f" ({x:.4g}, {y:.4g}, {z:.4g}): smaller cells, another boundary condition or a max_gap of at least"
+        f" {found.width[worst]:.4g} would help.",
     )
 
 
@@ -141,12 +206,11 @@ def _trade_off(fitted: FittedPanels, limits: list[Floats], settings: PanelSettin
     most = max(len(curve) for curve in curves)
     filled = np.stack([curve[np.minimum(np.arange(most), len(curve) - 1)] for curve in curves])
     best = filled[..., 0 if settings.size_cost == "area" else 1].argmin(axis=0)
-    uncovered, worst = filled[best, np.arange(most)].T
-    return TradeOff(np.arange(1, most + 1), uncovered, worst)
+    return TradeOff(np.arange(1, most + 1), *filled[best, np.arange(most)].T)
 
 
 def _curve(fitted: FittedPanels, allowed: Floats, settings: PanelSettings) -> Floats:
-    """(k, 2) uncovered part and worst gap for 1…k classes."""
+    """(k, 4) for 1…k classes: uncovered part, worst gap, mean and greatest width of the joints."""
     order = np.argsort(allowed, kind="stable")
     limit = allowed[order]
     made, floored = partition(limit, TRADE_OFF_CLASSES, settings.size_cost, settings.increment)
@@ -155,11 +219,17 @@ def _curve(fitted: FittedPanels, allowed: Floats, settings: PanelSettings) -> Fl
     width_of_unit = 1 / np.tan(np.pi / p)
     cell_area = float(fitted.cell_area[fitted.regular].sum())
     free_length = _free_length(fitted)[order]
+    joints = None if fitted.facing is None else _joints(fitted)
+    own = np.zeros(0) if joints is None else joints.width(allowed)
+    lost = np.zeros(len(allowed) + 1)  # the last: of panels with a given shape, which lose nothing
     curve = []
     for start in made.start:
         length = lengths_of(start, floored)
         uncovered = 1 - _unit_area(p) * float(length @ length) / cell_area
-        curve.append((uncovered, float(np.max(free_length - length)) * width_of_unit))
+        lost[order] = limit - length
+        joint = own if joints is None else own + joints.shrink * (lost[joints.left] + lost[joints.right])
+        widest = float(np.max(free_length - length)) * width_of_unit
+        curve.append((uncovered, widest, joint.mean() if len(joint) else 0.0, joint.max(initial=0.0)))
     return np.array(curve)
 
 
@@ -182,7 +252,7 @@ def _range_notes(settings: PanelSettings, limit: Floats, outside: Ints) -> tuple
 
 def _size_notes(settings: PanelSettings, limit: Floats, length: Floats) -> list[str]:
     """Of sizes that are not used, and of panels that share one far below what their cells allow."""
-    if settings.sizes is None or not len(length):
+    if not isinstance(settings.sizes, int) or not len(length):
         return []
     notes = []
     different = len(np.unique(level(np.sort(floor_to(limit, settings.increment)))))

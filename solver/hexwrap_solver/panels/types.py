@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged
+from hexwrap_solver.panels.facing import Facing
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,8 @@ class ComponentSettings:
 class PanelSettings:
     """How panels are rationalized. Lengths in model units.
 
-    sizes: number of edge-length classes, fewer where more would be alike, None: one length per panel.
+    sizes: number of edge-length classes, fewer where more would be alike, None: one length per panel;
+    ``fewest``: as few as leave no joint wider than max_gap. max_gap: joints above it are counted.
     edge_range: allowed (min, max).
     size_cost: ``area`` (least uncovered area) or ``worst`` (least greatest loss).
     target: upper limit of a panel's edge length. joint: least width left open between neighbours.
@@ -40,7 +42,8 @@ class PanelSettings:
     """
 
     mode: Literal["split", "watertight"] = "split"
-    sizes: int | None = 11
+    sizes: int | Literal["fewest"] | None = 11
+    max_gap: float | None = None
     size_cost: Literal["area", "worst"] = "area"
     edge_range: tuple[float, float] | None = None
     target: Literal["shortest", "inscribed", "best", "mean"] = "inscribed"
@@ -58,11 +61,15 @@ class TradeOff:
 
     sizes: (k,) numbers of classes 1…; uncovered: (k,) fraction of the cells' area left open;
     worst_gap: (k,) greatest mean gap of a panel to its cell, model units.
+    joint_mean, joint_max: (k,) mean and greatest width of the joints between neighbours, model units, as they
+    would be were all facing edges parallel.
     """
 
     sizes: Ints
     uncovered: Floats
     worst_gap: Floats
+    joint_mean: Floats
+    joint_max: Floats
 
 
 @dataclass(frozen=True)
@@ -74,7 +81,8 @@ class FittedPanels:
     around the centre at edge length 1, of the r regular panels in order. shapes: polygons of the others in
     order. center, normal: (q, 3). limit: (q,) greatest edge length (mean edge of the others). whole: (q,).
     cell_area: (q,) of the panels' cells. energy, notes: as in ``Panels``. spare_limit, spare_center: another
-    choice of limit and center without overlap, which few classes may suit better.
+    choice of limit and center without overlap, which few classes may suit better. facing: edges of
+    neighbouring panels, None for watertight ones.
     """
 
     mode: Literal["split", "watertight"]
@@ -91,6 +99,7 @@ class FittedPanels:
     notes: tuple[str, ...] = ()
     spare_limit: Floats | None = None
     spare_center: Floats | None = None
+    facing: Facing | None = None
 
 
 @dataclass(frozen=True)

@@ -89,6 +89,24 @@ class TriangleTree:
         found.distance[far] = _length(gap)
         return found
 
+    def farthest(self, points: Floats, row: Ints, rows: int, near: Ints | None = None) -> Floats:
+        """(rows,) the greatest distance from the mesh among the points of each row, exactly; 0 for none.
+
+        points: (k, 3), finite. row: (k,) row of each. near: (k,) a triangle believed to be near each point.
+        Its distance bounds the point's own from above, so that most points need not be searched for.
+        """
+        if near is None:
+            near = np.asarray(self.centroids.query(points)[1])
+        bound = nearest_in_triangles(points, self.corners[near])[1]
+        greatest = np.zeros(rows)
+        order = np.lexsort((-bound, row))
+        while len(order):
+            first = order[np.diff(row[order], prepend=-1) > 0]
+            np.maximum.at(greatest, row[first], self.nearest(points[first]).distance)
+            rest = order[np.diff(row[order], prepend=-1) == 0]
+            order = rest[bound[rest] > greatest[row[rest]]]
+        return greatest
+
     def _moved_near(self, points: Floats) -> tuple[Ints, Floats]:
         """Which points are too far away to search for them as they are, and all points, those moved."""
         low, high = self.low[0][:, 0], self.high[0][:, 0]

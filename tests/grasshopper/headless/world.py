@@ -28,7 +28,7 @@ except ImportError:
 
 PYTHON = os.environ["HEXWRAP_PYTHON"]
 SERVE = (
-    "from hexwrap_server.app import serve; from hexwrap_server.settings import Settings; "
+    "from hexwrap_server.http.app import serve; from hexwrap_server.settings import Settings; "
     "serve(Settings.from_environment())"
 )
 

@@ -10,13 +10,14 @@ import pytest
 from hexwrap_solver.conformal import conformal_map
 from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap
 from hexwrap_solver.errors import PatternError
-from hexwrap_solver.pattern import lay_pattern, place
-from hexwrap_solver.pattern.align import Straightening
-from hexwrap_solver.pattern.deform import distortion_of
+from hexwrap_solver.pattern import lay_pattern
 from hexwrap_solver.pattern.lattice import LATTICES
-from hexwrap_solver.pattern.place import Placing, loops_to_align, place_lattice
-from hexwrap_solver.pattern.rows import rows_along
-from hexwrap_solver.pattern.sides import sides_of
+from hexwrap_solver.pattern.place import choose
+from hexwrap_solver.pattern.place.align import Straightening
+from hexwrap_solver.pattern.place.choose import Placing, loops_to_align, place_lattice
+from hexwrap_solver.pattern.place.deform import distortion_of
+from hexwrap_solver.pattern.place.rows import rows_along
+from hexwrap_solver.pattern.place.sides import sides_of
 from hexwrap_solver.pattern.types import PatternSettings
 from tests.solver.pattern import annuli
 from tests.solver.pattern.test_lay import check_closed
@@ -187,7 +188,7 @@ def test_of_one_pattern_every_loop_is_straightened_once(monkeypatch):
     made = []
     of = Straightening.of.__func__
     monkeypatch.setattr(Straightening, "of", lambda *a: (made.append(a[-1]), of(Straightening, *a))[1])
-    monkeypatch.setattr(place, "BEARABLE", 0.0)
+    monkeypatch.setattr(choose, "BEARABLE", 0.0)
     placing = Placing.of(MAPS["entrance"], LATTICES["hex"], PatternSettings(around=60))
     for around in (60, 72, 96):
         placing.at(PatternSettings(around=around))

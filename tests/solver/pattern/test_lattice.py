@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hexwrap_solver.pattern.align import symmetry_centres
 from hexwrap_solver.pattern.lattice import LATTICES, Motion
+from hexwrap_solver.pattern.place.align import symmetry_centres
 
 KINDS = st.sampled_from(list(LATTICES))
 INTEGERS = st.integers(-50, 50)

@@ -13,10 +13,10 @@ from hexwrap_solver.arrays import Ragged
 from hexwrap_solver.errors import NotAdaptedError, PatternError
 from hexwrap_solver.pattern import lay_pattern
 from hexwrap_solver.pattern.lattice import LATTICES
-from hexwrap_solver.pattern.lay import mean_edge
-from hexwrap_solver.pattern.place import place_lattice
-from hexwrap_solver.pattern.placement import BEARABLE
-from hexwrap_solver.pattern.size import width_per_cell
+from hexwrap_solver.pattern.lay_pattern import mean_edge
+from hexwrap_solver.pattern.place.choose import place_lattice
+from hexwrap_solver.pattern.place.placement import BEARABLE
+from hexwrap_solver.pattern.place.size import width_per_cell
 from hexwrap_solver.pattern.types import Pattern, PatternSettings
 from tests.solver.conformal.test_conformal_map import ring_with_corners
 from tests.solver.pattern import annuli

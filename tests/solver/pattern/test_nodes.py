@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from hexwrap_solver.errors import PatternError
-from hexwrap_solver.pattern import nodes
 from hexwrap_solver.pattern.lattice import LATTICES
-from hexwrap_solver.pattern.lay import layout_of
-from hexwrap_solver.pattern.place import Placing
+from hexwrap_solver.pattern.lay import nodes
+from hexwrap_solver.pattern.lay_pattern import layout_of
+from hexwrap_solver.pattern.place.choose import Placing
 from hexwrap_solver.pattern.types import PatternSettings
 from tests.solver.pattern import annuli
 

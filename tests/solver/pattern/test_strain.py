@@ -8,12 +8,12 @@ from itertools import product
 import numpy as np
 import pytest
 
-from hexwrap_solver.pattern import align
-from hexwrap_solver.pattern.deform import System
 from hexwrap_solver.pattern.lattice import LATTICES, Motion
-from hexwrap_solver.pattern.place import place_lattice
-from hexwrap_solver.pattern.sides import lines_of
-from hexwrap_solver.pattern.strain import Strain
+from hexwrap_solver.pattern.place import align
+from hexwrap_solver.pattern.place.choose import place_lattice
+from hexwrap_solver.pattern.place.deform import System
+from hexwrap_solver.pattern.place.sides import lines_of
+from hexwrap_solver.pattern.place.strain import Strain
 from hexwrap_solver.pattern.types import PatternSettings
 from tests.solver.pattern.test_align import CASES, HEX_CASES, MAPS
 

@@ -1,0 +1,95 @@
+"""The pipeline without the server: an input of the command line → a checked request → a solution."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from hexwrap_server import samples
+from hexwrap_server.cli.options import asked_body, asked_meshing
+from hexwrap_server.input.json_text import loads
+from hexwrap_server.input.requests import SentSurface, Wanted
+from hexwrap_server.input.schemas import parse_request
+from hexwrap_server.input.surface_files import read_surface
+from hexwrap_server.jobs.cache import CachingRunner, StageCache
+from hexwrap_server.jobs.work import run_stages
+from hexwrap_server.jobs.worker import Report
+from hexwrap_solver.pipeline import Solution
+from hexwrap_solver.surface import MeshSettings, NurbsSurface, SentMesh
+
+#: Nobody but the user waits here, so only what no memory would hold is refused.
+MAX_VERTICES, MAX_PANELS = 20_000_000, 5_000_000
+SAMPLE = "sample:"
+
+
+class UsageError(Exception):
+    """What was typed makes no sense; the sentence says why."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """A request whose form has been checked."""
+
+    name: str
+    surface: SentSurface
+    wanted: Wanted
+
+
+def read_body(given: str) -> tuple[dict[str, Any], SentMesh | NurbsSurface | None]:
+    """The request body in a request file or sample, or the surface in any other file.
+
+    given: a path or ``sample:NAME``. Raises UsageError, HexwrapError.
+    """
+    if given.startswith(SAMPLE):
+        return sample_body(given.removeprefix(SAMPLE)), None
+    path = Path(given)
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise UsageError(f"{given} cannot be read: {error.strerror or error}.") from None
+    if path.suffix.lower() != ".json":
+        return {"name": path.stem[:200]}, read_surface(data, path.name)
+    body = loads(data)
+    if not isinstance(body, dict):
+        raise UsageError(f"{given} holds no JSON object; a request or a surface is one.")
+    body = body if "surface" in body else {"surface": body}
+    return {"name": path.stem[:200], **body}, None
+
+
+def sample_body(name: str) -> dict[str, Any]:
+    """The request of a bundled sample. Raises UsageError."""
+    if name not in samples.names():
+        raise UsageError(f"there is no sample '{name}'; there are {', '.join(samples.names())}.")
+    return samples.load(name)
+
+
+def task(given: str, arguments: argparse.Namespace) -> Task:
+    """What an input and the options ask for. Raises UsageError, HexwrapError."""
+    body, surface = read_body(given)
+    meshing = asked_meshing(arguments)
+    if surface is not None:
+        body["surface"] = {"id": ""}  # stands for the file's surface while the rest is checked
+    elif isinstance(body["surface"], dict) and "nurbs" in body["surface"] and meshing:
+        body["surface"] = {**body["surface"], "mesh": {**body["surface"].get("mesh", {}), **meshing}}
+    request = parse_request(asked_body(arguments, body), MAX_VERTICES, MAX_PANELS)
+    sent = request.surface
+    if isinstance(surface, SentMesh):
+        sent = SentSurface(mesh=surface)
+    elif isinstance(surface, NurbsSurface):
+        sent = SentSurface(nurbs=surface, meshing=MeshSettings(**meshing, max_vertices=MAX_VERTICES))
+    if not isinstance(sent, SentSurface):
+        raise UsageError(f"{given} names a surface that only a server knows; give the surface itself.")
+    return Task(request.name, sent, request.wanted)
+
+
+def solve_here(asked: Task, report: Report) -> tuple[Solution, dict[str, float]]:
+    """The solution and seconds per stage. Raises HexwrapError."""
+    runner = CachingRunner(StageCache(None, 0), report)
+    return run_stages(asked.surface, asked.wanted, runner), runner.timings
+
+
+def only_map(asked: Task) -> Task:
+    """The same surface and boundary, without a pattern."""
+    return replace(asked, wanted=Wanted(asked.wanted.boundary, None, None))

@@ -1,0 +1,112 @@
+"""What came out, as a table for people: of the contract's Result, however it was obtained."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from hexwrap_server.output.text import angle, length, lengths
+
+#: A table of sizes is not longer than this.
+MOST_SIZES = 24
+Rows = Iterable[tuple[str, str]]
+
+
+def print_summary(console: Console, name: str, result: dict[str, Any]) -> None:
+    """Domain, panels, sizes with counts, quality and times of a Result; parts that are null are left out."""
+    table = Table(
+        title=name, title_justify="left", title_style="bold", show_header=False, box=None, pad_edge=False
+    )
+    table.add_column(style="dim", no_wrap=True)
+    table.add_column()
+    for heading, rows in (
+        ("domain", _domain(result["map"])),
+        ("pattern", _pattern(result["pattern"])),
+        ("panels", _panels(result)),
+        ("quality", _quality(result)),
+        ("seconds", [(stage, f"{seconds:.2f}") for stage, seconds in result.get("timings", {}).items()]),
+    ):
+        words = Text("   ").join(Text.assemble((f"{key} ", "dim"), value) for key, value in rows)
+        if words:
+            table.add_row(heading, words)
+    console.print(table)
+    if result["panels"] is not None:
+        console.print(_sizes(result["sizes"]))
+    for note in (*result["mesh"]["repairs"], *result["quality"]["notes"]):
+        console.print(Text(f"• {note}"))
+
+
+def _domain(found: dict[str, Any]) -> Rows:
+    yield "", found["kind"]
+    if found["kind"] == "cone":
+        yield "angle", angle(found["cone_angle"])
+    yield "circumference", length(found["circumference"])
+    yield "steps", str(found["iterations"])
+    yield "residual", f"{found['residual']:.1e} rad"
+    if found["flips"]:
+        yield "flips", str(found["flips"])
+
+
+def _pattern(found: dict[str, Any] | None) -> Rows:
+    if found is None:
+        return
+    yield "", found["kind"]
+    yield "cells", str(len(found["faces"]))
+    yield "around", str(found["around"])
+    yield "rings", str(found["rings"])
+    yield "edge", length(found["edge_length"])
+    yield "distortion", f"{found['distortion']:.2%}"
+
+
+def _panels(result: dict[str, Any]) -> Rows:
+    if result["panels"] is None:
+        return
+    yield "", str(len(result["panels"]["face"]))
+    yield "sizes", str(len(result["sizes"]))
+    yield "distinct", str(result["quality"]["distinct_panels"])
+    yield "overlaps", str(result["quality"]["overlaps"])
+    yield "coverage", f"{result['quality']['coverage']:.1%}"
+
+
+def _quality(result: dict[str, Any]) -> Rows:
+    found = result["quality"]
+    yield "scale ratio", f"{found['scale_ratio']:.3f}"
+    if result["panels"] is None:
+        return
+    for key, words in (
+        ("planarity", "planarity"),
+        ("edge_deviation", "edges"),
+        ("angle_deviation", "angles"),
+    ):
+        yield words, _small(found[key]["max"])
+    gap = found["gap"]["tangential"]
+    yield "gap", f"{_length(gap['mean'])} (at most {_length(gap['max'])})"
+    yield "off the surface", f"at most {_length(found['surface_distance']['max'])}"
+
+
+def _small(value: float | None) -> str:
+    return "not measured" if value is None else f"{value:.1e}"
+
+
+def _length(value: float | None) -> str:
+    return "not measured" if value is None else length(value)
+
+
+def _sizes(sizes: list[dict[str, Any]]) -> Table:
+    table = Table(box=None, pad_edge=False)
+    table.add_column("size", justify="right")
+    table.add_column("edge", justify="right")
+    table.add_column("panels", justify="right")
+    table.add_column("")
+    most = max((size["count"] for size in sizes), default=1)
+    words = lengths([size["edge_length"] for size in sizes[:MOST_SIZES]])
+    for size, word in zip(sizes, words, strict=False):
+        bar = Text("█" * max(1, round(30 * size["count"] / most)), style=size["color"])
+        table.add_row(str(size["size"]), word, str(size["count"]), bar)
+    if len(sizes) > MOST_SIZES:
+        table.add_row("…", "", f"{sum(size['count'] for size in sizes[MOST_SIZES:])}", "")
+    return table

@@ -1,0 +1,1 @@
+"""The service: its routes, its page, and what stands before them."""

@@ -1,0 +1,223 @@
+"""The application and the server around it."""
+
+from __future__ import annotations
+
+import logging
+import signal
+import socket
+import sys
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from types import FrameType
+from typing import Any
+
+import uvicorn
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from starlette.exceptions import HTTPException
+from starlette.responses import Response
+from starlette.routing import BaseRoute, Match, Mount
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from hexwrap_server import __version__
+from hexwrap_server.http.answers import problem_response
+from hexwrap_server.http.compressed import Compressed
+from hexwrap_server.http.docs import add_docs
+from hexwrap_server.http.head import Head
+from hexwrap_server.http.hops.routes import hops_router
+from hexwrap_server.http.observe import METHODS, Observer
+from hexwrap_server.http.routes import JobFailedError, router
+from hexwrap_server.http.security import Doorkeeper
+from hexwrap_server.http.service import Service
+from hexwrap_server.http.viewer import add_viewer
+from hexwrap_server.jobs import garbage
+from hexwrap_server.jobs.engine import Engine
+from hexwrap_server.logs import set_up_logging
+from hexwrap_server.problems import HttpError
+from hexwrap_server.settings import Settings
+from hexwrap_solver.errors import HexwrapError
+
+#: Seconds that open connections get when the server stops.
+GRACE = 2
+log = logging.getLogger("hexwrap.server")
+
+
+class PortTakenError(Exception):
+    """Somebody else listens there."""
+
+
+def create_app(settings: Settings | None = None, engine: Engine | None = None) -> FastAPI:
+    """The application. engine: where jobs run, if not as the settings say.
+
+    Raises FolderInUseError, DamagedError, OSError where the data folder cannot be used.
+    """
+    settings = settings or Settings.from_environment()
+    service = Service(settings, engine)
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        try:
+            await service.start()
+        except Exception as error:
+            app.state.failed = error
+            await service.stop()
+            raise
+        try:
+            yield
+        finally:
+            await service.stop()
+
+    app = FastAPI(
+        title="hexwrap",
+        version=__version__,
+        summary="Seamless hexagonal, quad and triangle panels on tube-like surfaces",
+        lifespan=lifespan,
+        redirect_slashes=False,
+        docs_url=None,
+        redoc_url=None,
+    )
+    app.state.service = service
+    app.state.failed = None
+    app.include_router(router)
+    app.include_router(hops_router())
+    add_viewer(app)
+    add_docs(app)
+    app.add_exception_handler(HexwrapError, _on_error)
+    app.add_exception_handler(HTTPException, _on_http_exception)
+    app.add_exception_handler(RequestValidationError, _on_parameters)
+    app.add_middleware(Compressed)
+    app.add_middleware(Head)
+    app.add_middleware(Doorkeeper, settings=settings)
+    app.add_middleware(Observer, metrics=service.metrics)
+    return app
+
+
+def serve(settings: Settings) -> None:
+    """Serve until Ctrl-C or SIGTERM.
+
+    Raises PortTakenError, FolderInUseError, DamagedError, OSError, and what keeps the engine from starting.
+    """
+    set_up_logging(settings.log_level)
+    # uvicorn raises the signal again once it has shut down; that shall end the program quietly
+    signal.signal(signal.SIGTERM, lambda number, frame: None)
+    listener = open_listener(settings)
+    try:
+        app = create_app(settings)
+        config = uvicorn.Config(
+            _without_traceback(app),
+            log_config=None,
+            access_log=False,
+            server_header=False,
+            timeout_graceful_shutdown=GRACE,
+            h11_max_incomplete_event_size=64 * 1024,
+        )
+        garbage.look_no_more()
+        _run(_Server(config, app.state.service), app, listener)
+    except KeyboardInterrupt:
+        return
+    finally:
+        listener.close()
+
+
+def _run(server: uvicorn.Server, app: FastAPI, listener: socket.socket) -> None:
+    """Raises what kept the application from starting; uvicorn would only give an exit status of its own."""
+    try:
+        server.run(sockets=[listener])
+    except SystemExit:
+        if app.state.failed is None:
+            raise
+    if app.state.failed is not None:
+        raise app.state.failed
+
+
+def _without_traceback(app: FastAPI) -> ASGIApp:
+    """Whoever called ``serve`` tells why it did not start, in one sentence."""
+
+    async def told(scope: Scope, receive: Receive, send: Send) -> None:
+        async def short(message: Message) -> None:
+            failed = message["type"] == "lifespan.startup.failed"
+            await send({**message, "message": ""} if failed else message)
+
+        await app(scope, receive, short if scope["type"] == "lifespan" else send)
+
+    return told
+
+
+class _Server(uvicorn.Server):
+    """Ends long polls and event streams as soon as a signal comes, so that nothing waits for them."""
+
+    def __init__(self, config: uvicorn.Config, service: Service) -> None:
+        super().__init__(config)
+        self._service = service
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        super().handle_exit(sig, frame)
+        self._service.manager.close_waits()
+
+
+def open_listener(settings: Settings) -> socket.socket:
+    """The socket to serve on; port 0 takes a free one. Raises PortTakenError."""
+    family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
+    # asyncio sends without delay only where the protocol is named
+    listener = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
+    if sys.platform != "win32":  # there it would let two servers share the port
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listener.bind((settings.host, settings.port))
+        listener.listen(128)
+    except OSError as error:
+        listener.close()
+        raise PortTakenError(
+            f"Cannot listen on {settings.host}:{settings.port} ({error.strerror or error}). If a hexwrap "
+            "server runs there already, use it; otherwise choose another --port."
+        ) from None
+    host, port = listener.getsockname()[:2]
+    log.info("listening on http://%s:%s", f"[{host}]" if ":" in host else host, port)
+    return listener
+
+
+async def _on_error(request: Request, error: Exception) -> Response:
+    assert isinstance(error, HexwrapError)
+    return problem_response(error.document if isinstance(error, JobFailedError) else error)
+
+
+async def _on_http_exception(request: Request, error: Exception) -> Response:
+    assert isinstance(error, HTTPException)
+    title, detail = {
+        404: (
+            "No such address",
+            f"There is nothing at {request.url.path[:200]}; the routes are listed at /docs.",
+        ),
+        405: ("Method not allowed", f"{request.method} is not possible at {request.url.path[:200]}."),
+    }.get(error.status_code, (str(error.detail), str(error.detail)))
+    slug = {404: "not-found", 405: "method-not-allowed"}.get(error.status_code, "http")
+    headers = dict(error.headers or {})
+    if error.status_code == 405:
+        headers["Allow"] = ", ".join(_allowed(request))
+    return problem_response(HttpError(error.status_code, slug, title, detail, headers))
+
+
+def _allowed(request: Request) -> list[str]:
+    """Methods that this path answers to, by whichever route: the router itself names those of the first."""
+    asked = {"type": "http", "path": request.scope["path"], "root_path": "", "headers": []}
+    taken = {m for m in METHODS if any(_takes(route, asked | {"method": m}) for route in request.app.routes)}
+    return sorted(taken | {"HEAD"} if "GET" in taken else taken)
+
+
+def _takes(route: BaseRoute, asked: Scope) -> bool:
+    if isinstance(route, Mount) and asked["method"] != "GET":
+        return False  # a folder of files matches whatever the method
+    return route.matches(asked)[0] is Match.FULL
+
+
+async def _on_parameters(request: Request, error: Exception) -> Response:
+    """Faults in the path or the query; bodies have their own way (``schemas``)."""
+    assert isinstance(error, RequestValidationError)
+    listed: list[dict[str, Any]] = [
+        {"pointer": "", "parameter": ".".join(map(str, e["loc"][1:])), "detail": e["msg"]}
+        for e in error.errors()
+    ]
+    detail = f"Parameter '{listed[0]['parameter']}': {listed[0]['detail']}."
+    return problem_response(
+        HttpError(422, "invalid-request", "The request does not have the right form", detail, errors=listed)
+    )

@@ -1,0 +1,1 @@
+"""Hops: the same work for Rhino's own component."""

@@ -1,0 +1,170 @@
+"""What the Hops components do: their calls → requests, solutions → their outputs.
+
+Runs in a worker process: reading and writing Rhino's geometry takes the interpreter for itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from hexwrap_server.http.hops.components import COMPONENTS, LIFT, PANELS, HopsError
+from hexwrap_server.http.hops.values import output, read_inputs
+from hexwrap_server.input.curves import Curve, rhino_curve
+from hexwrap_server.input.json_text import loads, packed
+from hexwrap_server.input.readers.rhino import convert
+from hexwrap_server.input.requests import ParsedRequest, SentSurface, Wanted
+from hexwrap_server.input.schemas import Request, parse_request
+from hexwrap_server.jobs.lift_curves import lift_curves
+from hexwrap_server.jobs.work import solution_at
+from hexwrap_server.jobs.worker import Report
+from hexwrap_server.output import wire
+from hexwrap_solver.pipeline import Solution
+from hexwrap_solver.surface.types import MeshSettings, SentMesh
+
+
+@dataclass(frozen=True)
+class Call:
+    """A call that was read. branch: where in the tree its geometry came from.
+
+    request: for PANELS; job and curves: for LIFT.
+    """
+
+    pointer: str
+    branch: tuple[int, ...]
+    request: ParsedRequest | None = None
+    job: str = ""
+    curves: tuple[Curve, ...] = ()
+
+
+def read_call(report: Report, text: bytes, max_vertices: int, max_panels: int) -> Call:
+    """The body of POST /solve. Raises HopsError, FormError, UnreadableFileError."""
+    body = loads(text)
+    pointer = body.get("pointer") if isinstance(body, dict) else None
+    if not isinstance(body, dict) or not isinstance(pointer, str):
+        raise HopsError("The body must be an object with 'pointer' and 'values'.")
+    pointer = "/" + pointer.split("//")[-1].partition("/")[2] if "//" in pointer else pointer
+    if pointer not in COMPONENTS:
+        raise HopsError(f"There is no component at '{pointer[:100]}'; there are {', '.join(COMPONENTS)}.")
+    values, branch = read_inputs(COMPONENTS[pointer].inputs, body.get("values"))
+    if pointer == LIFT:
+        curves = tuple(rhino_curve(curve) for curve in values["Curves"])
+        return Call(pointer, tuple(branch), job=values["Job"].strip().rpartition("/")[2], curves=curves)
+    wanted = _wanted(values, max_vertices, max_panels)
+    surface = _surface(values["Mesh"], max_vertices)
+    return Call(pointer, tuple(branch), packed(Request("hops", surface, wanted)))
+
+
+def _wanted(values: dict[str, Any], max_vertices: int, max_panels: int) -> Wanted:
+    points, angles = values["Points"], values["Angles"]
+    boundary: dict[str, Any] = {"mode": values["Mode"] or ("angles" if points else "straight")}
+    if boundary["mode"] == "angles":
+        angles = angles * len(points) if len(angles) == 1 else angles
+        if len(angles) != len(points):
+            raise HopsError(f"{len(points)} points and {len(angles)} angles: give one angle per point.")
+        corners = [{"point": p, "angle": a} for p, a in zip(points, angles, strict=True)]
+        boundary |= {"angle_unit": "deg", "angles": corners}
+    body = {
+        "surface": {"id": ""},
+        "boundary": boundary,
+        "pattern": {"kind": values["Kind"], "around": values["Around"] or None},
+        "panels": {"sizes": values["Sizes"] or None, "target": values["Target"]},
+    }
+    return parse_request(body, max_vertices, max_panels).wanted
+
+
+def _surface(geometry: Any, max_vertices: int) -> SentSurface:
+    read = convert(geometry)
+    if not isinstance(read, SentMesh):
+        return SentSurface(nurbs=read, meshing=MeshSettings(max_vertices=max_vertices))
+    if len(read.vertices) > max_vertices:
+        raise HopsError(f"The mesh has {len(read.vertices)} vertices, this server takes {max_vertices}.")
+    return SentSurface(mesh=read)
+
+
+def panels_answer(report: Report, path: str, branch: tuple[int, ...], job: str) -> dict[str, Any]:
+    """The outputs of PANELS for the solution at path."""
+    solution = solution_at(path)
+    made, laid = solution.panels, solution.pattern
+    assert made is not None
+    assert laid is not None
+    order = np.lexsort((laid.place[made.face], laid.ring[made.face]))
+    rings = laid.ring[made.face][order].tolist()
+    labels = laid.labels()
+    polygons = made.polygons.to_lists()
+    flat = _flat_cells(solution)
+    per_panel = {
+        "Panels": [_closed(polygons[k]) for k in order],
+        "Labels": [labels[made.face[k]] for k in order],
+        "Size": [int(made.size[k]) for k in order],
+        "Planes": [_frame(np.array(polygons[k]), made.center[k], made.normal[k]) for k in order],
+        "Flat": [flat[made.face[k]] for k in order],
+    }
+    whole = {"Report": [_report(solution)], "Job": [job]}
+    outputs = []
+    for parameter in COMPONENTS[PANELS].outputs:
+        branches: dict[tuple[int, ...], list[Any]] = {}
+        if parameter.name in whole:
+            branches[branch] = whole[parameter.name]
+        else:
+            for ring, value in zip(rings, per_panel[parameter.name], strict=True):
+                branches.setdefault((*branch, ring), []).append(value)
+        outputs.append(output(parameter, branches))
+    return _answer(outputs)
+
+
+def lift_answer(
+    report: Report, path: str, branch: tuple[int, ...], curves: tuple[Curve, ...]
+) -> dict[str, Any]:
+    """The outputs of LIFT for the solution at path."""
+    cmap = solution_at(path).map
+    branches: dict[tuple[int, ...], list[Any]] = {}
+    outside = 0
+    for number, curve in enumerate(curves):
+        carried = lift_curves(cmap, [curve], None)
+        outside += carried.outside
+        pieces = [_closed(c.points.tolist()) if c.closed else c.points.tolist() for c in carried.curves]
+        branches[*branch, number] = [piece for piece in pieces if len(piece) > 1]
+    lifted, count = COMPONENTS[LIFT].outputs
+    return _answer([output(lifted, branches), output(count, {branch: [outside]})])
+
+
+def _answer(values: list[dict[str, Any]]) -> dict[str, Any]:
+    return {"values": values, "errors": [], "warnings": []}
+
+
+def _flat_cells(solution: Solution) -> list[list[list[float]]]:
+    """Closed outlines of the cells in the unrolled domain, each in one piece, at z = 0."""
+    laid = solution.pattern
+    assert laid is not None
+    z = solution.map.deck.apply(laid.uv[laid.faces.values], laid.sheet)
+    points = np.stack([z.real, z.imag, np.zeros(len(z))], axis=1).tolist()
+    ends = laid.faces.offsets.tolist()
+    return [_closed(points[a:b]) for a, b in pairwise(ends)]
+
+
+def _closed(points: list[Any]) -> list[Any]:
+    return [*points, points[0]]
+
+
+def _frame(points: Any, center: Any, normal: Any) -> list[list[float]]:
+    """Origin and axes: x along the first edge, z outward."""
+    x = points[1] - points[0]
+    x = x - (x @ normal) * normal
+    x = x / np.linalg.norm(x)
+    return [axis.tolist() for axis in (center, x, np.cross(normal, x), normal)]
+
+
+def _report(solution: Solution) -> str:
+    quality = wire.quality(solution)
+    assert solution.panels is not None
+    lines = [
+        f"{solution.panels.n_panels} panels, {len(solution.panels.class_length)} sizes",
+        f"covered: {100 * quality['coverage']:.2f} %",
+        f"overlaps: {quality['overlaps']}",
+        *(f"note: {note}" for note in quality["notes"]),
+    ]
+    return "\n".join(lines)

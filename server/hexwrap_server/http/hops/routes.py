@@ -1,0 +1,92 @@
+"""Hops: the same work for Rhino's own component, without a script on the canvas.
+
+``GET /hops/panels`` describes a component, ``POST /solve`` runs whichever the body's ``pointer`` names; this
+is the protocol of Rhino Compute. Only answers with status 200 are kept by Hops, so errors are 500.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from typing import TYPE_CHECKING
+
+from fastapi import APIRouter, Request
+from starlette.responses import Response
+
+from hexwrap_server.http.answers import json_response
+from hexwrap_server.http.bodies import read_body
+from hexwrap_server.http.hops.components import COMPONENTS, LIFT, PANELS, HopsError
+from hexwrap_server.http.service import Service
+from hexwrap_server.jobs.store import Job
+from hexwrap_server.problems import HttpError
+from hexwrap_solver.errors import HexwrapError
+
+if TYPE_CHECKING:  # reading geometry is left to a worker; this process need not load what it takes
+    from hexwrap_server.http.hops.calls import Call
+
+#: Hops itself gives up after 100 seconds.
+PATIENCE = 90.0
+
+
+def hops_router() -> APIRouter:
+    """The routes, for an application whose state holds the service."""
+    router = APIRouter(tags=["hops"], include_in_schema=False)
+
+    @router.get(PANELS)
+    async def describe_panels() -> Response:
+        return json_response(COMPONENTS[PANELS].document())
+
+    @router.get(LIFT)
+    async def describe_lift() -> Response:
+        return json_response(COMPONENTS[LIFT].document())
+
+    @router.post("/solve")
+    async def solve(request: Request) -> Response:
+        try:
+            return await _solve(request)
+        except HexwrapError as error:
+            return json_response({"values": [], "errors": [error.detail], "warnings": []}, 500)
+
+    return router
+
+
+async def _solve(request: Request) -> Response:
+    service: Service = request.app.state.service
+    settings = service.settings
+    body = await read_body(request, settings.max_body_mib)
+    call: Call = await service.reading(
+        "hexwrap_server.http.hops.calls:read_call", body, settings.max_vertices, settings.max_panels
+    )
+    if call.request is None:
+        job = _finished(service.manager.get(call.job))
+        answer = await service.errand(
+            "hexwrap_server.http.hops.calls:lift_answer", _path(service, job), call.branch, call.curves
+        )
+    else:
+        job = await _run(service, call)
+        answer = await service.errand(
+            "hexwrap_server.http.hops.calls:panels_answer", _path(service, job), call.branch, job.id
+        )
+    return json_response(answer)
+
+
+async def _run(service: Service, call: Call) -> Job:
+    """The finished job of a call. Raises HexwrapError."""
+    parsed = call.request
+    assert parsed is not None
+    if parsed.surface is not None:
+        await asyncio.to_thread(service.store.keep_surface, parsed.surface_id, parsed.surface)
+    job = service.manager.submit(parsed)
+    return _finished(await service.manager.wait(job.id, PATIENCE))
+
+
+def _path(service: Service, job: Job) -> str:
+    return str(service.store.solution_path(job.identity))
+
+
+def _finished(job: Job) -> Job:
+    """Raises HopsError unless the job is done."""
+    if job.status == "done":
+        return job
+    if job.status == "failed" and job.problem:
+        raise HttpError(job.problem["status"], "", job.problem["title"], job.problem["detail"])
+    raise HopsError(f"The job is {job.status}. Recompute to see whether it is done; it goes on meanwhile.")

@@ -1,0 +1,129 @@
+"""What OpenAPI says about bodies and answers that the routes read and write by hand."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hexwrap_server.http.openapi_result import RESULT as _RESULT
+from hexwrap_server.http.schema_words import NUMBER, PLANE, POINT, listed, nullable, record
+from hexwrap_server.input.schemas import Body, Meshing
+
+_MESH = record(
+    ("vertices", "faces"),
+    more=False,
+    vertices=listed(POINT),
+    faces=listed(listed({"type": "integer", "minimum": 0}) | {"minItems": 3, "maxItems": 4}),
+    normals=nullable(listed(POINT)),
+)
+_NURBS = record(
+    ("nurbs",),
+    more=False,
+    nurbs=record(
+        ("degree", "knots", "control_points"),
+        more=False,
+        degree=listed({"type": "integer", "minimum": 1, "maximum": 25}, 2),
+        knots=listed(listed(NUMBER), 2),
+        control_points=listed(listed(listed(NUMBER) | {"minItems": 3, "maxItems": 4})),
+        closed=listed({"type": "boolean"}, 2),
+    ),
+    mesh=nullable(Meshing.model_json_schema()),
+)
+_SURFACE = {"anyOf": [_MESH, _NURBS, record(("id",), more=False, id={"type": "string"})]}
+
+_JOB = record(
+    ("id", "name", "status", "stage", "progress", "created", "started", "finished", "timings", "problem"),
+    id={"type": "string"},
+    name={"type": "string"},
+    status={"enum": ["queued", "running", "done", "failed", "cancelled"]},
+    stage={"type": "string"},
+    progress={"type": "number", "minimum": 0, "maximum": 1},
+    created={"type": "string", "format": "date-time"},
+    started=nullable({"type": "string", "format": "date-time"}),
+    finished=nullable({"type": "string", "format": "date-time"}),
+    timings={"type": "object", "additionalProperties": NUMBER},
+    found={"type": "object", "additionalProperties": {"type": "string"}},
+    problem=nullable({"type": "object"}),
+    queue_position=nullable({"type": "integer"}),
+)
+_PROBLEM = record(
+    ("type", "title", "status", "detail", "errors"),
+    type={"type": "string"},
+    title={"type": "string"},
+    status={"type": "integer"},
+    detail={"type": "string"},
+    errors=listed(record(("pointer", "detail"), pointer={"type": "string"}, detail={"type": "string"})),
+)
+_HEALTH = record(("status", "version", "workers", "queued", "running"), status={"const": "ok"})
+
+
+def _answers(media: dict[str, Any], status: int = 200, *problems: int) -> dict[str, Any]:
+    refused = {"description": "Refused", "content": {"application/problem+json": {"schema": _PROBLEM}}}
+    good: dict[str, Any] = {"description": "Done"} | ({"content": media} if media else {})
+    return {str(status): good} | {str(code): refused for code in (401, 403, 421, 422, *problems)}
+
+
+def _json(schema: dict[str, Any]) -> dict[str, Any]:
+    return {"application/json": {"schema": schema}}
+
+
+def _route(answers: dict[str, Any], body: dict[str, Any] | None = None) -> dict[str, Any]:
+    content = {"requestBody": {"required": True, "content": body}} if body else {}
+    return {"responses": answers} | content
+
+
+def _request_schema() -> dict[str, Any]:
+    """The request with its definitions inside, so that it can stand anywhere in the document."""
+    schema = _inlined(Body.model_json_schema())
+    schema["properties"] = {"surface": _SURFACE} | schema["properties"]
+    schema["required"] = ["surface"]
+    return schema
+
+
+def _inlined(schema: dict[str, Any]) -> dict[str, Any]:
+    definitions = schema.pop("$defs", {})
+
+    def resolve(part: Any) -> Any:
+        if isinstance(part, dict):
+            if "$ref" in part:
+                target = resolve(definitions[part["$ref"].rpartition("/")[2]])
+                return target | {k: v for k, v in part.items() if k != "$ref"}
+            return {k: resolve(v) for k, v in part.items()}
+        return [resolve(p) for p in part] if isinstance(part, list) else part
+
+    resolved: dict[str, Any] = resolve(schema)
+    return resolved
+
+
+_BODY_FAULTS = (400, 413, 415)
+_FILE = {"multipart/form-data": {"schema": record(("file",), file={"type": "string", "format": "binary"})}}
+_POINTS = record(("points",), more=False, points=listed(PLANE))
+_PLACES = record(("points",), more=False, points=listed(POINT))
+
+HEALTH = _route(_answers(_json(_HEALTH)))
+READY = _route(_answers(_json(_HEALTH), 200, 503))
+METRICS = _route(_answers({"text/plain": {"schema": {"type": "string"}}}))
+JOBS = _route(_answers(_json(record(("jobs",), jobs=listed(_JOB)))))
+JOB = _route(_answers(_json(_JOB), 200, 404))
+EVENTS = _route(_answers({"text/event-stream": {"schema": {"type": "string"}}}, 200, 404))
+RESULT = _route(_answers(_json(_RESULT), 200, 404, 409, 410, 500, 503))
+DELETE_JOB = _route(_answers({}, 204, 404))
+POST_JOB = _route(_answers(_json(_JOB), 202, *_BODY_FAULTS, 503), _json(_request_schema()))
+SOLVE = _route(_answers(_json(_RESULT), 200, *_BODY_FAULTS, 409, 410, 500, 503), _json(_request_schema()))
+SURFACES = _route(
+    _answers(_json(record(("id", "vertices", "faces", "loops", "repairs"))), 201, *_BODY_FAULTS, 500, 503),
+    _json({"anyOf": [_MESH, _NURBS]}) | _FILE,
+)
+LIFT = _route(
+    _answers(_json(record(("points", "normals", "inside"))), 200, *_BODY_FAULTS, 404, 409, 410, 503),
+    _json(_POINTS),
+)
+FLATTEN = _route(
+    _answers(_json(record(("uv", "distance"))), 200, *_BODY_FAULTS, 404, 409, 410, 503), _json(_PLACES)
+)
+FILES = _route(
+    _answers({"application/octet-stream": {"schema": {"type": "string"}}}, 200, 404, 409, 410, 500, 503)
+)
+SAMPLES = _route(_answers(_json(record(("samples",), samples=listed(record(("name",)))))))
+SAMPLE = _route(_answers(_json(record(("surface",))), 200, 404))
+REQUEST = _route(_answers(_json(record(("surface", "boundary", "pattern", "panels"))), 200, 404))
+PREVIEW = _route(_answers(_json(record(("vertices", "faces"))), 200, *_BODY_FAULTS, 500, 503), _FILE)

@@ -1,0 +1,91 @@
+"""What OpenAPI says of the Result (written by ``output.wire``). Fields may be added, none renamed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hexwrap_server.http.schema_words import NUMBER, PLANE, POINT, listed, nullable, record
+
+_INDEX = {"type": "integer", "minimum": 0}
+_COUNT = _INDEX
+_INTEGER = {"type": "integer"}
+_TEXT = {"type": "string"}
+_TRUTH = {"type": "boolean"}
+_MEASURE = nullable(NUMBER)  # null where nothing was measured
+_KIND = {"enum": ["hex", "triangle", "quad"]}
+
+
+def _all(**properties: Any) -> dict[str, Any]:
+    """An object that has all of these, and perhaps more."""
+    return record(tuple(properties), **properties)
+
+
+_MESH = _all(
+    vertices=listed(POINT),
+    faces=listed(listed(_INDEX, 3)),
+    input_vertex=listed({"type": "integer", "minimum": -1}),
+    loops=listed(listed(_INDEX), 2),
+    repairs=listed(_TEXT),
+)
+_MAP = _all(
+    kind={"enum": ["cylinder", "cone"]},
+    cone_angle=NUMBER,
+    log_scale=listed(NUMBER),
+    uv=listed(PLANE),
+    sheet=listed(listed(_INTEGER, 3)),
+    deck=_all(angle=NUMBER, translation=PLANE),
+    circumference=NUMBER,
+    apex=nullable(PLANE),
+    boundary_angles=listed(listed(NUMBER), 2),
+    iterations=_COUNT,
+    residual=NUMBER,
+    flips=_COUNT,
+)
+_PATTERN = _all(
+    kind=_KIND,
+    vertices=listed(POINT),
+    normals=listed(POINT),
+    uv=listed(PLANE),
+    faces=listed(listed(_INDEX)),
+    whole=listed(_TRUTH),
+    neighbours=listed(listed({"type": "integer", "minimum": -1})),
+    rings=_COUNT,
+    around=_COUNT,
+    distortion=NUMBER,
+)
+_PANELS = _all(
+    mode={"enum": ["split", "watertight"]},
+    polygons=listed(listed(POINT)),
+    face=listed(_INDEX),
+    label=listed(_TEXT),
+    size=listed(_INTEGER),
+    edge_length=listed(NUMBER),
+    center=listed(POINT),
+    normal=listed(POINT),
+    whole=listed(_TRUTH),
+)
+_SIZE = _all(size=_INDEX, edge_length=NUMBER, count=_COUNT, color=_TEXT | {"pattern": "^#[0-9a-fA-F]{6}$"})
+_QUALITY = _all(
+    scale_ratio=NUMBER,
+    quasi_conformal=_all(mean=NUMBER, max=NUMBER),
+    planarity=_all(max=_MEASURE, mean=_MEASURE),
+    edge_deviation=_all(max=_MEASURE),
+    angle_deviation=_all(max=_MEASURE),
+    surface_distance=_all(max=_MEASURE, mean=_MEASURE),
+    gap=_all(
+        tangential=_all(min=_MEASURE, mean=_MEASURE, max=_MEASURE), normal=_all(mean=_MEASURE, max=_MEASURE)
+    ),
+    overlaps=nullable(_COUNT),
+    coverage=_MEASURE,
+    distinct_panels=_COUNT,
+    notes=listed(_TEXT),
+)
+#: Whatever ``?include=`` picks of it, and without that all of it.
+RESULT = record(
+    mesh=_MESH,
+    map=_MAP,
+    pattern=nullable(_PATTERN),
+    panels=nullable(_PANELS),
+    sizes=listed(_SIZE),
+    quality=_QUALITY,
+) | {"minProperties": 1}

@@ -1,0 +1,345 @@
+"""The contract's routes."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Path, Query, Request
+from starlette.responses import Response, StreamingResponse
+
+from hexwrap_server.http import head, openapi
+from hexwrap_server.http.answers import (
+    JSON,
+    json_response,
+    packed_response,
+    problem_response,
+    takes_gzip,
+)
+from hexwrap_server.http.bodies import plain_body, read_body, sent_body
+from hexwrap_server.http.metrics import MEDIA_TYPE as METRICS_TYPE
+from hexwrap_server.http.service import Service
+from hexwrap_server.input.requests import Intake, ParsedRequest
+from hexwrap_server.jobs.intake import keep, read_and_keep
+from hexwrap_server.jobs.manager import JobManager, unpacked
+from hexwrap_server.jobs.parts import PARTS, names
+from hexwrap_server.jobs.store import Job
+from hexwrap_server.problems import HttpError, dumped, not_found
+from hexwrap_server.settings import MIB
+
+#: Bodies of up to so many bytes and quotation marks are read in a thread, others in a process: reading holds
+#: the interpreter, and a name that is out of place takes as long as many numbers.
+SMALL_BODY, FEW_QUOTES = 4_000_000, 50_000
+#: Longest time that ``?wait=`` holds an answer.
+MAX_WAIT = 60.0
+#: Seconds between two signs of life on an event stream.
+HEARTBEAT = 15.0
+#: Files of a finished job and their media types; ``hexwrap_server.output.writers`` writes them.
+FILES = {
+    "panels.obj": "model/obj",
+    "panels.3dm": "model/vnd.3dm",
+    "panels.dxf": "image/vnd.dxf",
+    "panels.csv": "text/csv; charset=utf-8",
+    "flat.dxf": "image/vnd.dxf",
+    "domain.svg": "image/svg+xml",
+    "domain.dxf": "image/vnd.dxf",
+    "panels.png": "image/png",
+    "result.json": JSON,
+    "result.npz": "application/octet-stream",
+}
+
+router = APIRouter()
+JobId = Annotated[str, Path(description="a job's id", max_length=64)]
+
+
+def service_of(request: Request) -> Service:
+    service: Service = request.app.state.service
+    return service
+
+
+def manager_of(request: Request) -> JobManager:
+    return service_of(request).manager
+
+
+@router.get("/health", openapi_extra=openapi.HEALTH)
+async def health(request: Request) -> Response:
+    """Whether the server lives."""
+    return json_response(service_of(request).health())
+
+
+@router.get("/ready", openapi_extra=openapi.READY)
+async def ready(request: Request) -> Response:
+    """Whether a job would be run now."""
+    service = service_of(request)
+    if not service.is_ready:
+        raise HttpError(
+            503, "not-ready", "Not ready", "The worker processes are starting.", {"Retry-After": "1"}
+        )
+    return json_response(service.health())
+
+
+@router.get("/metrics", openapi_extra=openapi.METRICS)
+async def metrics(request: Request) -> Response:
+    """Prometheus text."""
+    return Response(service_of(request).metrics.text(), media_type=METRICS_TYPE)
+
+
+@router.post("/v1/jobs", status_code=202, openapi_extra=openapi.POST_JOB)
+async def post_job(request: Request) -> Response:
+    """Have a surface panelized."""
+    manager = manager_of(request)
+    job = manager.submit(await _read(request))
+    return json_response(manager.document(job), 202, {"Location": f"/v1/jobs/{job.id}"})
+
+
+@router.get("/v1/jobs", openapi_extra=openapi.JOBS)
+async def list_jobs(request: Request, limit: Annotated[int, Query(ge=1, le=1000)] = 100) -> Response:
+    """Jobs, newest first."""
+    manager = manager_of(request)
+    return json_response({"jobs": [manager.document(job) for job in manager.latest(limit)]})
+
+
+@router.get("/v1/jobs/{id}", openapi_extra=openapi.JOB)
+async def get_job(
+    request: Request, id: JobId, wait: Annotated[float, Query(ge=0, le=MAX_WAIT, allow_inf_nan=False)] = 0.0
+) -> Response:
+    """A job, at once or when it ends."""
+    manager = manager_of(request)
+    job = await manager.wait(id, wait) if wait else manager.get(id)
+    return json_response(manager.document(job), headers={"Cache-Control": "no-store"} | _timing(job))
+
+
+@router.get("/v1/jobs/{id}/events", openapi_extra=openapi.EVENTS)
+async def events(request: Request, id: JobId) -> Response:
+    """A job's progress as Server-Sent Events."""
+    manager = manager_of(request)
+    manager.get(id)
+    headers = {"Cache-Control": "no-store", "X-Accel-Buffering": "no"}
+    nobody_listens = request.scope.get(head.MARK)
+    stream = iter(()) if nobody_listens else _events(manager, id)
+    return StreamingResponse(stream, headers=headers, media_type="text/event-stream")
+
+
+@router.get("/v1/jobs/{id}/result", openapi_extra=openapi.RESULT)
+async def get_result(
+    request: Request, id: JobId, include: Annotated[str | None, Query(description=", ".join(PARTS))] = None
+) -> Response:
+    """A job's Result, or its problem."""
+    return await _result(request, manager_of(request).get(id), _parts(include))
+
+
+@router.delete("/v1/jobs/{id}", status_code=204, openapi_extra=openapi.DELETE_JOB)
+async def delete_job(request: Request, id: JobId) -> Response:
+    """Stop a job, or forget it."""
+    await manager_of(request).delete(id)
+    return Response(status_code=204)
+
+
+@router.post("/v1/solve", openapi_extra=openapi.SOLVE)
+async def solve(
+    request: Request, include: Annotated[str | None, Query(description=", ".join(PARTS))] = None
+) -> Response:
+    """The Result itself, when it is there."""
+    manager = manager_of(request)
+    parts = _parts(include)
+    job = manager.submit(await _read(request))
+    job = await manager.wait(job.id, None)
+    if not job.is_over:
+        raise HttpError(
+            503,
+            "shutting-down",
+            "The server is shutting down",
+            f"The job is kept and goes on when the server runs again; then ask for /v1/jobs/{job.id}/result.",
+            {"Retry-After": "5", "Location": f"/v1/jobs/{job.id}"},
+        )
+    return await _result(request, job, parts)
+
+
+@router.post("/v1/surfaces", status_code=201, openapi_extra=openapi.SURFACES)
+async def post_surface(
+    request: Request,
+    name: Annotated[str | None, Query(max_length=200, description="name of a raw file")] = None,
+) -> Response:
+    """Send a surface once, as JSON or as a file."""
+    service = service_of(request)
+    settings, caching = service.settings, service.manager.caching
+    kind = request.headers.get("content-type", "")
+    body = await read_body(request, settings.max_body_mib)
+    if name is not None or kind.lower().startswith("multipart/"):
+        arguments: tuple[Any, ...] = (
+            body,
+            kind,
+            name or "",
+            settings.max_vertices,
+            int(settings.max_body_mib * MIB),
+            caching,
+        )
+        intake: Intake = await service.reading("hexwrap_server.input.uploads:read_upload", *arguments)
+    else:
+        intake = await service.reading(
+            "hexwrap_server.jobs.work:read_surface", body, settings.max_vertices, caching
+        )
+    await asyncio.to_thread(service.store.keep_surface, intake.id, intake.surface)
+    return json_response({"id": intake.id} | intake.answer, 201)
+
+
+@router.post("/v1/jobs/{id}/lift", openapi_extra=openapi.LIFT)
+async def lift(request: Request, id: JobId) -> Response:
+    """Points of the unrolled domain → points of the surface."""
+    return await _carry(request, id, "lift")
+
+
+@router.post("/v1/jobs/{id}/flatten", openapi_extra=openapi.FLATTEN)
+async def flatten(request: Request, id: JobId) -> Response:
+    """Points near the surface → points of the unrolled domain."""
+    return await _carry(request, id, "flatten")
+
+
+@router.get("/v1/jobs/{id}/files/{name}", openapi_extra=openapi.FILES)
+async def get_file(
+    request: Request,
+    id: JobId,
+    name: Annotated[str, Path(max_length=64)],
+    sheet: Annotated[
+        str | None,
+        Query(
+            pattern=r"^[0-9]+(\.[0-9]+)?[xX][0-9]+(\.[0-9]+)?$",
+            max_length=64,
+            description="flat.dxf: width and height of its sheets in model units, such as 2500x1250",
+        ),
+    ] = None,
+) -> Response:
+    """The finished work as a file."""
+    if name not in FILES:
+        raise not_found("file", f"There is no file '{name[:64]}'; there are {', '.join(FILES)}.")
+    service = service_of(request)
+    size = None if sheet is None else _sheet(sheet)
+    job = service.manager.get(id)
+    _finished(job)
+    if name == "result.json":
+        packed, work = await service.manager.result(job)
+        data = await asyncio.to_thread(unpacked, packed, work, None)
+    else:
+        path = str(service.store.solution_path(job.identity))
+        data = await service.errand(
+            "hexwrap_server.jobs.work:write_file", path, name, job.name, job.timings, size
+        )
+    headers = {"Content-Disposition": f'attachment; filename="{name}"'}
+    return await packed_response(request, data, FILES[name], headers)
+
+
+async def _read(request: Request) -> ParsedRequest:
+    """The request of a body; the same bytes again are not read again."""
+    service = service_of(request)
+    settings = service.settings
+    sent = await sent_body(request, settings.max_body_mib)
+    known = service.known_body(sent.mark)
+    if known is not None:
+        return known
+    text = await plain_body(sent, settings.max_body_mib)
+    limits = (settings.max_vertices, settings.max_panels)
+    if len(text) <= SMALL_BODY and text.count(b'"') <= FEW_QUOTES:
+        parsed = await service.read(read_and_keep, service.store, text, *limits)
+    else:
+        parsed = await service.reading("hexwrap_server.input.json_text:read_request", text, *limits)
+        await asyncio.to_thread(keep, service.store, parsed)
+    return service.remember_body(sent.mark, parsed)
+
+
+async def _carry(request: Request, id: str, what: str) -> Response:
+    service = service_of(request)
+    settings = service.settings
+    job = service.manager.get(id)
+    body = await read_body(request, settings.max_body_mib)
+    _finished(job)
+    path = str(service.store.solution_path(job.identity))
+    data = await service.errand(f"hexwrap_server.jobs.lift_points:{what}", path, body, settings.max_points)
+    return await packed_response(request, data)
+
+
+async def _result(request: Request, job: Job, include: list[str] | None) -> Response:
+    if job.status == "failed" and job.problem:
+        return problem_response(job.problem)
+    _finished(job)
+    packed, work = await manager_of(request).result(job)
+    picked = "" if include is None else f"?include={','.join(include)}"
+    location = f"/v1/jobs/{job.id}/result{picked}"
+    headers = {"Content-Location": location, "Vary": "Accept-Encoding"} | _timing(job)
+    if include is None and takes_gzip(request.headers):
+        return Response(packed, headers=headers | {"Content-Encoding": "gzip"}, media_type=JSON)
+    text = await asyncio.to_thread(unpacked, packed, work, include)
+    if include is None:
+        return Response(text, headers=headers, media_type=JSON)
+    return await packed_response(request, text, headers=headers)
+
+
+def _finished(job: Job) -> None:
+    """Raises HttpError unless the job is done."""
+    if job.status == "failed" and job.problem:
+        raise JobFailedError(job.problem)
+    if job.status == "cancelled":
+        raise HttpError(
+            409, "cancelled", "The job was cancelled", "The job was cancelled, so it has no result."
+        )
+    if job.status != "done":
+        raise HttpError(
+            409,
+            "not-finished",
+            "The job is not finished",
+            f"The job is {job.status}; wait with GET …?wait=60.",
+            {"Retry-After": "1"},
+        )
+
+
+class JobFailedError(HttpError):
+    """Carries a failed job's own problem."""
+
+    def __init__(self, document: dict[str, Any]) -> None:
+        super().__init__(document["status"], "", document["title"], document["detail"])
+        self.document = document
+
+
+def _parts(include: str | None) -> list[str] | None:
+    if include is None:
+        return None
+    known, unknown = names(include)
+    if unknown or not known:
+        raise _bad_parameter("include", f"'include' names parts of the Result: {', '.join(PARTS)}.")
+    return known
+
+
+def _sheet(text: str) -> tuple[float, float]:
+    """Width and height of ``2500x1250``."""
+    width, height = (float(side) for side in text.lower().split("x"))
+    if width <= 0 or height <= 0:
+        raise _bad_parameter("sheet", f"Both sides of the sheet must be greater than 0, not {text}.")
+    return width, height
+
+
+def _bad_parameter(name: str, detail: str) -> HttpError:
+    return HttpError(
+        422,
+        "invalid-request",
+        "The request does not have the right form",
+        detail,
+        errors=[{"pointer": "", "parameter": name, "detail": detail}],
+    )
+
+
+def _timing(job: Job) -> dict[str, str]:
+    """Server-Timing: milliseconds per stage and where it came from."""
+    entries = [
+        f'{stage};dur={seconds * 1000:.1f};desc="{job.found.get(stage, "computed")}"'
+        for stage, seconds in job.timings.items()
+    ]
+    return {"Server-Timing": ", ".join(entries)} if entries else {}
+
+
+async def _events(manager: JobManager, id: str) -> AsyncIterator[bytes]:
+    async for job in manager.changes(id, HEARTBEAT):
+        if job is None:
+            yield b": still here\n\n"
+        else:
+            name = job.status if job.is_over else "progress"
+            yield b"event: %s\ndata: %s\n\n" % (name.encode(), dumped(manager.document(job)))

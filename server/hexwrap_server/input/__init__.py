@@ -1,0 +1,1 @@
+"""What is sent or read: requests, surfaces, drawings."""

@@ -1,0 +1,171 @@
+"""Stages that need not be computed twice.
+
+Each stage is known by the SHA-256 of the solver's version, the stage's settings and the stage before it. The
+stages of one worker are kept in its memory, those of all workers of a machine in a folder.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import time
+from collections import OrderedDict
+from collections.abc import Callable
+from dataclasses import is_dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from hexwrap_server.jobs import later
+from hexwrap_server.jobs.codec import CodecError, decode, digest, pieces
+from hexwrap_server.jobs.disk import StorageError, write_whole
+from hexwrap_server.version import solver_version
+from hexwrap_solver.arrays import Progress
+
+T = TypeVar("T")
+log = logging.getLogger("hexwrap.cache")
+
+#: Share of the whole work that each stage usually takes, for the progress bar.
+SHARES = {
+    "surface": 0.1,
+    "map": 0.35,
+    "pattern": 0.1,
+    "fit": 0.2,
+    "panels": 0.05,
+    "quality": 0.15,
+    "components": 0.02,
+    "support": 0.03,
+}
+
+#: Stages that took this many seconds are written at once, others when the answer is sent.
+PRECIOUS = 1.0
+
+
+class StageCache:
+    """Finished stages by key: the recently used ones in memory, more of them in a folder."""
+
+    def __init__(self, folder: Path | None, memory_bytes: int) -> None:
+        self.folder = folder
+        self.memory_bytes = memory_bytes
+        self._kept: OrderedDict[str, tuple[Any, int]] = OrderedDict()
+        self._used = 0
+
+    def get(self, key: str) -> tuple[Any, str] | None:
+        """The stage and where it was found (``memory`` or ``disk``), or None."""
+        if key in self._kept:
+            self._kept.move_to_end(key)
+            return self._kept[key][0], "memory"
+        value = self._read(key)
+        if value is None:
+            return None
+        self._keep(key, value)
+        return value, "disk"
+
+    def put(self, key: str, value: Any, seconds: float = 0.0) -> None:
+        """seconds: what it cost."""
+        self._keep(key, value)
+        if self.folder is None:
+            return
+        if seconds >= PRECIOUS:
+            self._write(key, value)
+        else:
+            later.put_off(lambda: self._write(key, value))
+
+    def _write(self, key: str, value: Any) -> None:
+        try:
+            write_whole(self._path(key), pieces(value))
+        except StorageError as error:  # a full disk costs speed, not the job
+            log.warning("a stage could not be written to the cache: %s", error)
+
+    def _keep(self, key: str, value: Any) -> None:
+        self._weigh(key, value)
+        later.put_off(lambda: self._weigh_again(key))  # with what later stages will have derived from it
+
+    def _weigh_again(self, key: str) -> None:
+        if key in self._kept:
+            self._weigh(key, self._kept[key][0])
+
+    def _weigh(self, key: str, value: Any) -> None:
+        size = size_of(value)
+        self._used += size - self._kept.get(key, (None, 0))[1]
+        self._kept[key] = (value, size)
+        while self._used > self.memory_bytes and self._kept:
+            self._used -= self._kept.popitem(last=False)[1][1]
+
+    def _read(self, key: str) -> Any:
+        if self.folder is None:
+            return None
+        path = self._path(key)
+        try:
+            value = decode(path.read_bytes())
+            os.utime(path)  # pruning goes by last use
+        except FileNotFoundError:
+            return None
+        except (CodecError, OSError) as error:
+            log.warning("a cached stage cannot be used: %s", error)
+            return None
+        return value
+
+    def _path(self, key: str) -> Path:
+        assert self.folder is not None
+        return self.folder / f"{key}.stage"
+
+
+def nothing(stage: str, value: Any) -> None:
+    """A listener that does not care."""
+
+
+class CachingRunner:
+    """A StageRunner that looks every stage up first.
+
+    timings: seconds per stage, hits included. found: per stage ``memory``, ``disk`` or ``computed``.
+    made: told of each stage that is done, and of what it made.
+    """
+
+    def __init__(
+        self,
+        cache: StageCache,
+        report: Callable[[str, float, str], None],
+        made: Callable[[str, Any], None] = nothing,
+    ) -> None:
+        self.timings: dict[str, float] = {}
+        self.found: dict[str, str] = {}
+        self.cache = cache
+        self._report = report
+        self._made = made
+        self._key = solver_version()
+        self._done = 0.0
+
+    def __call__(self, stage: str, settings: Any, compute: Callable[[Progress], T]) -> T:
+        start = time.perf_counter()
+        share = SHARES.get(stage, 0.0)
+        done = self._done
+
+        def progress(fraction: float, what: str) -> None:
+            self._report(stage, min(done + share * min(max(fraction, 0.0), 1.0), 1.0), what)
+
+        progress(0.0, "")
+        self._key = digest(self._key, stage, settings)
+        hit = self.cache.get(self._key)
+        if hit is None:
+            result = compute(progress)
+            self.cache.put(self._key, result, time.perf_counter() - start)
+            self.found[stage] = "computed"
+        else:
+            result, self.found[stage] = hit
+        self._done = done + share
+        self.timings[stage] = time.perf_counter() - start
+        self._made(stage, result)
+        return result
+
+
+def size_of(value: Any) -> int:
+    """Bytes of the arrays inside a dataclass of arrays, and of those that it has derived and keeps."""
+    if isinstance(value, np.ndarray):
+        return value.nbytes
+    if isinstance(value, (list, tuple)):
+        return sum(size_of(v) for v in value)
+    if is_dataclass(value):
+        return 64 + sum(size_of(v) for v in list(vars(value).values()))
+    return 64

@@ -1,0 +1,155 @@
+"""Where work is run. An engine runs a named function elsewhere and can always stop it.
+
+Cancelling the coroutine that waits for ``run`` kills the work; a limit that is exceeded or a worker that dies
+ends that one call with a WorkError; all other calls go on.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, Protocol
+
+from hexwrap_server.jobs.worker import Report, WorkerProcess, WorkError
+
+#: What a worker process imports before it says that it is ready.
+ENGINE_PRELOAD = "hexwrap_server.jobs.work"
+log = logging.getLogger("hexwrap.engine")
+
+
+class Engine(Protocol):
+    """Runs ``module:function`` with a Report and the given arguments (picklable) in another process."""
+
+    @property
+    def shares_disk(self) -> bool:
+        """Whether its processes see this machine's files."""
+        ...
+
+    @property
+    def capacity(self) -> int:
+        """How many calls can run at once."""
+        ...
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether there is a place where a call could run, now or when it is free."""
+        ...
+
+    async def start(self) -> None: ...
+
+    async def stop(self) -> None:
+        """Kill whatever runs; afterwards no process of the engine is left."""
+        ...
+
+    async def wait_for_place(self, seconds: float, told: Callable[[str], None]) -> None:
+        """Until there is any place where a call could run. told: what it waits for, if it has to.
+
+        Raises WorkError after seconds.
+        """
+        ...
+
+    async def run(self, function: str, *arguments: Any, report: Report, seconds: float, mib: float) -> Any:
+        """Raises HexwrapError as the function does, WorkError; when cancelled, kills the call first."""
+        ...
+
+
+def nobody(stage: str, fraction: float, what: str) -> None:
+    """A listener that does not care."""
+
+
+class ProcessEngine:
+    """A number of worker processes on this machine."""
+
+    shares_disk = True
+
+    def __init__(self, workers: int, preload: str = ENGINE_PRELOAD) -> None:
+        self._workers = [WorkerProcess(preload) for _ in range(workers)]
+        self._idle: asyncio.LifoQueue[WorkerProcess] = asyncio.LifoQueue()  # the one that remembers most
+        self._threads = ThreadPoolExecutor(2 * workers, thread_name_prefix="hexwrap-engine")
+        self._starting: set[asyncio.Task[None]] = set()
+        self._stopping = False
+
+    @property
+    def capacity(self) -> int:
+        return len(self._workers)
+
+    @property
+    def is_ready(self) -> bool:
+        return not self._stopping and len(self._starting) < len(self._workers)
+
+    @property
+    def pids(self) -> list[int]:
+        """Process ids of the living workers."""
+        return [w.pid for w in self._workers if w.is_alive]
+
+    async def start(self) -> None:
+        for worker in self._workers:
+            self._begin(worker)
+
+    async def stop(self) -> None:
+        self._stopping = True
+        for worker in self._workers:
+            worker.stop()
+        await asyncio.gather(*self._starting, return_exceptions=True)
+        await asyncio.to_thread(self._threads.shutdown, wait=True)
+        for worker in self._workers:
+            worker.close()
+
+    async def wait_for_place(self, seconds: float, told: Callable[[str], None]) -> None:
+        return  # workers that die are started again
+
+    async def run(self, function: str, *arguments: Any, report: Report, seconds: float, mib: float) -> Any:
+        loop = asyncio.get_running_loop()
+
+        def relay(stage: str, fraction: float, what: str) -> None:
+            with contextlib.suppress(RuntimeError):  # the loop is gone, and with it whoever listened
+                loop.call_soon_threadsafe(report, stage, fraction, what)
+
+        while not (worker := await self._idle.get()).is_alive:  # it died while it had nothing to do
+            self._begin(worker)
+        call = loop.run_in_executor(self._threads, worker.run, function, arguments, relay, seconds, mib)
+        try:
+            return await asyncio.shield(call)
+        except asyncio.CancelledError:
+            worker.stop()
+            with contextlib.suppress(Exception):
+                await call
+            raise
+        finally:
+            if not call.done():
+                await asyncio.wait([call])
+            self._hand_back(worker)
+
+    def _hand_back(self, worker: WorkerProcess) -> None:
+        if worker.is_alive:
+            self._idle.put_nowait(worker)
+        elif not self._stopping:
+            self._begin(worker)
+
+    def _begin(self, worker: WorkerProcess) -> None:
+        task = asyncio.create_task(self._start(worker))
+        self._starting.add(task)
+        task.add_done_callback(self._starting.discard)
+
+    async def _start(self, worker: WorkerProcess) -> None:
+        pause = 0.1
+        while not self._stopping:
+            try:
+                await asyncio.get_running_loop().run_in_executor(self._threads, _renew, worker)
+            except (WorkError, OSError) as error:
+                if not self._stopping:
+                    log.error("a worker process did not start: %s", error)
+                    await asyncio.sleep(pause)
+                    pause = min(2 * pause, 10.0)
+            else:
+                self._idle.put_nowait(worker)
+                return
+
+
+def _renew(worker: WorkerProcess) -> None:
+    worker.close()
+    worker.start()
+    worker.wait_ready()

@@ -1,0 +1,88 @@
+"""``hexwrap lift``: own drawings from the unrolled domain onto the surface, and back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hexwrap_server.cli.local import UsageError
+from hexwrap_server.input.curves import Curve, refined
+from hexwrap_solver.arrays import Complexes, Floats
+from hexwrap_solver.conformal.types import ConformalMap, Deck
+from hexwrap_solver.domain import flatten, lift
+
+#: Drawn lines are followed in steps of this part of the circumference.
+STEPS_AROUND = 400
+
+
+@dataclass(frozen=True)
+class Carried:
+    """curves: what arrived. outside: how many points of the drawing have no place there; farthest: the
+    greatest distance of a point from the surface it was laid down from (flattening)."""
+
+    curves: list[Curve]
+    outside: int = 0
+    farthest: float = 0.0
+
+
+def lift_curves(cmap: ConformalMap, curves: list[Curve], step: float | None) -> Carried:
+    """Curves (k, 2) of the unrolled domain onto the surface; what lies outside is cut away.
+
+    step: how closely lines are followed, in units of the domain; None: a 400th of the circumference.
+    """
+    fine = [
+        refined(Curve(c.points[:, :2], c.closed), step or cmap.circumference / STEPS_AROUND) for c in curves
+    ]
+    at = np.vstack([curve.points for curve in fine])
+    there = lift(cmap, at[:, 0] + 1j * at[:, 1])
+    carried: list[Curve] = []
+    start = 0
+    for curve in fine:
+        part = slice(start, start + len(curve.points))
+        start = part.stop
+        carried += _inside(Curve(there.points[part], curve.closed), there.inside[part])
+    return Carried(carried, outside=int(np.sum(~there.inside)))
+
+
+def flatten_curves(cmap: ConformalMap, curves: list[Curve], step: float | None) -> Carried:
+    """Curves (k, 3) near the surface into the unrolled domain, each in one piece over several sheets."""
+    if any(curve.points.shape[1] != 3 for curve in curves):
+        raise UsageError("--flatten needs points in space: three numbers each.")
+    fine = [refined(curve, step) if step else curve for curve in curves]
+    found = flatten(cmap, np.vstack([curve.points for curve in fine]))
+    carried = []
+    start = 0
+    for curve in fine:
+        z = one_piece(cmap.deck, found.uv[start : start + len(curve.points)])
+        start += len(curve.points)
+        # A closed curve that goes around the surface ends on another sheet than it started on.
+        closed = curve.closed and bool(_turns(cmap.deck, z[[-1, 0]])[1] == 0)
+        if curve.closed and not closed:
+            z = np.append(z, cmap.deck.apply(z[:1], _turns(cmap.deck, z[[-1, 0]])[1:]))
+        carried.append(Curve(np.stack([z.real, z.imag], axis=1), closed))
+    return Carried(carried, farthest=float(found.distance.max(initial=0.0)))
+
+
+def one_piece(deck: Deck, z: Complexes) -> Complexes:
+    """Each place moved to the sheet in which it is nearest to the place before it."""
+    return deck.apply(z, np.cumsum(_turns(deck, z)))
+
+
+def _turns(deck: Deck, z: Complexes) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
+    """(k,) how many turns each place lies before the one before it; they add up, since g is an isometry."""
+    shifts = np.array([0, -1, 1, -2, 2])
+    near = np.abs(deck.apply(z[1:, None], shifts[None, :]) - z[:-1, None])
+    return np.append(0, shifts[np.argmin(near, axis=1)])
+
+
+def _inside(curve: Curve, inside: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> list[Curve]:
+    """The pieces of a curve whose points are inside."""
+    if inside.all():
+        return [curve]
+    points: Floats = curve.points
+    if curve.closed:  # start behind a gap, so that no piece is cut at the start
+        gap = int(np.flatnonzero(~inside)[0])
+        points, inside = np.roll(points, -gap, axis=0), np.roll(inside, -gap)
+    ends = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]]).astype(int)))
+    return [Curve(points[a:b]) for a, b in ends.reshape(-1, 2).tolist()]

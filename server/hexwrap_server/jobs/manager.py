@@ -1,0 +1,466 @@
+"""The queue: jobs come in, works are run, everybody who waits is told."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import time
+import uuid
+from collections import OrderedDict
+from collections.abc import AsyncIterator, Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from isal import isal_zlib
+
+from hexwrap_server.http.answers import GZIP_WINDOW
+from hexwrap_server.http.metrics import Metrics
+from hexwrap_server.input.requests import CacheSettings, Order, Outcome, ParsedRequest
+from hexwrap_server.jobs.codec import digest
+from hexwrap_server.jobs.disk import BusyError, StorageError
+from hexwrap_server.jobs.endings import Ledger
+from hexwrap_server.jobs.engine import Engine
+from hexwrap_server.jobs.parts import chosen
+from hexwrap_server.jobs.store import Job, Store, Work
+from hexwrap_server.jobs.worker import InternalError, WorkerDiedError, WorkError
+from hexwrap_server.problems import FormError, HttpError, not_found, plain, problem
+from hexwrap_server.settings import MIB, Settings
+from hexwrap_server.version import service_version
+from hexwrap_solver.errors import HexwrapError
+
+#: A work that was running this often when the server died is not started again.
+MAX_ATTEMPTS = 3
+#: Seconds between two rounds of pruning.
+PRUNE_INTERVAL = 600.0
+#: Seconds between two attempts to write what a full disk refused.
+CATCH_UP_INTERVAL = 2.0
+#: Seconds that a job waits for the database while another program holds it, and between two attempts.
+PATIENCE, BUSY_INTERVAL = 10.0, 0.1
+#: Results kept in memory as they go over the wire.
+HOT_RESULT_BYTES = 64 * MIB
+log = logging.getLogger("hexwrap.jobs")
+
+
+class AttemptsError(WorkError):
+    slug = "too-many-attempts"
+    title = "The job was given up"
+
+
+@dataclass(eq=False)
+class _Item:
+    """A work that waits or runs, and the jobs that want it."""
+
+    work: Work
+    jobs: dict[str, Job] = field(default_factory=dict)
+    task: asyncio.Task[None] | None = None
+
+
+class JobManager:
+    """Belongs to one event loop."""
+
+    def __init__(self, store: Store, engine: Engine, settings: Settings, metrics: Metrics) -> None:
+        self.store = store
+        self._ledger = Ledger(store)
+        self._engine = engine
+        self._settings = settings
+        self._metrics = metrics
+        self._items: dict[str, _Item] = {}  # by identity
+        self._live: dict[str, _Item] = {}  # by job
+        self._queue: OrderedDict[str, _Item] = OrderedDict()
+        self._running: set[_Item] = set()
+        self._changed: dict[str, asyncio.Event] = {}
+        self._hot: OrderedDict[str, bytes] = OrderedDict()
+        self._chores: list[asyncio.Task[None]] = []
+        self._closing = asyncio.Event()
+
+    @property
+    def caching(self) -> CacheSettings:
+        folder = str(self.store.stages) if self._engine.shares_disk else ""
+        # what is remembered counts towards the limit of the next job
+        mib = min(self._settings.memory_cache_mib, self._settings.job_mib / 8)
+        return CacheSettings(folder, int(mib * MIB))
+
+    @property
+    def n_queued(self) -> int:
+        return len(self._queue)
+
+    @property
+    def n_running(self) -> int:
+        return len(self._running)
+
+    async def start(self) -> None:
+        """Take up what an earlier server left."""
+        jobs = self.store.unfinished()
+        for job in jobs:
+            self._resume(job)
+        for identity in {job.identity for job in jobs} - self._items.keys():
+            self._settle(identity)
+        self._chores = [asyncio.create_task(self._prune_forever()), asyncio.create_task(self._catch_up())]
+        self._pump()
+
+    def close_waits(self) -> None:
+        """End all long polls and event streams; the server stops."""
+        self._closing.set()
+        for event in self._changed.values():
+            event.set()
+
+    async def stop(self) -> None:
+        """Stop everything, the engine too; what is unfinished is taken up by the next server."""
+        self.close_waits()
+        self._queue.clear()
+        tasks = [item.task for item in self._running if item.task]
+        tasks += self._chores
+        for task in tasks:
+            task.cancel()
+        # before the tasks come to know: the engine need not replace the workers that they kill
+        await self._engine.stop()
+        await asyncio.gather(*tasks, return_exceptions=True)
+        self._ledger.catch_up()
+
+    # what clients do
+
+    def submit(self, parsed: ParsedRequest) -> Job:
+        """Raises HttpError when the queue is full, FormError when the surface is unknown."""
+        identity = digest(service_version(), parsed.surface_id, parsed.wanted)
+        job = Job(uuid.uuid4().hex, identity, parsed.name, created=time.time())
+        finished = self.store.finished_work(identity)
+        if finished is not None:
+            job = _reused(job, finished)
+            self.store.add(job, finished)
+            self._metrics.jobs.labels("reused").inc()
+            return job
+        if not self.store.use_surface(parsed.surface_id):
+            raise FormError.at("/surface/id", "no such surface is kept here; send it to /v1/surfaces again")
+        item = self._items.get(identity)
+        if item is None and len(self._queue) >= self._settings.max_queue:
+            raise HttpError(
+                503,
+                "queue-full",
+                "The queue is full",
+                f"{len(self._queue)} jobs are waiting, the limit of this server; try again in a few seconds.",
+                {"Retry-After": "5"},
+            )
+        if item is not None and any(other.status == "running" for other in item.jobs.values()):
+            job = replace(job, status="running", started=job.created)
+        self.store.add(job, Work(identity, parsed.surface_id, parsed.wanted))
+        self._attach(job, item, Work(identity, parsed.surface_id, parsed.wanted))
+        self._log(job, "accepted")
+        self._pump()
+        return job
+
+    def get(self, id: str) -> Job:
+        """Raises HttpError 404."""
+        item = self._live.get(id)
+        job = item.jobs[id] if item else self._ledger.get(id) or self.store.job(id)
+        if job is None:
+            raise not_found("job", f"There is no job '{id[:64]}' here; it may have been forgotten.")
+        return job
+
+    def latest(self, limit: int) -> list[Job]:
+        """Newest first."""
+        listed = self.store.jobs(limit)
+        return [self.get(j.id) if j.id in self._live or j.id in self._ledger else j for j in listed]
+
+    def position(self, job: Job) -> int | None:
+        """Number of works before this one, None unless it is queued."""
+        if job.status != "queued":
+            return None
+        return next((i for i, identity in enumerate(self._queue) if identity == job.identity), 0)
+
+    def document(self, job: Job) -> dict[str, Any]:
+        return job.document(self.position(job))
+
+    async def wait(self, id: str, seconds: float | None) -> Job:
+        """The job when it is over, or after seconds (None: however long), or when the server stops."""
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(seconds):
+                while not self.get(id).is_over and not self._closing.is_set():
+                    await self._event(id).wait()
+        return self.get(id)
+
+    async def changes(self, id: str, heartbeat: float) -> AsyncIterator[Job | None]:
+        """The job now and after each change until it is over; None after heartbeat seconds without one."""
+        while True:
+            job = self.get(id)
+            if job.is_over or self._closing.is_set():
+                yield job
+                return
+            event = self._event(id)  # before the job is sent: that may take long, and the job end meanwhile
+            yield job
+            while True:
+                try:
+                    async with asyncio.timeout(heartbeat):
+                        await event.wait()
+                    break
+                except TimeoutError:
+                    yield None
+
+    async def delete(self, id: str) -> None:
+        """Stop a job that waits or runs, forget one that is over."""
+        job = self.get(id)
+        if job.is_over:
+            self._ledger.forget(id)
+            return
+        item = self._live[id]
+        self._end([replace(job, status="cancelled", finished=time.time())])
+        if item.jobs:
+            return
+        self._queue.pop(item.work.identity, None)
+        if self._items.get(item.work.identity) is item:
+            del self._items[item.work.identity]
+        if item.task:
+            item.task.cancel()
+            await asyncio.wait([item.task], timeout=2.0)
+
+    async def result(self, job: Job) -> tuple[bytes, Work]:
+        """The packed Result, and where its parts stand. Raises HttpError where there is none."""
+        work = self.store.finished_work(job.identity)
+        if work is None:
+            raise _gone()
+        if job.identity not in self._hot:
+            packed = await asyncio.to_thread(self.store.result, job.identity)
+            if packed is None:
+                raise _gone()
+            self._heat(job.identity, packed)
+        self._hot.move_to_end(job.identity)
+        return self._hot[job.identity], work
+
+    # how works run
+
+    def _attach(self, job: Job, item: _Item | None, work: Work) -> None:
+        if item is None:
+            item = _Item(work)
+            self._items[work.identity] = item
+            self._queue[work.identity] = item
+        item.jobs[job.id] = job
+        self._live[job.id] = item
+
+    def _resume(self, job: Job) -> None:
+        work = self.store.work(job.identity)
+        if work is None or not self.store.has_surface(work.surface):
+            lost = InternalError("What this job needs was lost while the server was down; send it again.")
+            self._end([_failed(job, lost)])
+        elif work.parts is not None and self.store.has_outcome(job.identity):
+            self._end([_reused(job, work)])
+        elif work.attempts >= MAX_ATTEMPTS:
+            gave_up = AttemptsError(
+                f"The server died {work.attempts} times while this job was running, so it is not tried "
+                "again; make the mesh or the pattern coarser."
+            )
+            self._end([_failed(job, gave_up)])
+        else:
+            self._attach(job, self._items.get(job.identity), work)
+            self._log(job, "taken up again")
+
+    def _pump(self) -> None:
+        while self._queue and len(self._running) < self._engine.capacity and not self._closing.is_set():
+            _, item = self._queue.popitem(last=False)
+            self._take(item)
+        self._metrics.queued.set(len(self._queue))
+        self._metrics.running.set(len(self._running))
+
+    def _take(self, item: _Item) -> None:
+        self._running.add(item)
+        item.task = asyncio.create_task(self._run(item))
+        # a task that is cancelled before its first step never comes to its own end
+        item.task.add_done_callback(lambda _: self._leave(item))
+
+    async def _run(self, item: _Item) -> None:
+        identity = item.work.identity
+        begun = False
+        try:
+            await self._engine.wait_for_place(
+                self._settings.job_seconds, lambda what: self._change(item, stage=what)
+            )
+            await _patiently(lambda: self.store.start_work(identity))
+            begun = True
+            now = time.time()
+            await _patiently(
+                lambda: self._change(item, written=True, status="running", stage="", started=now)
+            )
+            outcome = await self._compute(item)
+            packed = await asyncio.to_thread(self.store.keep_outcome, identity, outcome)
+            await _patiently(lambda: self.store.finish_work(identity, outcome))
+            self._heat(identity, packed)
+            self._end([_done(job, outcome) for job in item.jobs.values()])
+        except asyncio.CancelledError:
+            self._take_back(item, begun)
+            raise
+        except HexwrapError as error:
+            told_to_end = isinstance(error, WorkerDiedError) and self._closing.is_set()
+            if told_to_end:  # as this server was; the next one goes on with the job
+                self._take_back(item, begun)
+            else:
+                self._fail(item, error)
+        except Exception as error:
+            log.exception("a job failed unexpectedly")
+            fault = InternalError(f"The server could not finish the job ({type(error).__name__}: {error}).")
+            self._fail(item, fault)
+        finally:
+            self._leave(item)
+
+    def _leave(self, item: _Item) -> None:
+        """Make room for the next work. Does no harm twice."""
+        if item not in self._running:
+            return
+        self._running.discard(item)
+        if self._items.get(item.work.identity) is item:
+            del self._items[item.work.identity]
+        self._pump()
+
+    def _take_back(self, item: _Item, begun: bool) -> None:
+        if begun:
+            with contextlib.suppress(StorageError):  # then it counts as an attempt
+                self.store.take_back(item.work.identity)
+
+    def _fail(self, item: _Item, error: HexwrapError) -> None:
+        self._settle(item.work.identity)
+        try:
+            ended = [_failed(job, error) for job in item.jobs.values()]
+        except Exception:  # whatever cannot be told must not keep the jobs from ending
+            log.exception("a problem cannot be told")
+            fault = InternalError(f"The job failed, and its problem cannot be told ({error}); report it.")
+            ended = [_failed(job, fault) for job in item.jobs.values()]
+        self._end(ended)
+
+    def _settle(self, identity: str) -> None:
+        with contextlib.suppress(StorageError):  # then it counts as an attempt
+            self.store.settle(identity)
+
+    async def _compute(self, item: _Item) -> Outcome:
+        def report(stage: str, fraction: float, what: str) -> None:
+            self._change(item, stage=stage, progress=round(max(0.0, min(1.0, fraction)), 4))
+
+        outcome: Outcome = await self._engine.run(
+            "hexwrap_server.jobs.work:solve",
+            await self._order(item.work, next(iter(item.jobs), "")),
+            self.caching,
+            report=report,
+            seconds=self._settings.job_seconds,
+            mib=self._settings.job_mib,
+        )
+        return outcome
+
+    async def _order(self, work: Work, job: str) -> Order:
+        """Workers on this machine read and write the files themselves."""
+        if self._engine.shares_disk:
+            surface = str(self.store.surface_path(work.surface))
+            files = (str(self.store.result_path(work.identity)), str(self.store.solution_path(work.identity)))
+            return Order(work.surface, surface, work.wanted, files, job)
+        data = await asyncio.to_thread(self.store.surface, work.surface)
+        return Order(work.surface, data or b"", work.wanted, None, job)
+
+    def _change(self, item: _Item, *, written: bool = False, **changes: Any) -> None:
+        changed = {id: replace(job, **changes) for id, job in item.jobs.items()}
+        if written:
+            self.store.update(changed.values())
+        item.jobs.update(changed)
+        for id in changed:
+            self._tell(id)
+
+    def _end(self, jobs: list[Job]) -> None:
+        """Write the end of jobs, then tell."""
+        self._ledger.end(jobs)
+        for job in jobs:
+            item = self._live.pop(job.id, None)
+            if item is not None:
+                item.jobs.pop(job.id, None)
+            self._tell(job.id)
+            self._metrics.ended(job)
+            self._log(job, job.status)
+
+    def _event(self, id: str) -> asyncio.Event:
+        return self._changed.setdefault(id, asyncio.Event())
+
+    def _tell(self, id: str) -> None:
+        event = self._changed.pop(id, None)
+        if event:
+            event.set()
+
+    def _heat(self, identity: str, packed: bytes) -> None:
+        self._hot[identity] = packed
+        while len(self._hot) > 1 and sum(map(len, self._hot.values())) > HOT_RESULT_BYTES:
+            self._hot.popitem(last=False)
+
+    async def _prune_forever(self) -> None:
+        s = self._settings
+        while True:
+            try:
+                surfaces = await asyncio.to_thread(self.store.surface_files)
+                kept = self.store.prune_rows(s.results_days, s.results_mib * MIB, surfaces)
+                await asyncio.to_thread(self.store.prune_files, kept, s.cache_mib * MIB)
+            except StorageError as error:
+                log.error("old results cannot be pruned: %s", error)
+            await asyncio.sleep(PRUNE_INTERVAL)
+
+    async def _catch_up(self) -> None:
+        while True:
+            await asyncio.sleep(CATCH_UP_INTERVAL)
+            self._ledger.catch_up()
+            try:
+                await asyncio.to_thread(self.store.check_point)
+            except (StorageError, OSError) as error:
+                log.error("the list of jobs cannot be tidied: %s", error)
+
+    def _log(self, job: Job, what: str) -> None:
+        seconds = round(job.finished - job.started, 3) if job.finished and job.started else None
+        extra = {"job": job.id, "job_name": job.name, "seconds": seconds, "found": job.found}
+        log.info("job %s", what, extra=extra)
+
+
+async def _patiently(write: Callable[[], None]) -> None:
+    """Write when whoever else holds the database lets go; requests are answered meanwhile.
+
+    Raises StorageError after PATIENCE seconds: no job fails because somebody made a copy.
+    """
+    deadline = time.monotonic() + PATIENCE
+    while True:
+        try:
+            return write()
+        except BusyError:
+            if time.monotonic() > deadline:
+                raise
+        await asyncio.sleep(BUSY_INTERVAL)
+
+
+def unpacked(packed: bytes, work: Work, include: list[str] | None) -> bytes:
+    """The Result as JSON, or some of its parts."""
+    text = isal_zlib.decompress(packed, GZIP_WINDOW)
+    return text if include is None else chosen(text, work.parts or {}, include)
+
+
+def _gone() -> HttpError:
+    return HttpError(
+        410, "gone", "The result is no longer kept", "The result was pruned; send the job again."
+    )
+
+
+def _done(job: Job, outcome: Outcome) -> Job:
+    return replace(
+        job,
+        status="done",
+        stage="done",
+        progress=1.0,
+        finished=time.time(),
+        timings=outcome.timings,
+        found=outcome.found,
+    )
+
+
+def _reused(job: Job, work: Work) -> Job:
+    now = time.time()
+    return replace(
+        job,
+        status="done",
+        stage="done",
+        progress=1.0,
+        started=job.created,
+        finished=now,
+        timings=dict.fromkeys(work.timings, 0.0),
+        found=dict.fromkeys(work.timings, "result"),
+    )
+
+
+def _failed(job: Job, error: HexwrapError) -> Job:
+    return replace(job, status="failed", finished=time.time(), problem=plain(problem(error)))

@@ -1,0 +1,1 @@
+"""What is handed out: the Result and the files made of it."""

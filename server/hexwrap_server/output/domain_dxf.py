@@ -1,0 +1,30 @@
+"""``domain.dxf``: the unrolled domain in its own units, to draw over: what is drawn there can be lifted."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hexwrap_server.output.drawing import encode, grey_drawing
+from hexwrap_server.output.meta import Meta
+from hexwrap_server.output.unrolled import Unrolled, cells, plane
+from hexwrap_server.output.viewpoint import corners
+from hexwrap_solver.pipeline import Solution
+
+
+def domain_dxf(solution: Solution, meta: Meta) -> bytes:
+    """Boundary loops, the cut, corners (points) and the pattern's cells, each on a layer of its own."""
+    cmap, pattern = solution.map, solution.pattern
+    document = grey_drawing(meta.name, "loop-0", "loop-1", "cut", "corners", "pattern")
+    space = document.modelspace()
+    unrolled = Unrolled.of(cmap)
+    for layer, sides in (*zip(("loop-0", "loop-1"), unrolled.loops, strict=True), ("cut", unrolled.cut)):
+        for line in unrolled.lines(sides):
+            space.add_lwpolyline(plane(line).tolist(), dxfattribs={"layer": layer})
+    marked = [vertex for vertex, _ in corners(cmap)]
+    for loop, sides in zip(cmap.surface.loops, unrolled.loops, strict=True):
+        for place in plane(unrolled.start[sides[np.isin(loop, marked)]]).tolist():
+            space.add_point(place, dxfattribs={"layer": "corners"})
+    if pattern is not None:
+        for outline in cells(cmap, pattern).to_lists():
+            space.add_lwpolyline(outline, close=True, dxfattribs={"layer": "pattern"})
+    return encode(document)

@@ -1,0 +1,233 @@
+"""``domain.svg``: the unrolled domain with mesh, boundary, pattern, corners and apex (paper, Figure 5)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from xml.sax.saxutils import escape
+
+import numpy as np
+
+from hexwrap_server.output.colours import size_colours
+from hexwrap_server.output.layers import size_name
+from hexwrap_server.output.meta import Meta
+from hexwrap_server.output.text import angle, length, one_line
+from hexwrap_server.output.unrolled import Unrolled, cells, plane
+from hexwrap_server.output.viewpoint import corners
+from hexwrap_solver.arrays import Complexes, Floats, Ragged
+from hexwrap_solver.conformal.types import ConformalMap
+from hexwrap_solver.pattern.types import Pattern
+from hexwrap_solver.pipeline import Solution
+
+#: Drawing units: the longer side of the domain, and the room around it.
+SIDE, MARGIN = 1400.0, 90.0
+#: Larger meshes are left out: their lines would be a grey mass of many megabytes.
+MAX_FACES = 30_000
+#: More corners than this are marked, but not named.
+MAX_NAMES = 40
+#: The apex is shown where it is no further from the domain than this many times the domain's size.
+APEX_REACH = 0.6
+
+STYLE = """
+text { font-family: "DejaVu Sans", "Segoe UI", Helvetica, Arial, sans-serif; fill: #23262b; }
+.title { font-size: 26px; font-weight: bold; } .note { font-size: 18px; fill: #70757d; }
+.mesh { fill: none; stroke: #c3c7cd; stroke-width: 0.5; }
+.cells { stroke: #23262b; stroke-linejoin: round; }
+.cut { fill: none; stroke: #e8781e; stroke-width: 2.2; stroke-dasharray: 9 6; }
+.loop0, .loop1 { fill: none; stroke-width: 3.2; stroke-linecap: round; }
+.loop0 { stroke: #16202e; } .loop1 { stroke: #16202e; }
+.corner { fill: #c8202f; stroke: #ffffff; stroke-width: 2; } .angle { font-size: 20px; fill: #c8202f; }
+.halo { paint-order: stroke; stroke: #ffffff; stroke-width: 5; stroke-linejoin: round; }
+.apex { fill: none; stroke: #6a3fa0; stroke-width: 2.5; } .named { font-size: 20px; }
+"""
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Where the plane's points stand in the drawing: y runs down there."""
+
+    low: Floats
+    scale: float
+    width: float
+    height: float
+
+    @classmethod
+    def around(cls, points: Floats) -> Frame:
+        extent = np.ptp(points, axis=0)
+        scale = SIDE / float(extent.max())
+        width, height = (extent * scale + 2 * MARGIN).tolist()
+        return cls(points.min(axis=0), scale, width, height)
+
+    def place(self, points: Floats) -> Floats:
+        """(…, 2) drawing coordinates."""
+        x = MARGIN + (points[..., 0] - self.low[0]) * self.scale
+        y = self.height - MARGIN - (points[..., 1] - self.low[1]) * self.scale
+        return np.stack([x, y], axis=-1)
+
+    def at(self, z: complex) -> tuple[float, float]:
+        """Drawing coordinates of one place."""
+        x, y = self.place(np.array([z.real, z.imag])).tolist()
+        return x, y
+
+
+def domain_svg(solution: Solution, meta: Meta) -> bytes:
+    """SVG 1.1, complete in itself. Cells across the cut are drawn in one piece, in a sheet of their own."""
+    cmap, pattern = solution.map, solution.pattern
+    unrolled = Unrolled.of(cmap)
+    outlines = None if pattern is None else cells(cmap, pattern)
+    points = [plane(unrolled.start)] if outlines is None else [plane(unrolled.start), outlines.values]
+    frame = Frame.around(np.vstack([*points, *_apex(cmap)]))
+    parts = []
+    if len(cmap.surface.faces) <= MAX_FACES:
+        corners_at = frame.place(plane(unrolled.start).reshape(-1, 3, 2))
+        parts.append(_path(_outlines(Ragged.from_table(corners_at)), "mesh"))
+    if pattern is not None and outlines is not None:
+        parts += _cells(solution, pattern, Ragged(frame.place(np.asarray(outlines.values)), outlines.offsets))
+    parts.append(_path(_polylines(frame, unrolled.lines(unrolled.cut)), "cut"))
+    parts += _loops(cmap, frame, unrolled)
+    parts += _corner_marks(cmap, frame, unrolled)
+    parts += _apex_mark(cmap, frame)
+    return _page(frame, parts, solution, meta).encode()
+
+
+def _page(frame: Frame, parts: list[str], solution: Solution, meta: Meta) -> str:
+    head, foot = 74.0, 62.0
+    width, height = max(frame.width, 620.0), frame.height + head + foot
+    title = escape(one_line(meta.name))
+    inside = "\n".join(parts)
+    return f"""<?xml version="1.0" encoding="UTF-8"?>
+<svg xmlns="http://www.w3.org/2000/svg" width="{width:.0f}" height="{height:.0f}"
+ viewBox="0 0 {width:.2f} {height:.2f}">
+<title>{title}: unrolled domain</title>
+<style>{STYLE}</style>
+<rect width="100%" height="100%" fill="#ffffff"/>
+<text class="title" x="{MARGIN}" y="58">{title}</text>
+<g transform="translate({(width - frame.width) / 2:.2f} {head})">
+{inside}
+</g>
+<text class="note" x="{MARGIN}" y="{height - 34:.2f}">{escape(_caption(solution))}</text>
+</svg>
+"""
+
+
+def _caption(solution: Solution) -> str:
+    cmap, pattern = solution.map, solution.pattern
+    turned = "" if cmap.kind == "cylinder" else f", cone angle {angle(cmap.deck.angle)}"
+    words = f"{cmap.kind}{turned}, circumference {length(cmap.circumference)}"
+    if pattern is not None:
+        words += f"; {pattern.n_cells} cells"
+    return words
+
+
+def _apex(cmap: ConformalMap) -> Floats:
+    """(1, 2) where it is near enough to be shown, else (0, 2)."""
+    apex, uv = cmap.deck.apex, cmap.uv
+    if apex is None:
+        return np.zeros((0, 2))
+    size = abs(complex(np.ptp(uv.real), np.ptp(uv.imag)))
+    near = np.abs(uv - apex).min() < APEX_REACH * size
+    return plane(np.array([apex] if near else [], dtype=complex))
+
+
+def _cells(solution: Solution, pattern: Pattern, rows: Ragged) -> list[str]:
+    """Cells filled with the colour of their panel's size, one path per size."""
+    size = np.full(pattern.n_cells, -1)
+    colours: list[str] = []
+    if solution.panels is not None:
+        size[solution.panels.face] = solution.panels.size
+        colours = size_colours(len(solution.panels.class_length))
+    outlines = _outlines(rows)
+    members: dict[int, list[str]] = {}
+    for outline, group in zip(outlines, size.tolist(), strict=True):
+        members.setdefault(group, []).append(outline)
+    thin = float(np.clip(0.02 * np.sqrt(np.median(_areas(rows))), 0.25, 1.6))
+    return [
+        f'<path class="cells {size_name(group)}" stroke-width="{thin:.2f}"'
+        + f' fill="{colours[group] if group >= 0 else "none"}" fill-opacity="0.85"'
+        + f' d="{"".join(members[group])}"/>'
+        for group in sorted(members)
+    ]
+
+
+def _outlines(rows: Ragged) -> list[str]:
+    """A closed path for each row of points."""
+    numbers = np.asarray(rows.values).tolist()
+    words = [f"L{x:.2f} {y:.2f}" for x, y in numbers]
+    bounds = rows.offsets.tolist()
+    return ["M" + "".join(words[a:b])[1:] + "Z" for a, b in pairwise(bounds)]
+
+
+def _areas(rows: Ragged) -> Floats:
+    points = np.asarray(rows.values)
+    z = points[:, 0] + 1j * points[:, 1]
+    return np.abs(np.bincount(rows.row, (np.conj(z) * z[rows.next()]).imag, rows.n_rows)) / 2
+
+
+def _path(words: list[str], kind: str) -> str:
+    return f'<path class="{kind}" d="{"".join(words)}"/>'
+
+
+def _polylines(frame: Frame, lines: list[Complexes]) -> list[str]:
+    """An open path for each line."""
+    return [
+        "M" + "L".join(f"{x:.2f} {y:.2f}" for x, y in frame.place(plane(line)).tolist()) for line in lines
+    ]
+
+
+def _loops(cmap: ConformalMap, frame: Frame, unrolled: Unrolled) -> list[str]:
+    """Each loop's curve, its name and the way it runs."""
+    parts = []
+    marked = [vertex for vertex, _ in corners(cmap)]
+    for number, (loop, sides) in enumerate(zip(cmap.surface.loops, unrolled.loops, strict=True)):
+        parts.append(_path(_polylines(frame, unrolled.lines(sides)), f"loop{number}"))
+        places = unrolled.start[sides]
+        # The name stands where no corner's angle does, and away from the cut.
+        taken = np.append(places[np.isin(loop, marked)], unrolled.end[unrolled.cut])
+        free = np.abs(places[:, None] - taken).min(axis=1, initial=np.inf)
+        middle = sides[int(np.argmax(free)) if len(taken) else len(sides) // 2]
+        along = unrolled.end[middle] - unrolled.start[middle]
+        away = along / abs(along) * -1j * 34 / frame.scale
+        x, y = frame.at(unrolled.start[middle] + away)
+        turn = -np.degrees(np.angle(along))
+        arrow, turn = ("→", turn) if abs(turn) <= 90 else ("←", turn - np.copysign(180, turn))
+        words = f"loop {number} {arrow}" if arrow == "→" else f"{arrow} loop {number}"
+        parts.append(
+            f'<text class="named halo" text-anchor="middle" dominant-baseline="central" '
+            f'transform="translate({x:.2f} {y:.2f}) rotate({turn:.2f})">{words}</text>'
+        )
+    return parts
+
+
+def _corner_marks(cmap: ConformalMap, frame: Frame, unrolled: Unrolled) -> list[str]:
+    """A dot at each corner of the domain, with its angle."""
+    marked = dict(corners(cmap))
+    parts = []
+    for loop, sides in zip(cmap.surface.loops, unrolled.loops, strict=True):
+        for vertex, side in zip(loop.tolist(), sides.tolist(), strict=True):
+            if vertex not in marked:
+                continue
+            place = unrolled.start[side]
+            x, y = frame.at(place)
+            parts.append(f'<circle class="corner" cx="{x:.2f}" cy="{y:.2f}" r="8"/>')
+            if len(marked) > MAX_NAMES:
+                continue
+            # The inside spans the angle to the left of the side that leaves the corner.
+            along = unrolled.end[side] - place
+            away = -along / abs(along) * np.exp(0.5j * marked[vertex]) * 30 / frame.scale
+            x, y = frame.at(place + away)
+            parts.append(
+                f'<text class="angle halo" text-anchor="middle" dominant-baseline="central" '
+                f'x="{x:.2f}" y="{y:.2f}">{angle(marked[vertex])}</text>'
+            )
+    return parts
+
+
+def _apex_mark(cmap: ConformalMap, frame: Frame) -> list[str]:
+    parts = []
+    for x, y in frame.place(_apex(cmap)).tolist():
+        parts += [
+            f'<path class="apex" d="M{x - 12:.2f} {y:.2f}h24M{x:.2f} {y - 12:.2f}v24"/>',
+            f'<circle class="apex" cx="{x:.2f}" cy="{y:.2f}" r="7"/>',
+            f'<text class="named halo" x="{x + 16:.2f}" y="{y - 12:.2f}">apex</text>',
+        ]
+    return parts

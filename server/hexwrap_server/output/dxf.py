@@ -1,0 +1,41 @@
+"""``panels.dxf``: the panels in space as closed 3-D polylines, a layer per size, labels at their centres."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hexwrap_server.output.drawing import drawing, encode
+from hexwrap_server.output.layers import size_layers
+from hexwrap_server.output.meta import Meta, panels_of
+from hexwrap_solver.arrays import Floats
+from hexwrap_solver.pipeline import Solution
+
+#: Height of the labels in edge lengths.
+TEXT = 0.16
+
+
+def panels_dxf(solution: Solution, meta: Meta) -> bytes:
+    """AutoCAD 2010 DXF; labels lie in the planes of their panels, read from outside."""
+    pattern, panels = panels_of(solution, "panels.dxf")
+    document = drawing(panels, meta.name, "labels")
+    space = document.modelspace()
+    layers = {size: layer.name for size, layer in size_layers(panels).items()}
+    for points, size in zip(panels.polygons.to_lists(), panels.size.tolist(), strict=True):
+        space.add_polyline3d(points, close=True, dxfattribs={"layer": layers[size]})
+    names = pattern.labels()
+    centres = object_coordinates(panels.center, panels.normal).tolist()
+    for face, centre, normal, edge in zip(
+        panels.face.tolist(), centres, panels.normal.tolist(), panels.edge_length.tolist(), strict=True
+    ):
+        place = {"layer": "labels", "extrusion": normal, "insert": centre, "align_point": centre}
+        space.add_text(names[face], height=TEXT * edge, dxfattribs={**place, "halign": 1, "valign": 2})
+    return encode(document)
+
+
+def object_coordinates(points: Floats, normals: Floats) -> Floats:
+    """(n, 3) points in the coordinates in which DXF places flat things (its arbitrary axis algorithm)."""
+    steep = np.all(np.abs(normals[:, :2]) < 1 / 64, axis=1, keepdims=True)
+    x_axis = np.cross(np.where(steep, [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]), normals)
+    x_axis /= np.linalg.norm(x_axis, axis=1, keepdims=True)
+    y_axis = np.cross(normals, x_axis)
+    return np.stack([np.sum(points * axis, axis=1) for axis in (x_axis, y_axis, normals)], axis=1)

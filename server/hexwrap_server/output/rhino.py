@@ -1,0 +1,121 @@
+"""``panels.3dm``: closed polylines with a layer per size, labels as text dots, panel data as user strings."""
+
+from __future__ import annotations
+
+import base64
+from typing import Any
+
+import numpy as np
+import rhino3dm
+
+from hexwrap_server.output.layers import size_layers
+from hexwrap_server.output.meta import Meta, panels_of
+from hexwrap_server.output.table import columns
+from hexwrap_server.output.text import one_line
+from hexwrap_solver.arrays import Ints, Ragged
+from hexwrap_solver.panels.types import Components, Support
+from hexwrap_solver.pipeline import Solution
+
+#: The columns of ``panels.csv`` that every polyline carries as user strings.
+KEYS = (
+    "label", "ring", "place", "size", "edge_length", "planarity", "surface_distance",
+    "gap_tangential_mean", "gap_normal_mean", "neighbours",
+)  # fmt: skip
+LABELS = (60, 64, 70)
+COMPONENTS = (150, 156, 166)
+SUPPORT = (96, 104, 118)
+
+
+def panels_3dm(solution: Solution, meta: Meta) -> bytes:
+    """A Rhino file without a unit: lengths are those of the sent surface."""
+    _, panels = panels_of(solution, "panels.3dm")
+    model = rhino3dm.File3dm()
+    model.ApplicationName = "hexwrap"
+    model.Settings.ModelUnitSystem = getattr(rhino3dm.UnitSystem, "None")
+    model.Strings["hexwrap"] = one_line(meta.name)
+    known = {key: values for key, values in columns(solution).items() if key in KEYS}
+    names = [str(label) for label in known["label"]]
+    top = _layer(model, "panels", LABELS)
+    place = {size: _layer(model, x.name, x.colour, top) for size, x in size_layers(panels).items()}
+    sizes = panels.size.tolist()
+    texts = list(zip(*([str(value) for value in values] for values in known.values()), strict=True))
+    for row, points in enumerate(panels.polygons.to_lists()):
+        attributes = _attributes(place[sizes[row]], names[row])
+        for key, value in zip(known, texts[row], strict=True):
+            attributes.SetUserString(key, value)
+        model.Objects.AddPolyline(_closed(points), attributes)
+    labels = _layer(model, "labels", LABELS)
+    for name, centre in zip(names, panels.center.tolist(), strict=True):
+        model.Objects.AddTextDot(name, rhino3dm.Point3d(*centre), _attributes(labels, name))
+    if solution.components is not None:
+        _add_components(model, solution.components, names)
+    if solution.support is not None:
+        _add_support(model, solution.support)
+    return base64.b64decode(model.Encode())
+
+
+def _layer(
+    model: rhino3dm.File3dm, name: str, colour: tuple[int, int, int], parent: int | None = None
+) -> int:
+    layer = rhino3dm.Layer()
+    layer.Name = name
+    layer.Color = (*colour, 255)
+    if parent is not None:
+        layer.ParentLayerId = model.Layers[parent].Id
+    return int(model.Layers.Add(layer))
+
+
+def _attributes(layer: int, name: str) -> rhino3dm.ObjectAttributes:
+    attributes = rhino3dm.ObjectAttributes()
+    attributes.LayerIndex = layer
+    attributes.Name = name
+    return attributes
+
+
+def _closed(points: list[Any]) -> rhino3dm.Point3dList:
+    return rhino3dm.Point3dList([rhino3dm.Point3d(*p) for p in (*points, points[0])])
+
+
+def _mesh(vertices: list[Any], faces: list[Any]) -> rhino3dm.Mesh:
+    mesh = rhino3dm.Mesh()
+    mesh.Vertices.UseDoublePrecisionVertices = True
+    for point in vertices:
+        mesh.Vertices.AddPoint3d(*point)
+    for face in faces:
+        mesh.Faces.AddFace(*face)
+    mesh.Normals.ComputeNormals()
+    return mesh
+
+
+def _add_components(model: rhino3dm.File3dm, components: Components, names: list[str]) -> None:
+    top = _layer(model, "components", COMPONENTS)
+    outlines = _layer(model, "outlines", COMPONENTS, top)
+    for name, points in zip(names, components.outline.to_lists(), strict=True):
+        model.Objects.AddPolyline(_closed(points), _attributes(outlines, name))
+    if components.solid_vertices is None or components.solid_faces is None:
+        return
+    solids = _layer(model, "solids", COMPONENTS, top)
+    for name, points, corners in zip(
+        names, components.solid_vertices.to_lists(), components.solid_faces.to_lists(), strict=True
+    ):
+        triangles = np.asarray(corners).reshape(-1, 3).tolist()
+        model.Objects.AddMesh(_mesh(points, triangles), _attributes(solids, name))
+
+
+def _add_support(model: rhino3dm.File3dm, support: Support) -> None:
+    """Beams as one mesh of ruled strips with corners of their own; node axes as lines of the beams' depth,
+    or of a quarter of the beams' length where they have no depth."""
+    top = _layer(model, "support", SUPPORT)
+    depth = np.linalg.norm(support.strips[:, 3] - support.strips[:, 0], axis=1).max(initial=0.0)
+    if depth > 0:
+        strips = Ragged.from_table(support.strips)
+        corners: Ints = np.arange(len(strips.values)).reshape(-1, 4)
+        beams = _attributes(_layer(model, "beams", SUPPORT, top), "beams")
+        model.Objects.AddMesh(_mesh(strips.values.tolist(), corners.tolist()), beams)
+    else:
+        ends = support.nodes[support.edges]
+        depth = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).mean() / 4
+    axes = _attributes(_layer(model, "axes", SUPPORT, top), "node axis")
+    ends = support.nodes - depth * support.axes
+    for start, end in zip(support.nodes.tolist(), ends.tolist(), strict=True):
+        model.Objects.AddLine(rhino3dm.Point3d(*start), rhino3dm.Point3d(*end), axes)

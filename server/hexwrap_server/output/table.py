@@ -1,0 +1,90 @@
+"""``panels.csv``: one row per panel with everything that is known of it."""
+
+from __future__ import annotations
+
+import csv
+import io
+
+import numpy as np
+
+from hexwrap_server.output.meta import Meta, panels_of
+from hexwrap_solver.arrays import Floats, Ints
+from hexwrap_solver.panels.types import Panels
+from hexwrap_solver.pattern.types import Pattern
+from hexwrap_solver.pipeline import Solution
+
+
+def panels_csv(solution: Solution, meta: Meta) -> bytes:
+    """UTF-8, comma separated, a heading row. Lengths in model units, angles in radians.
+
+    ``neighbours`` names the panels across each edge in order, ``-`` where there is none; gaps are to
+    those neighbours, along the surface (``tangential``) and across it (``normal``).
+    """
+    panels_of(solution, "panels.csv")
+    known = columns(solution)
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\r\n")  # RFC 4180
+    writer.writerow(known)
+    writer.writerows(zip(*known.values(), strict=True))
+    return text.getvalue().encode()
+
+
+def columns(solution: Solution) -> dict[str, list[object]]:
+    """Column name → one entry per panel, empty text where something was not measured."""
+    pattern, panels = panels_of(solution, "a table")
+    quality, n = solution.quality, panels.n_panels
+    labels = np.array(pattern.labels(), dtype=object)
+    known: dict[str, list[object]] = {
+        "label": labels[panels.face].tolist(),
+        "ring": pattern.ring[panels.face].tolist(),
+        "place": pattern.place[panels.face].tolist(),
+        "size": ["" if s < 0 else s for s in panels.size.tolist()],
+        "edge_length": _numbers(panels.edge_length, n),
+        "limit": _numbers(panels.limit, n),
+        "corners": panels.polygons.lengths.tolist(),
+        "whole": panels.whole.astype(int).tolist(),
+    }
+    for name, vectors in (("center", panels.center), ("normal", panels.normal)):
+        for axis, letter in enumerate("xyz"):
+            known[f"{name}_{letter}"] = _numbers(vectors[:, axis], n)
+    for name in ("planarity", "edge_deviation", "angle_deviation", "surface_distance"):
+        known[name] = _numbers(getattr(quality, name), n)
+    known["convex"] = [""] * n if quality.convex is None else quality.convex.astype(int).tolist()
+    for name in ("gap_tangential", "gap_normal", "kink"):
+        for what, numbers in _over_edges(getattr(quality, name), pattern, panels.face).items():
+            known[f"{name}_{what}"] = _numbers(numbers, n)
+    known["neighbours"] = [" ".join(names) for names in neighbour_labels(pattern, panels)]
+    return known
+
+
+def neighbour_labels(pattern: Pattern, panels: Panels) -> list[list[str]]:
+    """Per panel, the label across each edge of its cell; ``-`` where no panel stands."""
+    has_panel = np.zeros(pattern.n_cells + 1, dtype=bool)  # one more, for index −1
+    has_panel[panels.face] = True
+    names = np.array([*pattern.labels(), "-"], dtype=object)
+    across = np.asarray(pattern.neighbours.values)
+    named = np.where(has_panel[across], names[across], "-")
+    rows = np.split(named, pattern.neighbours.offsets[1:-1])
+    return [rows[cell].tolist() for cell in panels.face.tolist()]
+
+
+def _numbers(values: Floats | None, n: int) -> list[object]:
+    """n numbers, printed as the shortest text that reads back the same; empty where not measured."""
+    if values is None:
+        return [""] * n
+    return ["" if bad else v for v, bad in zip(values.tolist(), ~np.isfinite(values), strict=True)]
+
+
+def _over_edges(values: Floats | None, pattern: Pattern, cells: Ints) -> dict[str, Floats | None]:
+    """min, mean and max over the edges of each given cell, NaN where it has no neighbour at all."""
+    if values is None:
+        return {"min": None, "mean": None, "max": None}
+    row, n = pattern.neighbours.row, pattern.n_cells
+    there = np.isfinite(values)
+    count = np.bincount(row[there], minlength=n)
+    total = np.bincount(row[there], weights=values[there], minlength=n)
+    least, most = np.full(n, np.inf), np.full(n, -np.inf)
+    np.minimum.at(least, row[there], values[there])
+    np.maximum.at(most, row[there], values[there])
+    mean = np.divide(total, count, out=np.full(n, np.nan), where=count > 0)
+    return {"min": least[cells], "mean": mean[cells], "max": most[cells]}

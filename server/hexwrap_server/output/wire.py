@@ -1,0 +1,279 @@
+"""Solution → the contract's Result. Arrays go into the text directly; what is not a number becomes null."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import orjson
+from numpy.typing import NDArray
+
+from hexwrap_server.jobs.parts import PARTS, join_parts
+from hexwrap_server.output.colours import size_colours
+from hexwrap_solver.arrays import Complexes, Floats, Ints, Ragged
+from hexwrap_solver.conformal.types import ConformalMap
+from hexwrap_solver.panels.types import Components, Panels, Support, TradeOff
+from hexwrap_solver.pattern.types import Pattern
+from hexwrap_solver.pipeline import Solution
+from hexwrap_solver.surface.types import Surface
+
+
+def result_json(
+    solution: Solution, timings: dict[str, float] | None = None, include: Sequence[str] = PARTS
+) -> bytes:
+    """The Result as JSON. include: the parts wanted."""
+    return join_parts(parts_json(solution, timings or {}, include))
+
+
+def parts_json(
+    solution: Solution, timings: dict[str, float], include: Sequence[str] = PARTS
+) -> dict[str, bytes]:
+    """The JSON of each part of the Result."""
+    return {name: dump(part(solution, name, timings)) for name in PARTS if name in include}
+
+
+def part(solution: Solution, name: str, timings: dict[str, float]) -> Any:
+    """One part of the Result as a structure that ``dump`` takes."""
+    match name:
+        case "mesh":
+            return mesh(solution.map.surface)
+        case "map":
+            return conformal(solution.map)
+        case "pattern":
+            return solution.pattern and pattern(solution.pattern)
+        case "panels":
+            return solution.panels and panels(solution)
+        case "sizes":
+            return sizes(solution.panels)
+        case "quality":
+            return quality(solution)
+        case "components":
+            return solution.components and components(solution.components)
+        case "support":
+            return solution.support and support(solution.support)
+        case _:
+            return timings
+
+
+def dump(value: Any) -> bytes:
+    """JSON, numpy arrays included."""
+    return orjson.dumps(value, option=orjson.OPT_SERIALIZE_NUMPY)
+
+
+def mesh(surface: Surface) -> dict[str, Any]:
+    return {
+        "vertices": flat(surface.vertices),
+        "faces": flat(surface.faces),
+        "input_vertex": flat(surface.input_vertex),
+        "loops": [flat(loop) for loop in surface.loops],
+        "repairs": list(surface.repairs),
+    }
+
+
+def conformal(cmap: ConformalMap) -> dict[str, Any]:
+    apex = None if cmap.kind == "cylinder" else cmap.deck.apex
+    return {
+        "kind": cmap.kind,
+        "cone_angle": float(cmap.deck.angle),
+        "log_scale": flat(cmap.log_scale),
+        "uv": plane(cmap.uv),
+        "sheet": mostly_zero(cmap.sheet),
+        "deck": {
+            "angle": float(cmap.deck.angle),
+            "translation": [cmap.deck.translation.real, cmap.deck.translation.imag],
+        },
+        "circumference": float(cmap.circumference),
+        "apex": None if apex is None else [apex.real, apex.imag],
+        "boundary_angles": [flat(angles) for angles in cmap.boundary_angles],
+        "iterations": int(cmap.iterations),
+        "residual": float(cmap.residual),
+        "flips": int(cmap.flips),
+        "inserted": int(cmap.inserted),
+        "closing_error": float(cmap.closing_error),
+    }
+
+
+def pattern(laid: Pattern) -> dict[str, Any]:
+    return {
+        "kind": laid.kind,
+        "vertices": flat(laid.vertices),
+        "normals": flat(laid.normals),
+        "uv": plane(laid.uv),
+        "faces": rows(laid.faces),
+        "sheet": rows(Ragged(laid.sheet, laid.faces.offsets)),
+        "whole": flat(laid.whole),
+        "neighbours": rows(laid.neighbours),
+        "ring": flat(laid.ring),
+        "place": flat(laid.place),
+        "rings": int(laid.rings),
+        "around": int(laid.around),
+        "rotation": float(laid.rotation),
+        "edge_length": float(laid.edge_length),
+        "distortion": float(laid.distortion),
+    }
+
+
+def panels(solution: Solution) -> dict[str, Any]:
+    assert solution.panels is not None
+    assert solution.pattern is not None
+    return shapes(solution.panels, solution.pattern) | measures(solution)
+
+
+def shapes(made: Panels, laid: Pattern) -> dict[str, Any]:
+    """What is known of the panels before they are measured."""
+    labels = laid.labels()
+    return {
+        "mode": made.mode,
+        "polygons": rows(made.polygons),
+        "face": flat(made.face),
+        "label": [labels[i] for i in made.face.tolist()],
+        "size": flat(made.size),
+        "edge_length": flat(made.edge_length),
+        "limit": flat(made.limit),
+        "center": flat(made.center),
+        "normal": flat(made.normal),
+        "whole": flat(made.whole),
+        "outside": flat(made.outside),
+    }
+
+
+def measures(solution: Solution) -> dict[str, Any]:
+    """What is measured on each panel."""
+    made, laid, measured = solution.panels, solution.pattern, solution.quality
+    assert made is not None
+    assert laid is not None
+    return {
+        "planarity": flat(measured.planarity),
+        "edge_deviation": flat(measured.edge_deviation),
+        "angle_deviation": flat(measured.angle_deviation),
+        "surface_distance": flat(measured.surface_distance),
+        "gap_tangential": _widest(measured.gap_tangential, laid.neighbours, made),
+        "gap_normal": _widest(measured.gap_normal, laid.neighbours, made),
+        "congruence": flat(measured.congruence),
+    }
+
+
+def sizes(made: Panels | None) -> list[dict[str, Any]]:
+    if made is None:
+        return []
+    listed = zip(
+        made.class_length.tolist(),
+        made.class_count.tolist(),
+        size_colours(len(made.class_length)) if len(made.class_length) else [],
+        strict=True,
+    )
+    return [
+        {"size": i, "edge_length": length, "count": count, "color": colour}
+        for i, (length, count, colour) in enumerate(listed)
+    ]
+
+
+def quality(solution: Solution) -> dict[str, Any]:
+    measured = solution.quality
+    made = solution.panels
+    return {
+        "scale_ratio": float(measured.scale_ratio),
+        "quasi_conformal": {
+            "mean": float(measured.quasi_conformal_mean),
+            "max": float(measured.quasi_conformal_max),
+        },
+        "planarity": summary(measured.planarity, "max", "mean"),
+        "edge_deviation": summary(measured.edge_deviation, "max"),
+        "angle_deviation": summary(measured.angle_deviation, "max"),
+        "surface_distance": summary(measured.surface_distance, "max", "mean"),
+        "gap": {
+            "tangential": summary(measured.gap_tangential, "min", "mean", "max"),
+            "normal": summary(measured.gap_normal, "mean", "max"),
+        },
+        "kink": summary(measured.kink, "mean", "max"),
+        "overlaps": None if made is None else int(measured.overlaps),
+        "coverage": None if made is None else float(measured.coverage),
+        "distinct_panels": 0 if measured.congruence is None else len(np.unique(measured.congruence)),
+        "not_convex": 0 if measured.convex is None else int(np.sum(~measured.convex)),
+        "movement": float(measured.movement),
+        "trade_off": trade_off(made.trade_off) if made and made.trade_off else None,
+        "notes": notes(solution),
+    }
+
+
+def trade_off(curve: TradeOff) -> dict[str, Any]:
+    return {
+        "sizes": flat(curve.sizes),
+        "uncovered": flat(curve.uncovered),
+        "worst_gap": flat(curve.worst_gap),
+    }
+
+
+def notes(solution: Solution) -> list[str]:
+    """What every stage has to say to the user, each sentence once."""
+    stages = (solution.map, solution.pattern, solution.panels, solution.quality)
+    return list(dict.fromkeys(note for stage in stages if stage is not None for note in stage.notes))
+
+
+def components(made: Components) -> dict[str, Any]:
+    return {
+        "outline": rows(made.outline),
+        "origin": flat(made.origin),
+        "x_axis": flat(made.x_axis),
+        "y_axis": flat(made.y_axis),
+        "z_axis": flat(made.z_axis),
+        "solid_vertices": made.solid_vertices and rows(made.solid_vertices),
+        "solid_faces": made.solid_faces and rows(made.solid_faces),
+    }
+
+
+def support(made: Support) -> dict[str, Any]:
+    return {
+        "nodes": flat(made.nodes),
+        "axes": flat(made.axes),
+        "edges": flat(made.edges),
+        "strips": flat(made.strips),
+        "torsion": flat(made.torsion),
+        "tilt": flat(made.tilt),
+    }
+
+
+def summary(values: Floats | None, *wanted: str) -> dict[str, float | None]:
+    """The named statistics of the finite values, null where there are none."""
+    finite = np.zeros(0) if values is None else values[np.isfinite(values)]
+    return {name: float(getattr(np, name)(finite)) if len(finite) else None for name in wanted}
+
+
+def rows(ragged: Ragged) -> Any:
+    """Rows of equal length as one array, others as lists."""
+    lengths = ragged.lengths
+    if len(lengths) == 0:
+        return []
+    if np.all(lengths == lengths[0]):
+        return flat(ragged.values.reshape(len(lengths), int(lengths[0]), *ragged.values.shape[1:]))
+    values, offsets = ragged.values.tolist(), ragged.offsets.tolist()
+    return [values[a:b] for a, b in pairwise(offsets)]
+
+
+def flat(array: NDArray[Any] | None) -> Any:
+    """What orjson asks of an array: contiguous."""
+    return None if array is None else np.ascontiguousarray(array)
+
+
+def mostly_zero(table: Ints) -> orjson.Fragment:
+    """(n, 3) integers, few of them other than 0, as text: only the seam is written, a third of the work."""
+    other = np.flatnonzero(table[:, 0] | table[:, 1] | table[:, 2])
+    zeros = np.diff(other, prepend=-1, append=len(table)) - 1
+    written = [b"", *(b"[%d,%d,%d]," % tuple(row) for row in table[other].tolist())]
+    rows = b"".join([row + b"[0,0,0]," * n for row, n in zip(written, zeros.tolist(), strict=True)])
+    return orjson.Fragment(b"[" + rows[:-1] + b"]")
+
+
+def plane(z: Complexes) -> Floats:
+    """(n, 2) of complex numbers."""
+    return np.stack([z.real, z.imag], axis=-1)
+
+
+def _widest(gap: Floats | None, neighbours: Ragged, made: Panels) -> Floats | None:
+    """(q,) the greatest gap of each panel to its neighbours, NaN where it has none."""
+    if gap is None or len(gap) != len(neighbours.values) or not neighbours.n_rows:
+        return None
+    widest: Floats = np.fmax.reduceat(gap, neighbours.offsets[:-1])
+    return flat(widest[made.face])  # type: ignore[no-any-return]

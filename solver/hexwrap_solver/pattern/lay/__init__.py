@@ -1,0 +1,1 @@
+"""Nodes, edges and cells of a lattice that has been placed on a domain."""

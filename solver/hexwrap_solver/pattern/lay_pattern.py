@@ -1,0 +1,284 @@
+"""Laying a pattern on the domain of a conformal map (paper, definition 2; Figures 1, 5–7)."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from hexwrap_solver.arrays import Bools, Floats, Ints, Progress, Ragged, no_progress
+from hexwrap_solver.conformal.types import ConformalMap
+from hexwrap_solver.domain.cover import Cover, cover_of
+from hexwrap_solver.domain.interpolate import surface_weights
+from hexwrap_solver.domain.lift import points_at
+from hexwrap_solver.domain.locate import barycentric
+from hexwrap_solver.errors import PatternError
+from hexwrap_solver.pattern.lattice import LATTICES, Lattice
+from hexwrap_solver.pattern.lay.cells import (
+    Cells,
+    awkward_cells,
+    largest_part,
+    manifold_corners,
+    only_whole_cells,
+)
+from hexwrap_solver.pattern.lay.edges import link_nodes
+from hexwrap_solver.pattern.lay.labels import places, rows_from, turns_around, winding
+from hexwrap_solver.pattern.lay.nodes import Layout, find_nodes
+from hexwrap_solver.pattern.place.choose import Placing
+from hexwrap_solver.pattern.place.placement import Placement, anchor_vertex, edge_angle
+from hexwrap_solver.pattern.place.rotation import with_rotation
+from hexwrap_solver.pattern.place.size import ASKED, fitting_number
+from hexwrap_solver.pattern.trim.arrangement import Points
+from hexwrap_solver.pattern.trim.trim import TooCoarse, Trimmed, trim
+from hexwrap_solver.pattern.types import Pattern, PatternSettings
+from hexwrap_solver.surface.normals import with_tangents
+from hexwrap_solver.surface.projection import project, start_parameters
+
+#: Relative error of an edge length asked for that calls for a second attempt.
+CLOSE = 0.005
+
+#: Above so many cells, where the map is STEEP, it is the map that does not suit, not the size of the cells.
+MANY = 1e12
+#: Differences of u that alone make so many: areas e^24 = 3e10 times as large as others.
+STEEP = 12.0
+
+#: Rounding of the layout, relative to its extent; points this near to an edge count as on it.
+REACH = 1e-11
+
+
+def lay_pattern(cmap: ConformalMap, settings: PatternSettings, progress: Progress = no_progress) -> Pattern:
+    """A closed pattern of regular cells in the domain, carried to the surface.
+
+    Raises NotAdaptedError where the cone angle does not suit the kind of pattern, PatternError where the
+    cells are too many (``settings.max_cells``) or too large to close up around the surface.
+    """
+    lattice = LATTICES[settings.kind]
+    settings, notes = with_rotation(cmap, lattice, settings)
+    placing = Placing.of(cmap, lattice, settings)
+    pattern = _lay(placing, settings, progress)
+    if settings.around is not None and pattern.around != settings.around:
+        notes.append(
+            f"{pattern.around} cells around instead of {settings.around}: the nearest that closes up."
+        )
+    wanted = settings.edge_length
+    if wanted is not None and abs(pattern.edge_length / wanted - 1) > CLOSE:
+        corrected = replace(settings, edge_length=wanted**2 / pattern.edge_length)
+        again = _lay(placing, corrected, no_progress)
+        if abs(again.edge_length / wanted - 1) < abs(pattern.edge_length / wanted - 1):
+            pattern = again
+        if abs(pattern.edge_length / wanted - 1) > ASKED:
+            notes.append(
+                f"The mean edge length is {pattern.edge_length:.6g} instead of {wanted:.6g}, so that the "
+                f"pattern closes up with little distortion ({pattern.around} cells around); others may be "
+                "had with around."
+            )
+    return replace(pattern, notes=(*notes, *pattern.notes))
+
+
+def _lay(placing: Placing, settings: PatternSettings, progress: Progress) -> Pattern:
+    cmap, lattice = placing.cmap, placing.lattice
+    placement = placing.at(settings)
+    progress(0.1, "placing the lattice")
+    layout = layout_of(cmap, lattice, placement)
+    _check_count(cmap, layout, settings)
+    nodes = find_nodes(layout)
+    if not nodes.n:
+        raise _too_coarse(cmap, settings, placement)
+    progress(0.3, f"{nodes.n} nodes")
+    links = link_nodes(layout, nodes)
+    progress(0.6, "edges")
+    if settings.boundary == "trim":
+        try:
+            trimmed = trim(cmap, layout, nodes, links)
+        except TooCoarse:
+            raise _too_coarse(cmap, settings, placement) from None
+    else:
+        cells = only_whole_cells(lattice, layout.motion, links)
+        own = nodes.own
+        points = Points(nodes.face[own], lattice.position(nodes.point[own]), np.zeros(nodes.n, dtype=bool))
+        trimmed = Trimmed(cells, np.ones(cells.n, dtype=bool), points)
+    progress(0.8, f"{trimmed.cells.n} cells")
+    return _finish(cmap, settings, placement, layout, trimmed)
+
+
+def layout_of(cmap: ConformalMap, lattice: Lattice, placement: Placement) -> Layout:
+    """The domain's triangles in lattice units."""
+    corners = placement.motion.carry(placement.place[cmap.surface.faces], cmap.sheet)
+    extent = float(abs(corners).max())
+    reach = max(1e-9, REACH * extent, 2 * cmap.closing_error * extent)
+    return Layout(corners, cover_of(cmap), lattice, placement.motion, reach)
+
+
+def _check_count(cmap: ConformalMap, layout: Layout, settings: PatternSettings) -> None:
+    extent = float(abs(layout.corners).max())
+    p, q, r = layout.corners.T / extent  # on cones that shrink beyond all measure areas would overflow
+    area = float((abs(((q - p).conj() * (r - p)).imag) / 2).sum())
+    cells = min(area / layout.lattice.cell_area * extent * extent, sys.float_info.max)
+    if cells > MANY and np.ptp(cmap.log_scale) > STEEP:
+        raise PatternError(
+            f"About {cells:.0e} cells would be needed: under this boundary condition the map shrinks some "
+            "parts of the surface far too much for cells of one size; ask for a smaller cone angle.",
+            data={"cells": cells, "limit": settings.max_cells},
+        )
+    if cells > settings.max_cells:
+        raise PatternError(
+            f"About {cells:,.0f} cells would be needed, over the limit of {settings.max_cells:,}: ask for "
+            "a larger edge length or fewer cells around.",
+            data={"cells": int(cells), "limit": settings.max_cells},
+        )
+
+
+def _finish(
+    cmap: ConformalMap, settings: PatternSettings, placement: Placement, layout: Layout, cut: Trimmed
+) -> Pattern:
+    keep, narrow = _usable(cut.cells, placement.motion.turns != 0)
+    if not keep.any():
+        raise _too_coarse(cmap, settings, placement)
+    cells = cut.cells.part(keep)
+    corner, point = manifold_corners(cells)
+    triangle, place = cut.points.face[point], cut.points.place[point]
+    weights = barycentric(layout.corners[triangle], place)
+    uv = (weights * cmap.corners()[triangle]).sum(axis=1)
+    on_surface = surface_weights(cmap, triangle, weights)
+    vertices, normals = _on_input_surface(cmap, triangle, on_surface)
+    faces, neighbours = Ragged(corner, cells.corner.offsets), cells.neighbours()
+    first = _at_first_loop(cmap, layout.cover, faces, neighbours, cells.turns)
+    if first is None:
+        raise _too_coarse(cmap, settings, placement)
+    ring = rows_from(neighbours, first)
+    if settings.kind == "triangle":
+        ring = ring // 2  # a row of triangles: those that stand and those that hang
+    vertex_turn = turns_around(cmap)
+    turn = (weights * (vertex_turn[cmap.surface.faces] + cmap.sheet)[triangle]).sum(axis=1)
+    turn = turn[corner] - vertex_turn[anchor_vertex(cmap)] + cells.turns
+    turn_of_cell = np.add.reduceat(turn, faces.offsets[:-1]) / faces.lengths
+    return Pattern(
+        kind=settings.kind,
+        vertices=vertices,
+        normals=normals,
+        uv=uv,
+        faces=faces,
+        sheet=cells.turns,
+        neighbours=neighbours,
+        triangle=triangle,
+        barycentric=on_surface,
+        whole=cut.whole[keep],
+        ring=ring,
+        place=places(ring, turn_of_cell),
+        rings=int(ring.max()) + 1,
+        around=placement.around,
+        rotation=placement.rotation,
+        edge_length=mean_edge(vertices, faces),
+        distortion=placement.distortion,
+        notes=(*placement.notes, *_told(cut, narrow, int(np.count_nonzero(~keep)) - narrow)),
+    )
+
+
+def _usable(cells: Cells, narrows: bool) -> tuple[Bools, int]:
+    """(c,) the largest part without cells that no mesh of shared vertices can tell apart, and how many these
+    are. narrows: towards one end fewer go around, and those left out may be the few there; none are usable
+    otherwise."""
+    keep = np.ones(cells.n, dtype=bool)
+    narrow = 0
+    while keep.any():
+        members = np.flatnonzero(keep)
+        part = cells.part(keep)
+        keep[members] = largest_part(part)
+        members, part = np.flatnonzero(keep), cells.part(keep)
+        awkward = awkward_cells(Ragged(manifold_corners(part)[0], part.corner.offsets), part.twin)
+        if not awkward.any():
+            break
+        keep[members[awkward]] = False
+        keep &= narrows
+        narrow += int(awkward.sum())
+    return keep, narrow
+
+
+def _told(cut: Trimmed, narrow: int, apart: int) -> list[str]:
+    notes = []
+    if cut.joined:
+        notes.append(f"{cut.joined} slivers at the boundary were joined to the cut cell beside them.")
+    if cut.lost:
+        notes.append(
+            f"{cut.lost} slivers at the boundary were left out, {cut.dropped:.2f} cells in area altogether."
+        )
+    if narrow:
+        notes.append(
+            f"{narrow} cells at the narrow end were left out: so few go around it there that they touch "
+            "themselves."
+        )
+    if apart:
+        notes.append(f"{apart} cells hung on the pattern by no edge and were left out.")
+    return notes
+
+
+def _on_input_surface(cmap: ConformalMap, triangle: Ints, weights: Floats) -> tuple[Floats, Floats]:
+    """Points and normals on the mesh, or on the NURBS surface where the mesh was made from one."""
+    points, normals = points_at(cmap, triangle, weights)
+    surface = cmap.surface
+    if surface.nurbs is None:
+        return points, normals
+    start = start_parameters(surface, triangle, weights)
+    points, _, exact = project(surface.nurbs, points, start)
+    return points, with_tangents(exact, normals)
+
+
+def mean_edge(vertices: Floats, faces: Ragged) -> float:
+    """Mean edge length of the cells, each weighted with its area (the mean over the surface)."""
+    corner = faces.values
+    tail, head = vertices[corner], vertices[corner[faces.next()]]
+    length = np.add.reduceat(np.linalg.norm(head - tail, axis=1), faces.offsets[:-1]) / faces.lengths
+    beside = vertices[corner[faces.offsets[:-1]]][faces.row]  # far off, areas about the origin lose digits
+    vector = np.add.reduceat(np.cross(tail - beside, head - beside), faces.offsets[:-1])
+    area = np.linalg.norm(vector, axis=1)
+    return float(length @ area / area.sum())
+
+
+def _too_coarse(cmap: ConformalMap, settings: PatternSettings, placement: Placement) -> PatternError:
+    around, step, asked = placement.around, placement.step, ""
+    if settings.around not in (None, around):
+        only = f" (only multiples of {step} close up at this rotation)" if step > 1 else ""
+        asked = f", the nearest to the {settings.around} asked for{only}"
+    return PatternError(
+        f"With {around} cell{'s' if around > 1 else ''} around{asked}, the cells do not close up to a ring "
+        "around the surface, since they are too large for its narrowest place: ask for more cells around, or "
+        f"a shorter edge{_that_fits(cmap, settings, placement)}."
+    )
+
+
+def _that_fits(cmap: ConformalMap, settings: PatternSettings, placement: Placement) -> str:
+    """A size that would do, where it is not that of the placement."""
+    lattice = LATTICES[settings.kind]
+    enough, edge = fitting_number(cmap, lattice, edge_angle(lattice, settings))
+    enough = placement.step * -(-enough // placement.step)
+    return (
+        "" if enough <= placement.around else f": {enough} cells around, or an edge length of {edge:.3g}, fit"
+    )
+
+
+def _at_first_loop(
+    cmap: ConformalMap, cover: Cover, faces: Ragged, neighbours: Ragged, sheet: Ints
+) -> Bools | None:
+    """(c,) cells with an edge on the loop of the pattern that faces the surface's loop 0.
+
+    None unless the pattern is an annulus: two boundary loops, one each way around.
+    """
+    following = faces.next()
+    edge = np.flatnonzero(neighbours.values < 0)
+    tail, head = faces.values[edge], faces.values[following[edge]]
+    n = int(faces.values.max()) + 1
+    _, part = connected_components(
+        coo_array((np.ones(len(edge)), (tail, head)), shape=(n, n)), directed=False
+    )
+    loops, which = np.unique(part[tail], return_inverse=True)
+    gained = np.bincount(which, weights=sheet[following[edge]] - sheet[edge])
+    euler = n - (len(faces.values) + len(edge)) // 2 + faces.n_rows
+    if len(loops) != 2 or sorted(np.rint(gained)) != [-1, 1] or euler != 0:
+        return None
+    side = int(np.argmax(gained * winding(cmap, cover)))
+    first = np.zeros(faces.n_rows, dtype=bool)
+    first[faces.row[edge[which == side]]] = True
+    return first

@@ -1,0 +1,1 @@
+"""Where the lattice lies on the unrolled domain (paper, definition 2)."""

@@ -1,0 +1,303 @@
+"""Placement where the boundary has corners: every straight side on a lattice line (Figures 5–7)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from hexwrap_solver.arrays import Complexes, Floats, Ints
+from hexwrap_solver.conformal.types import ConformalMap
+from hexwrap_solver.pattern.lattice import Lattice, Motion
+from hexwrap_solver.pattern.place.deform import System, deform, distortion_of
+from hexwrap_solver.pattern.place.placement import Placement, edge_angle
+from hexwrap_solver.pattern.place.rows import Rows, rows_along
+from hexwrap_solver.pattern.place.sides import Lines, Sides, lines_of, sides_of
+from hexwrap_solver.pattern.place.size import edges_around, size_spread, wanted_edge, width_per_cell
+from hexwrap_solver.pattern.place.strain import Strain
+from hexwrap_solver.pattern.types import PatternSettings
+
+#: Scales tried, from the smallest to the largest admissible.
+SCALES = 241
+
+#: Costs, beside the distortion: of a size off the wanted one by its whole spread; of all corners standing on
+#: cells instead of nodes.
+COST_OF_SIZE, COST_OF_CORNERS = 0.002, 0.004
+
+#: Corners standing on cells that one which the lattice does not mirror there outweighs: at an entrance the
+#: tip goes before the two corners beside it.
+COST_OF_LOPSIDED = 3.0
+
+#: So many placements with the least mean strain are compared by their sharp one, and so many of these, in
+#: order, are deformed, until one of them distorts by less than ENOUGH.
+COMPARED, DEFORMED, ENOUGH = 12, 3, 0.03
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """W = scale·(z − apex) + origin before the deformation, what g becomes, and the line of each side.
+
+    moved: by how much the sides (and g) are moved, and the scale, as ``Strain`` wants it. extra: costs beside
+    its own.
+    """
+
+    scale: complex
+    origin: complex
+    motion: Motion
+    depth: Floats
+    moved: Floats
+    extra: float
+
+    def cost(self, strain: float) -> float:
+        return 2 * strain / abs(self.scale) + self.extra
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """The sides turned to the lattice's directions. normal: (s,) inward; depth: (s,) of the sides at scale 1,
+    from the apex or the layout's origin; unit: the turn common to all; around: cells that are asked for."""
+
+    cmap: ConformalMap
+    lattice: Lattice
+    turns: int
+    around: int | None
+    sides: Sides
+    rows: Rows
+    normal: Complexes
+    depth: Floats
+    unit: complex
+
+    @property
+    def turned(self) -> Floats:
+        """(k,) mean depth of their side less the depth of the sides' vertices, at scale 1."""
+        place = (self.sides.place - (self.cmap.deck.apex or 0)) * self.unit
+        side = self.sides.side
+        return np.asarray(self.depth[side] - (self.normal[side].conj() * place).real)
+
+    @cached_property
+    def following(self) -> tuple[Ints, Ints]:
+        """(s,) the side after each, and the sheet on which the frame of the loop shows it: the first one
+        comes again a turn further."""
+        side, sheet = np.arange(1, self.sides.n + 1), np.zeros(self.sides.n, dtype=np.int64)
+        for loop in np.unique(self.sides.loop):
+            members = np.flatnonzero(self.sides.loop == loop)
+            side[members[-1]] = members[0]
+            sheet[members[-1]] = self.sides.sheet[self.sides.side == members[-1]][-1]
+        return side, sheet
+
+
+@dataclass(frozen=True)
+class Straightening:
+    """All that moving the sides of a domain onto lattice lines takes, whatever the size of the cells."""
+
+    frame: _Frame
+    lines: Lines
+    system: System
+    strain: Strain
+
+    @classmethod
+    def of(
+        cls, cmap: ConformalMap, lattice: Lattice, settings: PatternSettings, turns: int, loops: list[int]
+    ) -> Straightening:
+        """settings: their sizes do not matter. loops: the ones to straighten, polygons."""
+        frame = _frame(cmap, lattice, settings, turns, loops)
+        rotation = Motion(lattice, turns, (0, 0))
+        lines = lines_of(len(cmap.uv), frame.sides, frame.normal, rotation)
+        system = System(cmap, rotation, lines.normal)
+        return cls(frame, lines, system, Strain.of(system, frame.sides, lines, frame.turned))
+
+
+def place_by_sides(straightening: Straightening, settings: PatternSettings) -> Placement:
+    """Scale, centre and lines whose deformation distorts least, then that deformation."""
+    frame, lines = replace(straightening.frame, around=settings.around), straightening.lines
+    system, strain = straightening.system, straightening.strain
+    cmap, lattice = frame.cmap, frame.lattice
+    angle = edge_angle(lattice, settings)
+    if cmap.deck.apex is None:
+        edges_around(cmap, lattice, settings, angle)
+    size = lattice.edge / wanted_edge(cmap, lattice, settings, angle)
+    spread = size_spread(settings)
+    trials = [
+        trial
+        for x in np.linspace(-1, 1, SCALES)
+        for trial in _trials_at(frame, strain, size * (1 + spread * x) * frame.unit, COST_OF_SIZE * x**2)
+    ]
+    tried = []
+    for trial in _best_of(trials, strain)[:DEFORMED]:
+        rest = trial.scale * (cmap.uv - (cmap.deck.apex or 0)) + trial.origin
+        place = deform(system, trial.motion, trial.scale, rest, lines.depths(trial.depth, trial.motion))
+        tried.append((distortion_of(cmap, trial.motion, place), trial, place))
+        if tried[-1][0] < ENOUGH:
+            break
+    distortion, best, place = min(tried, key=lambda found: found[0] + found[1].extra)
+    width = width_per_cell(lattice, angle) * lattice.edge
+    around = round(cmap.circumference * abs(best.scale) / width)
+    if frame.turns == 0:
+        around = int(lattice.cells_around(np.array(best.motion.shift)))
+    notes = (
+        ("phase has no effect: lattice lines on all sides leave no freedom.",) if any(settings.phase) else ()
+    )
+    return Placement(place, best.motion, angle, around, distortion, notes)
+
+
+def _frame(
+    cmap: ConformalMap, lattice: Lattice, settings: PatternSettings, turns: int, loops: list[int]
+) -> _Frame:
+    angle = edge_angle(lattice, settings)
+    sides = sides_of(cmap, lattice, loops)
+    zero = complex(lattice.position(lattice.steps[0])) / lattice.edge * np.exp(-1j * angle)
+    turn = _turns(cmap, lattice, sides, zero)
+    # Directions are exact up to rounding of the boundary angles; from here on they are exact.
+    steps = np.rint(np.angle(sides.direction * turn / zero) / lattice.quantum)
+    normal = 1j * zero * np.exp(1j * lattice.quantum * steps)
+    return _Frame(
+        cmap,
+        lattice,
+        turns,
+        settings.around,
+        sides,
+        rows_along(lattice, angle, settings.boundary),
+        normal,
+        _mean_depth(cmap, sides, normal, turn),
+        complex(turn.mean() / abs(turn.mean())),
+    )
+
+
+def _trials_at(frame: _Frame, strain: Strain, scale: complex, cost_of_size: float) -> list[_Trial]:
+    """For every centre the best lines at one scale."""
+    lattice, sides, rows, normal = frame.lattice, frame.sides, frame.rows, frame.normal
+    trials = []
+    for motion, origin in _origins(frame, scale):
+        depth = frame.depth * abs(scale) + (normal.conj() * origin).real
+        moved = rows.first + rows.period * np.rint((depth - rows.first) / rows.period) - depth
+        if frame.cmap.deck.apex is None:
+            apart = complex(lattice.position(np.array(motion.shift))) - scale * frame.cmap.deck.translation
+            moved = np.append(moved, [apart.real, apart.imag])
+        moved = np.append(moved, abs(scale))
+        moved = strain.nearest(moved, rows.period, sides.n)
+        line = depth + moved[: sides.n]
+        extra = cost_of_size + COST_OF_CORNERS * _misplaced_corners(frame, motion, line)
+        trials.append(_Trial(scale, origin, motion, line, moved, extra))
+    return trials
+
+
+def _best_of(trials: list[_Trial], strain: Strain) -> list[_Trial]:
+    """Those with the least costs, the least first, each choice of lines once."""
+    different: dict[tuple[object, ...], _Trial] = {}
+    for trial in sorted(trials, key=lambda trial: trial.cost(strain.mean(trial.moved))):
+        lines = (*trial.motion.shift, *np.rint(1e6 * trial.depth).tolist())
+        if different.setdefault(lines, trial) is trial and len(different) == COMPARED:
+            break
+    return sorted(different.values(), key=lambda trial: trial.cost(strain.sharp(trial.moved)))
+
+
+def _turns(cmap: ConformalMap, lattice: Lattice, sides: Sides, zero: complex) -> Complexes:
+    """(s,) rotations after which the sides have lattice directions, one for each loop on a cone.
+
+    The sides of one loop differ by multiples of the quantum. Those of the other may be turned against them
+    about the apex by any angle, which the deformation then has to make up for; the least one is taken. For
+    a translation, no loop can turn by itself: one rotation for all.
+    """
+    loops = sides.loop if cmap.deck.apex is not None else np.zeros(sides.n, dtype=np.int64)
+    turn = np.ones(sides.n, dtype=complex)
+    before: complex | None = None
+    for loop in np.unique(loops):
+        on = loops == loop
+        mean = complex((sides.length[on] * sides.direction[on] ** lattice.order).sum())
+        unit = zero / complex(np.exp(1j * np.angle(mean) / lattice.order))
+        if before is not None:
+            steps = round(float(np.angle(before / unit)) / lattice.quantum)
+            unit *= complex(np.exp(1j * lattice.quantum * steps))
+        before = unit
+        turn[on] = unit
+    return turn
+
+
+def turn_between_loops(cmap: ConformalMap, lattice: Lattice, loops: list[int]) -> float:
+    """Angle about the apex between the sides of the two loops, modulo the quantum, 0 for one loop; rad."""
+    turn = _turns(cmap, lattice, sides_of(cmap, lattice, loops), 1.0)
+    return float(np.angle(turn[-1] / turn[0]))
+
+
+def _mean_depth(cmap: ConformalMap, sides: Sides, normal: Complexes, turn: Complexes) -> Floats:
+    """(s,) depth of each side's line at scale 1, measured from the apex, or from the layout's origin."""
+    place = (sides.place - (cmap.deck.apex or 0)) * turn[sides.side]
+    value = (normal[sides.side].conj() * place).real
+    return np.asarray(np.bincount(sides.side, weights=value) / np.bincount(sides.side))
+
+
+def _origins(frame: _Frame, scale: complex) -> list[tuple[Motion, complex]]:
+    """Every way in which g can be a motion of the lattice, and where the apex, or the layout's origin, stands
+    then: on a cone at the kinds of symmetry centres; for a translation as two sides may lie on lines."""
+    lattice, rows, normal = frame.lattice, frame.rows, frame.normal
+    if frame.cmap.deck.apex is not None:
+        return symmetry_centres(lattice, frame.turns)
+    shift = _translation(frame, scale * frame.cmap.deck.translation)
+    motion = Motion(lattice, frame.turns, (int(shift[0]), int(shift[1])))
+    depth = frame.depth * abs(scale)
+    across = np.flatnonzero(abs((normal.conj() * normal[0]).imag) > 1e-6)
+    if not len(across):
+        return [(motion, complex(normal[0] * (rows.first - depth[0])))]
+    p, q = normal[0], normal[across[0]]
+    d = rows.first - depth[0]
+    lines = rows.first + rows.period * np.arange(lattice.colours) - depth[across[0]]
+    return [(motion, complex(1j * (e * p - d * q) / (np.conj(p) * q).imag)) for e in lines]
+
+
+def _translation(frame: _Frame, wanted: complex) -> Ints:
+    """The translation of the lattice that g becomes, near the wanted one.
+
+    A loop that is one closed line runs along it exactly. On a cylinder it has the number of cells asked for.
+    """
+    lattice = frame.lattice
+    if (np.bincount(frame.sides.loop) == 1).any():
+        row = lattice.shortest_towards(wanted)
+        return np.asarray(max(1, round(abs(wanted) / abs(complex(lattice.position(row))))) * row)
+    if frame.turns == 0 and frame.around is not None:
+        return lattice.ring_near(frame.around, wanted)
+    return lattice.translation_near(wanted)
+
+
+def symmetry_centres(lattice: Lattice, turns: int) -> list[tuple[Motion, complex]]:
+    """Motions p ↦ ζ^turns·p + τ that differ by more than a translation of the lattice, with their fixed
+    points: centres of 6-, 4-, 3- or 2-fold symmetry, the highest first."""
+    zeta = np.exp(1j * lattice.quantum * turns)
+    e1 = complex(lattice.position(lattice.basis[0]))
+    found: list[tuple[Motion, complex]] = []
+    reach = range(-2, 3)
+    shifts = sorted(((x, y) for x in reach for y in reach), key=lambda v: abs(v[0] + v[1] * lattice.unit))
+    for x, y in shifts:
+        shift = x * lattice.basis[0] + y * lattice.basis[1]
+        centre = complex(lattice.position(shift)) / (1 - zeta)
+        apart = [lattice.coordinates(np.array((centre - other) / e1)) for _, other in found]
+        if all(abs(a - np.rint(a)).max() > 1e-9 for a in apart):
+            found.append((Motion(lattice, turns, (int(shift[0]), int(shift[1]))), centre))
+    return found
+
+
+def _misplaced_corners(frame: _Frame, motion: Motion, line: Floats) -> float:
+    """Part of the corners between successive sides that stand badly.
+
+    Corners stand well on nodes. Where three edges meet there, though, the lattice is mirrored at the
+    bisector of 2π/3 and 4π/3, but not of π/3 and 5π/3: those stand well on the centres of cells.
+    """
+    lattice = frame.lattice
+    following, sheet = frame.following
+    shift = lattice.position(motion.apply(np.zeros((len(sheet), 2), dtype=np.int64), sheet))
+    p, d = frame.normal, line
+    q = p[following] * np.exp(1j * lattice.quantum * motion.rotation(sheet))
+    e = line[following] + (q.conj() * shift).real
+    area = (p.conj() * q).imag
+    inner = abs(area) > 1e-6
+    p, q, d, e, area = p[inner], q[inner], d[inner], e[inner], area[inner]
+    if not len(area):
+        return 0.0
+    corner = 1j * (e * p - d * q) / area
+    point = np.rint(lattice.coordinates(corner)).astype(np.int64)
+    on_lattice = abs(lattice.position(point) - corner) < 1e-6
+    on_node = on_lattice & lattice.is_node(point)
+    odd = np.rint(np.angle(q / p) / lattice.quantum) % 2 == 1
+    lopsided = odd & on_node if lattice.kind == "hex" else np.zeros(len(odd), dtype=bool)
+    mirrored = odd & on_lattice & ~on_node if lattice.kind == "hex" else lopsided
+    return float((COST_OF_LOPSIDED * lopsided + ~(on_node | mirrored)).mean())
