@@ -7,6 +7,7 @@
     │   ├── GaussBonnetError    boundary angles that no surface can have, equation (1)
     │   ├── BoundaryError       a boundary vertex or angle that cannot be used
     │   ├── NotAdaptedError     cone angle no multiple of the pattern's quantum, definition 2
+    │   ├── SingularityError    singularities that cannot be where or what they are asked for
     │   ├── PatternError        no pattern of that size, kind or place fits
     │   └── PanelsError         no panels under those conditions
     └── ConvergenceError        a computation did not reach its tolerance (figures in the sentence)
@@ -89,6 +90,12 @@ class NotAdaptedError(RequestError):
     slug = "not-adapted"
     title = "The cone angle does not fit the pattern"
     default_field = ("boundary",)
+
+
+class SingularityError(RequestError):
+    slug = "singularities"
+    title = "The singularities cannot be used"
+    default_field = ("singularities",)
 
 
 class PatternError(RequestError):

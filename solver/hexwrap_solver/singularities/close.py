@@ -1,9 +1,9 @@
 """Singularities moved until the pattern closes up around every one of them and around every loop.
 
-Cut open along a tree, the surface is laid out in the plane; across each branch of the cut stands a motion. All
-of these must be symmetries of one lattice. Deforming the layout until they are would strain it at the
-singularities; instead these move on the surface, by less than a cell each, and u varies a little along free loops
-(a dipole each), so that the map stays conformal.
+Cut open along a tree, the surface is laid out in the plane; across each branch of the cut stands a motion.
+All of these must be symmetries of one lattice. Deforming the layout until they are would strain it at the
+singularities; instead these move on the surface, by less than a cell each, and u varies a little along free
+loops (a dipole each), so that the map stays conformal.
 """
 
 from __future__ import annotations
@@ -19,22 +19,23 @@ from hexwrap_solver.conformal.newton import minimise
 from hexwrap_solver.errors import ConvergenceError
 from hexwrap_solver.linalg.factor import Factorisation
 from hexwrap_solver.singularities.cut import Branches, branches
-from hexwrap_solver.singularities.drag import Grip, dragged, grips, refined
+from hexwrap_solver.singularities.drag import Grip, dragged, grips
 from hexwrap_solver.singularities.integers import nearest_integers
 from hexwrap_solver.singularities.linear import targets, vertex_areas
 from hexwrap_solver.singularities.types import End
 from hexwrap_solver.surface.topology import next_half_edge
 from hexwrap_solver.surface.types import Surface
 
-#: Units of the unknowns beside moves by a cell: a dipole's amplitude, a uniform stretch, a turn of the lattice, a
-#: change of its scale.
+#: Units of the unknowns beside moves by a cell: a dipole's amplitude, a uniform stretch, a turn of the
+#: lattice, a change of its scale.
 DIPOLE, STRETCH, TURN, SCALE = 0.15, 0.002, 0.1, 0.02
-#: Largest move in one step, cells; steps of Newton's method; residuals at which it ends, and which are accepted.
+#: Largest move in one step, cells; steps of Newton's method; residuals at which it ends, and which are
+#: accepted.
 STRIDE, STEPS, DONE, ACCEPTED = 0.6, 40, 1e-11, 1e-9
 #: Differences for the Jacobian, in units, and the residual of the angle sums that will do for it.
 DIFFERENCE, ROUGH = 0.02, 1e-6
-#: Chord steps of the inner Newton's method, each of which must leave at most this part of the residual until it is
-#: down to rounding, radians.
+#: Chord steps of the inner Newton's method, each of which must leave at most this part of the residual
+#: until it is down to rounding, radians.
 CHORDS, CHORD_GAIN, SMALL = 60, 0.3, 1e-12
 #: Rotations and scales of the lattice that are tried where nothing is aligned.
 TURNS, SCALES = 48, 9
@@ -42,8 +43,8 @@ TURNS, SCALES = 48, 9
 
 @dataclass(frozen=True)
 class Line:
-    """Straight loops that are to be lattice lines: the shortest translation along one, and at which depths ≡ first
-    (mod period), inwards from a cell's centre, they may lie; in widths of a cell."""
+    """Straight loops that are to be lattice lines: the shortest translation along one, and at which depths
+    ≡ first (mod period), inwards from a cell's centre, they may lie; in widths of a cell."""
 
     step: complex
     first: float
@@ -52,9 +53,9 @@ class Line:
 
 @dataclass(frozen=True)
 class Seen:
-    """The map at some moves. place: (3, m) the layout. image: (e,) M(c) − c of every leaf's motion M, c being the
-    root's place; turn: (e,) quanta by which M turns. foot: per straight loop a point of it less c, and heading its
-    direction. residual: of the angle sums, radians."""
+    """The map at some moves. place: (3, m) the layout. image: (e,) M(c) − c of every leaf's motion M, c
+    being the root's place; turn: (e,) quanta by which M turns. foot: per straight loop a point of it less
+    c, and heading its direction. residual: of the angle sums, radians."""
 
     surface: Surface
     u: Floats
@@ -98,8 +99,8 @@ class Chart:
             found = minimise(self.energy)
         if not found.converged or found.broken:
             raise ConvergenceError(
-                "With these singularities there is no map on the triangles of the surface as they are: send a finer "
-                "or more regular mesh, or ask for fewer singularities."
+                "With these singularities there is no map on the triangles of the surface as they are: send "
+                "a finer or more regular mesh, or ask for fewer singularities."
             )
         self.factor.factorise(*self.energy.hessian(found.corners))
         self._x = self.energy.unknowns_of(found.u)
@@ -110,8 +111,8 @@ class Chart:
         return 2 * len(self.cones) + 2 * len(self.waves) + (self.slope is not None)
 
     def at(self, x: Floats, enough: float = 0.0) -> Seen:
-        """x: (unknowns,) moves of each singularity in cells, dipoles and stretch in their units. enough: residual of
-        the angle sums that will do, 0: rounding."""
+        """x: (unknowns,) moves of each singularity in cells, dipoles and stretch in their units. enough:
+        residual of the angle sums that will do, 0: rounding."""
         s, d = 2 * len(self.cones), 2 * len(self.waves)
         surface = dragged(self.surface, self.hold, x[:s].reshape(-1, 2) * self.cell)
         factor = np.zeros(len(surface.vertices))
@@ -198,9 +199,9 @@ def _rim(surface: Surface, loop: Ints) -> Ints:
 
 @dataclass(frozen=True)
 class Closed:
-    """seen: the map. factor, shift: z ↦ factor · z + shift carries its layout to the lattice whose translations
-    are ℤ[ζ]. motion: (e, 2) translation of each leaf's motion there. moves: (s,) cells; dipole: the largest
-    amplitude; stretch: ε. residual: cells."""
+    """seen: the map. factor, shift: z ↦ factor · z + shift carries its layout to the lattice whose
+    translations are ℤ[ζ]. motion: (e, 2) translation of each leaf's motion there. moves: (s,) cells;
+    dipole: the largest amplitude; stretch: ε. residual: cells."""
 
     seen: Seen
     factor: complex
@@ -221,7 +222,9 @@ def near_lattice(z: Complexes, order: int) -> Ints:
     low = np.stack([np.floor(a), np.floor(b)], axis=-1)
     every = low[..., None, :] + np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
     off = np.abs(every[..., 0] + every[..., 1] * zeta - z[..., None])
-    return np.asarray(np.take_along_axis(every, off.argmin(-1)[..., None, None], -2)[..., 0, :], dtype=np.int64)
+    return np.asarray(
+        np.take_along_axis(every, off.argmin(-1)[..., None, None], -2)[..., 0, :], dtype=np.int64
+    )
 
 
 def as_complex(points: Ints, order: int) -> Complexes:
@@ -239,14 +242,14 @@ class Goal:
 
 
 class Closing:
-    """Newton's method for a chart: factor · image must be translations of the lattice, and straight loops lie on
-    its lines."""
+    """Newton's method for a chart: factor · image must be translations of the lattice, and straight loops
+    lie on its lines."""
 
     def __init__(
         self, chart: Chart, width: float, line: Line | None = None, free_scale: float = 0.05
     ) -> None:
-        """width: of a cell in the domain; it may change by the share ``free_scale``. line: None leaves straight
-        loops where they come."""
+        """width: of a cell in the domain; it may change by the share ``free_scale``. line: None leaves
+        straight loops where they come."""
         self.chart, self.width, self.free_scale = chart, width, free_scale
         self.line = line if chart.straight else None
         self.order = round(2 * np.pi / chart.quantum)
@@ -309,7 +312,7 @@ class Closing:
         image = self.base.image[self.kept]
         inverse = np.linalg.pinv(self._slopes(changed, 1.0), rcond=1e-9)
         wanted = factors[:, None] * image
-        zeta = self.zeta**np.arange(2)
+        zeta = self.zeta ** np.arange(2)
         nearest = near_lattice(wanted / self.divisor, self.order) @ zeta * self.divisor
         off = (nearest - wanted) / factors[:, None]
         moves = inverse @ np.concatenate([off.real, off.imag], axis=1).T
@@ -341,7 +344,9 @@ class Closing:
         inverse = np.linalg.pinv(slopes, rcond=1e-9)
         weighted = inverse @ steps
         centre = np.linalg.lstsq(weighted, inverse @ (here - rest), rcond=None)[0]
-        z, _ = nearest_integers(weighted.T @ weighted, centre)
+        z, _ = nearest_integers(
+            np.asarray(weighted.T @ weighted, dtype=float), np.asarray(centre, dtype=float)
+        )
         wanted = steps @ z + rest
         moves = inverse @ (wanted - here)
         cost = float(moves @ moves + self._cost_of_scale(factor))
@@ -380,8 +385,8 @@ class Closing:
         factor, x, seen = goal.factor, np.zeros(chart.unknowns), self.base
         slopes = self._slopes(changed, factor)
         off = wanted - self._values(seen, factor)
-        best, step, s = float(np.abs(off).max()), 0, 2 * len(chart.cones)
-        for step in range(STEPS):
+        best, steps, s = float(np.abs(off).max()), 0, 2 * len(chart.cones)
+        for _ in range(STEPS):
             if best <= DONE:
                 break
             d = np.linalg.lstsq(slopes, off, rcond=1e-9)[0]
@@ -395,17 +400,18 @@ class Closing:
             progress(0.5, f"singularities close to {residual:.1e} cells")
             if residual > 0.5 * best and best <= ACCEPTED:
                 break
+            steps += 1
             x, factor, seen, off, best = new_x, new_factor, new_seen, new_off, residual
         every = factor * seen.image
         motion = near_lattice(every, self.order)
         residual = max(best, float(np.abs(every - as_complex(motion, self.order)).max()))
         if residual > ACCEPTED:
             raise ConvergenceError(
-                f"The singularities could not be moved so that the pattern closes: {residual:.1e} cells are left. "
-                "Another size of the cells or another number of singularities may do."
+                f"The singularities could not be moved so that the pattern closes: {residual:.1e} cells are "
+                "left. Another size of the cells or another number of singularities may do."
             )
-        d = 2 * len(chart.waves)
-        dipole = float(np.hypot(x[s : s + d : 2], x[s + 1 : s + d : 2]).max(initial=0.0)) * DIPOLE
+        w = s + 2 * len(chart.waves)
+        dipole = float(np.hypot(x[s:w:2], x[s + 1 : w : 2]).max(initial=0.0)) * DIPOLE
         stretch = STRETCH * float(x[-1]) if chart.slope is not None else 0.0
         moves = np.hypot(x[0:s:2], x[1:s:2])
-        return Closed(seen, factor, -factor * seen.center, motion, moves, dipole, stretch, residual, step)
+        return Closed(seen, factor, -factor * seen.center, motion, moves, dipole, stretch, residual, steps)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csr_array
+from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from hexwrap_solver.arrays import Floats, Ints
+from hexwrap_solver.arrays import Ints
 from hexwrap_solver.surface.topology import half_edges
 from hexwrap_solver.surface.types import Surface
 
@@ -17,8 +18,9 @@ from hexwrap_solver.surface.types import Surface
 class Branches:
     """A tree of edges that joins vertex ``root`` to the leaves: singularities, then loops.
 
-    twin: (3m,) half-edges across, −1 at the boundary and at the cut. ways: per leaf, the half-edges from it towards
-    the root, as far as it has them for itself. edges: (k,) every half-edge on the cut, one of each edge.
+    twin: (3m,) half-edges across, −1 at the boundary and at the cut. ways: per leaf, the half-edges from it
+    towards the root, as far as it has them for itself. edges: (k,) every half-edge on the cut, one of each
+    edge.
     """
 
     root: int
@@ -28,7 +30,8 @@ class Branches:
 
 
 def branches(surface: Surface, root: int, leaves: Ints, loops: tuple[Ints, ...]) -> Branches:
-    """Shortest paths that pass through no leaf and along no loop. Raises ValueError where one cannot be reached."""
+    """Shortest paths that pass through no leaf and along no loop. Raises ValueError where one cannot be
+    reached."""
     n = len(surface.vertices)
     ends = np.zeros(n, dtype=bool)
     ends[leaves] = True
@@ -38,8 +41,9 @@ def branches(surface: Surface, root: int, leaves: Ints, loops: tuple[Ints, ...])
     inner = surface.twin >= 0
     inner &= ~(ends[tail])  # paths end where they come to one
     length = surface.lengths.ravel()
-    graph = csr_array((length[inner], (tail[inner], head[inner])), shape=(n, n))
-    distance, before = dijkstra(graph, indices=root, return_predecessors=True)
+    graph = csr_matrix((length[inner], (tail[inner], head[inner])), shape=(n, n))
+    distances, predecessors = dijkstra(graph, indices=np.array([root]), return_predecessors=True)
+    distance, before = distances[0], predecessors[0]
     starts = [int(v) for v in leaves] + [int(loop[np.argmin(distance[loop])]) for loop in loops]
     half_edge = _numbers(surface)
     taken: dict[int, int] = {}
@@ -63,7 +67,7 @@ def branches(surface: Surface, root: int, leaves: Ints, loops: tuple[Ints, ...])
     return Branches(root, twin, ways, edges)
 
 
-def _numbers(surface: Surface):  # type: ignore[no-untyped-def]
+def _numbers(surface: Surface) -> Callable[[int, int], int]:
     """The half-edge from one vertex to another."""
     tail, head = half_edges(surface.faces)
     n = len(surface.vertices)

@@ -29,10 +29,9 @@ def refined(surface: Surface, places: Floats, cell: float) -> Surface:
     for reach, longest in zip(FINE, FINEST, strict=True):
         for _ in range(4):
             middle = surface.vertices[surface.faces].mean(axis=1)
-            near = cKDTree(places).query(middle)[0] <= reach * cell
-            marked = np.flatnonzero(
-                ((surface.lengths > longest * cell) & near[:, None]).ravel() & (surface.twin >= 0)
-            )
+            near = np.asarray(cKDTree(places).query(middle)[0]) <= reach * cell
+            long = np.greater(surface.lengths, longest * cell)
+            marked = np.flatnonzero((long & near[:, None]).ravel() & (surface.twin >= 0))
             if not len(marked):
                 break
             surface = split(surface, marked)
@@ -55,8 +54,8 @@ def split(surface: Surface, marked: Ints) -> Surface:
 @dataclass(frozen=True)
 class Grip:
     """The vertices that follow one singularity. share: (k,) how far, from 1 to 0. axes: (2, 3) tangents.
-    steps: (k, 2, 2) change of the NURBS parameters per unit along each axis; None where there are none, or where
-    they are singular."""
+    steps: (k, 2, 2) change of the NURBS parameters per unit along each axis; None where there are none, or
+    where they are singular."""
 
     vertex: Ints
     share: Floats
@@ -72,7 +71,9 @@ def grips(surface: Surface, cones: Ints, cell: float) -> list[Grip]:
     for i, cone in enumerate(cones):
         reach = REACH * cell
         if len(loops):
-            reach = min(reach, TO_LOOP * float(np.linalg.norm(surface.vertices[loops] - places[i], axis=1).min()))
+            reach = min(
+                reach, TO_LOOP * float(np.linalg.norm(surface.vertices[loops] - places[i], axis=1).min())
+            )
         if len(cones) > 1:
             others = np.delete(places, i, axis=0)
             reach = min(reach, TO_NEXT * float(np.linalg.norm(others - places[i], axis=1).min()))
@@ -133,7 +134,9 @@ def dragged(surface: Surface, hold: list[Grip], moves: Floats) -> Surface:
             jet = evaluate(surface.nurbs, parameters[index])
             vertices[index], exact = jet.point, jet.normal
         else:
-            vertices[index], parameters[index], exact = project(surface.nurbs, vertices[index], parameters[index])
+            vertices[index], parameters[index], exact = project(
+                surface.nurbs, vertices[index], parameters[index]
+            )
         normals[index] = with_tangents(exact, normals[index])
     else:
         seen = surface.tree.nearest(vertices[index])

@@ -1,5 +1,5 @@
-"""The integer vector nearest to a real one in a quadratic norm: reduced by Lenstra, Lenstra, Lovász (1982), then
-enumerated by Schnorr and Euchner (1994)."""
+"""The integer vector nearest to a real one in a quadratic norm: reduced by Lenstra, Lenstra, Lovász (1982),
+then enumerated by Schnorr and Euchner (1994)."""
 
 from __future__ import annotations
 
@@ -18,8 +18,9 @@ def nearest_integers(gram: Floats, centre: Floats) -> tuple[Ints, float]:
     n = len(centre)
     if not n:
         return np.zeros(0, dtype=np.int64), 0.0
-    change = _reduced(np.linalg.cholesky(gram).T)
-    upper = np.linalg.qr(np.linalg.cholesky(gram).T @ change, mode="r")
+    root = np.asarray(np.linalg.cholesky(gram).T, dtype=np.float64)
+    change = _reduced(root)
+    upper = _triangular(root @ change)
     middle = np.linalg.solve(change.astype(float), centre)
     found, value = _enumerate(upper, middle)
     return change @ found, value
@@ -33,7 +34,7 @@ def _reduced(basis: Floats) -> Ints:
     for _ in range(200 * n):
         if k >= n:
             break
-        upper = np.linalg.qr(basis @ change, mode="r")
+        upper = _triangular(basis @ change)
         for j in range(k - 1, -1, -1):
             q = int(np.rint(upper[j, k] / upper[j, j]))
             if q:
@@ -45,6 +46,11 @@ def _reduced(basis: Floats) -> Ints:
             change[:, [k - 1, k]] = change[:, [k, k - 1]]
             k = max(k - 1, 1)
     return change
+
+
+def _triangular(matrix: Floats) -> Floats:
+    """R of its QR decomposition."""
+    return np.asarray(np.linalg.qr(matrix)[1], dtype=np.float64)
 
 
 def _enumerate(upper: Floats, middle: Floats) -> tuple[Ints, float]:

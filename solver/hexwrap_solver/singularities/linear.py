@@ -1,8 +1,8 @@
 """Log scale factors as a linear function of singularities and loop curvatures (Soliman, Slepčev, Crane 2018;
 Springborn, Schröder, Pinkall 2008, section 5).
 
-On a surface with a flat metric, Δu = −curvature is linear. The discrete map is so up to a few per cent, so its
-Hessian at the solution without singularities tells what any of them would do.
+On a surface with a flat metric, Δu = −curvature is linear. The discrete map is so up to a few per cent, so
+its Hessian at the solution without singularities tells what any of them would do.
 """
 
 from __future__ import annotations
@@ -31,16 +31,16 @@ BLOCK = 128
 class Model:
     """Mean u of every patch: reference + response @ k + loop_response @ dK.
 
-    seat: (q,) mesh vertices on which a singularity may stand. place: (q, 3). patch: (q,) the patch around each.
-    weight: (p,) the patches' shares of the area. reference: (p,). response: (p, q), per k = 1. loop_response:
-    (p, f), per quantum more on each free loop but the first, which takes what is left. free: indices of the
-    free loops. loops: per loop, its curvature in quanta at the reference. total: Σ k wanted where no loop can
-    take a rest, None elsewhere.
+    seat: (q,) mesh vertices on which a singularity may stand. place: (q, 3). weight: (p,) the patches'
+    shares of the area. reference: (p,). response: (p, q), per k = 1. loop_response: (p, f), per quantum
+    more on each free loop but the first, which takes what is left. free: indices of the free loops. loops:
+    per loop, its curvature in quanta at the reference. total: Σ k wanted where no loop can take a rest,
+    None elsewhere. turn: (q,) for two straight loops on a tube: where seats stand around it, in turns; Σ
+    k·turn quanta is how far the second loop is turned against the first.
     """
 
     seat: Ints
     place: Floats
-    patch: Ints
     weight: Floats
     reference: Floats
     response: Floats
@@ -48,6 +48,7 @@ class Model:
     free: tuple[int, ...]
     loops: tuple[int, ...]
     total: int | None
+    turn: Floats | None = None
 
 
 def vertex_areas(surface: Surface) -> Floats:
@@ -66,11 +67,11 @@ def targets(
     index: Ints,
     background: float = 0.0,
 ) -> Targets:
-    """Cone angles at vertices, curvatures in quanta on loops; background: further curvature, spread evenly over
-    the area."""
+    """Cone angles at vertices, curvatures in quanta on loops; background: further curvature, spread evenly
+    over the area."""
     n = len(surface.vertices)
     angle, tie = np.full(n, 2 * np.pi), np.full(n, -1, dtype=np.int64)
-    tie_angle = []
+    tie_angle: list[float] = []
     if background:
         share = vertex_areas(surface)
         angle -= background * share / share.sum()
@@ -96,8 +97,11 @@ def reference_loops(surface: Surface, ends: tuple[str, ...], turns: int) -> tupl
     return tuple(0 if i in longest or straight[i] else -turns for i in range(len(ends)))
 
 
-def linear_model(surface: Surface, rules: Rules) -> Model:
-    """One nonlinear solution without singularities, one factorisation, and a solve for every seat."""
+def linear_model(
+    surface: Surface, rules: Rules, turn: Floats | None = None, seats: Ints | None = None
+) -> Model:
+    """turn: (n,) see Model. seats: vertices that singularities may stand on; None: as the rules allow. One
+    nonlinear solution without singularities, one factorisation, and a solve for every seat."""
     turns = round(2 * np.pi / rules.quantum)
     free = tuple(i for i, end in enumerate(rules.ends) if end == "free")
     loops = reference_loops(surface, rules.ends, turns)
@@ -110,29 +114,33 @@ def linear_model(surface: Surface, rules: Rules) -> Model:
     u, factor = _reference(energy)
     patch, seat = _patches(surface, area)
     weight = np.bincount(patch, area)
-    mean = csr_array((area / weight[patch], (patch, np.arange(len(patch)))), shape=(len(seat), len(patch)))
-    allowed = _allowed(surface, seat, rules)
+    share = csr_array((area / weight[patch], (patch, np.arange(len(patch)))), shape=(len(seat), len(patch)))
+
+    def mean(values: Floats) -> Floats:
+        return np.asarray(share @ values)
+
+    seats = seat[_allowed(surface, seat, rules)] if seats is None else seats
     shift = np.zeros(len(seat))
     if not free:  # a singularity takes its curvature from everywhere
-        shift = mean @ energy.scale_of(factor.solve(energy.reduce(area / area.sum())))
-    response = np.empty((len(seat), int(allowed.sum())))
+        shift = mean(energy.scale_of(factor.solve(energy.reduce(area / area.sum()))))
+    response = np.empty((len(seat), len(seats)))
     for begin in range(0, response.shape[1], BLOCK):
-        vertices = seat[allowed][begin : begin + BLOCK]
-        response[:, begin : begin + BLOCK] = mean @ _scales(energy, factor, energy.dof[vertices])
+        vertices = seats[begin : begin + BLOCK]
+        response[:, begin : begin + BLOCK] = mean(_scales(energy, factor, energy.dof[vertices]))
     response -= shift[:, None]
     ties = np.arange(energy.n_dof - max(len(free) - 1, 0), energy.n_dof)
-    loop_response = mean @ _scales(energy, factor, ties)
+    loop_response = mean(_scales(energy, factor, ties))
     return Model(
-        seat[allowed],
-        surface.vertices[seat[allowed]],
-        np.flatnonzero(allowed),
+        seats,
+        surface.vertices[seats],
         weight / weight.sum(),
-        mean @ u,
+        mean(u),
         rules.quantum * response,
         rules.quantum * loop_response,
         free,
         loops,
         None if free else rest,
+        None if turn is None else turn[seats],
     )
 
 

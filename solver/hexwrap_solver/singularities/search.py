@@ -1,7 +1,7 @@
 """Which singularities make the cells' sizes most equal: a search over the linear model.
 
-The area-weighted variance of u is a quadratic form in the indices of the singularities and the curvatures of the
-loops, so that every move of one of them is judged for all seats at once.
+The area-weighted variance of u is a quadratic form in the indices of the singularities and the curvatures
+of the loops, so that every move of one of them is judged for all seats at once.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.spatial import cKDTree
 
-from hexwrap_solver.arrays import Bools, Floats, Ints
+from hexwrap_solver.arrays import Bools, Floats
 from hexwrap_solver.singularities.linear import Model
 from hexwrap_solver.singularities.sizes import uncovered, uncovered_of_many
 from hexwrap_solver.singularities.types import Proposal, Rules
@@ -25,6 +25,9 @@ TRIED = 4
 NEAR, ROUNDS = 8, 10
 #: Gains below this, relative to the variance without singularities, are rounding.
 GAIN = 1e-6
+#: Cost of a turn by a quantum between straight loops, in the variance without singularities; it rises with
+#: the square, and is nothing at whole quanta.
+DIRECTION = 100.0
 #: Changes of the uncovered area that are none.
 SMALL = 2e-5
 
@@ -60,6 +63,7 @@ class Search:
     square: Floats = field(init=False)
     alone: Floats = field(init=False)
     moves: list[tuple[int, ...]] = field(init=False)
+    direction: float = DIRECTION
     _moves: tuple[Floats, Floats] = field(init=False)
     _quadratic: Floats = field(init=False)
     _near: cKDTree = field(init=False)
@@ -92,8 +96,8 @@ class Search:
         return np.asarray(u + self.model.loop_response @ np.array(state.loops, dtype=float))
 
     def value(self, state: State) -> float:
-        """Variance of u over the area."""
-        return self._seen(state)[0]
+        """Variance of u over the area, and the cost of wrong directions."""
+        return self._seen(state)[0] + self._misdirected(state)
 
     def _seen(self, state: State) -> tuple[float, Floats]:
         """The value, and (q + f,) half its derivative."""
@@ -101,6 +105,18 @@ class Search:
         s = np.array([*state.index, *state.loops], dtype=float)
         gradient = self.linear + s @ self.square[at]
         return float(self.constant + self.linear[at] @ s + gradient[at] @ s), gradient
+
+    def _misdirected(self, state: State) -> float:
+        """What it costs that straight loops do not stand in lattice directions to each other, by their turn
+        in quanta."""
+        if self.model.turn is None:
+            return 0.0
+        return float(
+            self._cost_of_turn(self.model.turn[list(state.seat)] @ np.array(state.index, dtype=float))
+        )
+
+    def _cost_of_turn(self, turn: Floats | float) -> Floats:
+        return np.asarray(self.direction * self.constant * (turn - np.rint(turn)) ** 2)
 
     def clear_of(self, seat: int, same: bool) -> Bools:
         """(q,) seats far enough from one, for a singularity of the same sign or the other."""
@@ -130,6 +146,9 @@ class Search:
         values = value + 2 * change @ gradient[self.seats :] + self._quadratic  # (moves,)
         half = gradient[: self.seats] + more  # (moves, q)
         all_values = values[:, None] + 2 * k * half + k * k * self.alone[: self.seats]
+        if self.model.turn is not None:
+            turn = self.model.turn[list(state.seat)] @ np.array(state.index, dtype=float)
+            all_values += self._cost_of_turn(turn + k * self.model.turn)
         all_values[:, ~clear] = np.inf
         best = np.argpartition(all_values.ravel(), most - 1)[:most] if most > 1 else [all_values.argmin()]
         for i in best:
@@ -151,12 +170,19 @@ class Search:
                     found = self.additions(State.of(rest, state.loops), pair[1], 1)
                     if found and found[0][0] < value - least:
                         value, state = found[0]
-            for move in self.moves:
-                other = State(state.seat, state.index, _plus(state.loops, move))
-                if (new := self.value(other)) < value - least:
-                    value, state = new, other
+            state = self.with_loops(state)
+            value = self.value(state)
             if value >= before - least:
                 return value, state
+
+    def with_loops(self, state: State) -> State:
+        """The same singularities with the loops' curvatures that make the value least."""
+        while True:
+            around = [State(state.seat, state.index, _plus(state.loops, move)) for move in self.moves]
+            best = min(around, key=self.value)
+            if self.value(best) >= self.value(state) - GAIN * self.constant:
+                return state
+            state = best
 
     def refined(self, state: State) -> tuple[float, State]:
         """Moved from seat to neighbouring seat, and loops by one, for the least uncovered area."""
@@ -168,6 +194,7 @@ class Search:
             around = [state, *self._neighbours(state)]
             u = np.stack([self.scale(one) for one in around], axis=1)
             values = uncovered_of_many(u, self.model.weight, sizes)
+            values += np.array([self._misdirected(one) for one in around]) / self.constant
             best = int(values.argmin())
             least, state = float(values[best]), around[best]
             if values[0] - least < SMALL:
@@ -199,7 +226,7 @@ class Search:
             np.array(state.index, dtype=np.int64)[order],
             tuple(ends),
             uncovered(u, self.model.weight, self.rules.sizes),
-            float(np.sqrt(max(self.value(state), 0.0))),
+            float(np.sqrt(max(self._seen(state)[0], 0.0))),
             float(np.exp(np.ptp(u))),
         )
 
@@ -228,32 +255,49 @@ def curve(search: Search) -> list[Proposal]:
     """The best there is with 0, 1, 2, … singularities, as far as the rules allow and numbers are possible."""
     rng = np.random.default_rng(17)
     kinds = [k for size in range(1, search.rules.largest + 1) for k in (-size, size)]
-    start = State((), (), (0,) * max(len(search.model.free) - 1, 0))
-    beam = [search.settled(start)]
-    found = [search.proposal(search.refined(start if not beam else beam[0][1])[1])] if search.complete(start) else []
-    for _ in range(search.rules.most):
-        beam = _next(search, beam, kinds, rng)
-        if not beam:
-            break
+    beam = [search.settled(State((), (), (0,) * max(len(search.model.free) - 1, 0)))]
+    found = []
+    for number in range(search.rules.most + 1):
+        if number:
+            beam = [
+                one
+                for group in _grouped(search, _additions(search, beam, kinds), number)
+                for one in _best(search, group, rng)
+            ]
         whole = [search.refined(state) for _, state in beam if search.complete(state)]
         if whole:
-            best = min(whole, key=lambda one: (one[0], one[1].seat))[1]
-            found.append(search.proposal(best))
+            found.append(search.proposal(min(whole, key=lambda one: (one[0], one[1].seat))[1]))
     return found
 
 
-def _next(
-    search: Search, beam: list[tuple[float, State]], kinds: list[int], rng: np.random.Generator
+def _additions(
+    search: Search, beam: list[tuple[float, State]], kinds: list[int]
 ) -> list[tuple[float, State]]:
-    """The best states with one singularity more."""
-    added = [one for _, state in beam for k in kinds for one in search.additions(state, k, TRIED)]
-    added = sorted(added, key=lambda one: one[0])[: 2 * BEAM * TRIED]
-    if not added:
-        return []
+    return [one for _, state in beam for k in kinds for one in search.additions(state, k, TRIED)]
+
+
+def _grouped(
+    search: Search, states: list[tuple[float, State]], number: int
+) -> list[list[tuple[float, State]]]:
+    """By Σ k, where it has to become a certain number: those that are as near to it as they can be."""
+    total = search.model.total
+    if total is None:
+        return [states]
+    far = max(1, abs(total) - number)
+    sums = sorted({sum(state.index) for _, state in states})
+    return [[one for one in states if sum(one[1].index) == k] for k in sums if abs(total - k) <= far]
+
+
+def _best(
+    search: Search, added: list[tuple[float, State]], rng: np.random.Generator
+) -> list[tuple[float, State]]:
+    """The best states of a number, from these and from random ones with the same indices."""
     tried = {}
-    for _, state in added:
+    for _, state in sorted(added, key=lambda one: one[0])[: 2 * BEAM * TRIED]:
         value, settled = search.settled(state)
         tried[settled] = value
+    if not tried:
+        return []
     leading = min(tried, key=lambda state: (tried[state], state.seat))
     for _ in range(STARTS):
         state = State((), (), leading.loops)
@@ -262,6 +306,12 @@ def _next(
             if len(clear):
                 state = State.of([*state.pairs, (int(rng.choice(clear)), k)], state.loops)
         if len(state.seat) == len(leading.seat):
+            if search.model.turn is not None:
+                search.direction = DIRECTION / 100
+                _, state = search.settled(state)
+                search.direction = DIRECTION / 10
+                _, state = search.settled(state)
+                search.direction = DIRECTION
             value, settled = search.settled(state)
             tried[settled] = value
     ranked = sorted(((value, state) for state, value in tried.items()), key=lambda one: (one[0], one[1].seat))

@@ -31,8 +31,8 @@ def uncovered(u: Floats, weight: Floats, sizes: int | None) -> float:
 
 
 def uncovered_of_many(u: Floats, weight: Floats, sizes: int) -> Floats:
-    """(m,) the same for each column of u (p, m), on STEPS sizes between each one's smallest and largest: good for
-    comparing neighbours.
+    """(m,) the same for each column of u (p, m), on STEPS sizes between each one's smallest and largest:
+    good for comparing neighbours.
 
     With k classes over the first j steps, V_k(j) = max_i V_{k−1}(i) + ℓ_i² (A_j − A_i), A being the sum of
     weight/ℓ² over the steps before.
@@ -46,7 +46,8 @@ def uncovered_of_many(u: Floats, weight: Floats, sizes: int) -> Floats:
     start = np.arange(STEPS) * width[:, None]
     square = np.exp(2 * start)
     sums = np.concatenate(
-        [np.zeros((len(columns), 1)), np.cumsum(share * np.exp(-2 * (start + width[:, None] / 2)), axis=1)], axis=1
+        [np.zeros((len(columns), 1)), np.cumsum(share * np.exp(-2 * (start + width[:, None] / 2)), axis=1)],
+        axis=1,
     )
     gain = square[:, :, None] * (sums[:, None, :] - sums[:, :STEPS, None])
     value = gain[:, 0]

@@ -12,6 +12,21 @@ End = Literal["free", "straight"]
 
 
 @dataclass(frozen=True)
+class SingularitySettings:
+    """What is asked for.
+
+    count: at most so many are placed, "auto": as many as pay, None: those listed only. vertices: (k,)
+    *sent* vertex indices, −1 where points gives a place instead. points: (k, 3). indices: (k,) sides fewer
+    of each. With a list, exactly those are taken.
+    """
+
+    count: int | Literal["auto"] | None = None
+    vertices: Ints | None = None
+    points: Floats | None = None
+    indices: Ints | None = None
+
+
+@dataclass(frozen=True)
 class Rules:
     """What the search must keep to.
 
@@ -40,9 +55,9 @@ class Rules:
 class Proposal:
     """Singularities as the linear model sees them.
 
-    vertex: (s,) of the mesh; index: (s,) k of each. loops: per loop its curvature in quanta (straight ones: 0).
-    uncovered: share of the area that the size classes leave open; spread: standard deviation of u over the
-    area; ratio: largest over smallest cell.
+    vertex: (s,) of the mesh; index: (s,) k of each. loops: per loop its curvature in quanta (straight ones:
+    0). uncovered: share of the area that the size classes leave open; spread: standard deviation of u over
+    the area; ratio: largest over smallest cell.
     """
 
     vertex: Ints

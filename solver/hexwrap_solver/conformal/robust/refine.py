@@ -76,10 +76,7 @@ def split_edges(problem: Problem, marked: Ints, place: Floats) -> Problem:
         surface,
         vertices=vertices,
         faces=flatten_out(vertices, parts, parent),
-        loops=(
-            _extend(surface.loops[0], h, new, tail, inner),
-            _extend(surface.loops[1], h, new, tail, inner),
-        ),
+        loops=tuple(_extend(loop, h, new, tail, inner) for loop in surface.loops),
         input_vertex=np.concatenate([surface.input_vertex, np.full(len(h), -1, dtype=np.int64)]),
         normals=normals,
         parameters=_blend_parameters(surface, i, j, s),
