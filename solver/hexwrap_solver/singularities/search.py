@@ -11,8 +11,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.spatial import cKDTree
+from scipy.spatial.distance import cdist
 
-from hexwrap_solver.arrays import Bools, Floats
+from hexwrap_solver.arrays import Bools, Floats, Ints
 from hexwrap_solver.singularities.linear import Model
 from hexwrap_solver.singularities.sizes import uncovered, uncovered_of_many
 from hexwrap_solver.singularities.types import Proposal, Rules
@@ -67,7 +68,7 @@ class Search:
     _moves: tuple[Floats, Floats] = field(init=False)
     _quadratic: Floats = field(init=False)
     _near: cKDTree = field(init=False)
-    _clear: dict[tuple[int, int], Bools] = field(init=False, default_factory=dict)
+    _close: tuple[Ints, Ints] = field(init=False)
 
     def __post_init__(self) -> None:
         model = self.model
@@ -84,6 +85,10 @@ class Search:
         self._moves = change, change @ self.square[self.seats :, : self.seats]
         self._quadratic = np.einsum("mf,fg,mg->m", change, self.square[self.seats :, self.seats :], change)
         self._near = cKDTree(model.place)
+        apart = cdist(model.place, model.place) / self.rules.cell
+        self._close = tuple(  # too near for opposite signs, and for equal ones
+            (apart < least).astype(np.int8) for least in (self.rules.opposite, self.rules.apart)
+        )
 
     @property
     def seats(self) -> int:
@@ -118,77 +123,50 @@ class Search:
     def _cost_of_turn(self, turn: Floats | float) -> Floats:
         return np.asarray(self.direction * self.constant * (turn - np.rint(turn)) ** 2)
 
-    def clear_of(self, seat: int, same: bool) -> Bools:
-        """(q,) seats far enough from one, for a singularity of the same sign or the other."""
-        key = (seat, int(same))
-        if key not in self._clear:
-            cells = self.rules.apart if same else self.rules.opposite
-            clear = np.ones(self.seats, dtype=bool)
-            clear[self._near.query_ball_point(self.model.place[seat], cells * self.rules.cell)] = False
-            self._clear[key] = clear
-        return self._clear[key]
-
     def open_seats(self, state: State, k: int) -> Bools:
         """(q,) where one more of index k may stand."""
-        clear = np.ones(self.seats, dtype=bool)
+        crowd = np.zeros(self.seats, dtype=np.int8)
         for seat, index in state.pairs:
-            clear &= self.clear_of(seat, index * k > 0)
-        return clear
+            crowd += self._close[int(index * k > 0)][seat]
+        return np.asarray(crowd == 0)
 
     def additions(self, state: State, k: int, most: int) -> list[tuple[float, State]]:
         """The best ways to add a singularity of index k, loops changed along with it."""
-        found: list[tuple[float, State]] = []
-        clear = self.open_seats(state, k)
-        if not clear.any():
-            return found
-        value, gradient = self._seen(state)
-        change, more = self._moves
-        values = value + 2 * change @ gradient[self.seats :] + self._quadratic  # (moves,)
-        half = gradient[: self.seats] + more  # (moves, q)
-        all_values = values[:, None] + 2 * k * half + k * k * self.alone[: self.seats]
-        if self.model.turn is not None:
-            turn = self.model.turn[list(state.seat)] @ np.array(state.index, dtype=float)
-            all_values += self._cost_of_turn(turn + k * self.model.turn)
-        all_values[:, ~clear] = np.inf
-        best = np.argpartition(all_values.ravel(), most - 1)[:most] if most > 1 else [all_values.argmin()]
+        draft = _Draft(self, state)
+        values = draft.with_one_more(k, draft.crowd[int(k > 0)])
+        best = np.argpartition(values.ravel(), min(most, values.size) - 1)[:most] if values.size else []
+        found = []
         for i in best:
             move, seat = divmod(int(i), self.seats)
-            if np.isfinite(all_values[move, seat]):
-                state_with = State.of([*state.pairs, (seat, k)], _plus(state.loops, self.moves[move]))
-                found.append((float(all_values[move, seat]), state_with))
-        return sorted(found, key=lambda one: (one[0], one[1].seat, one[1].loops))[:most]
+            if np.isfinite(values[move, seat]):
+                more = State.of([*state.pairs, (seat, k)], _plus(state.loops, self.moves[move]))
+                found.append((float(values[move, seat]), more))
+        return sorted(found, key=lambda one: (one[0], one[1].seat, one[1].loops))
 
     def settled(self, state: State) -> tuple[float, State]:
         """Each singularity relocated with the others held, loops changed by one, until nothing gains."""
-        value = self.value(state)
+        draft = _Draft(self, state)
         least = GAIN * self.constant
         while True:
-            before = value
-            for pair in state.pairs:
-                if pair in state.pairs:
-                    rest = [other for other in state.pairs if other != pair]
-                    found = self.additions(State.of(rest, state.loops), pair[1], 1)
-                    if found and found[0][0] < value - least:
-                        value, state = found[0]
-            state = self.with_loops(state)
-            value = self.value(state)
-            if value >= before - least:
-                return value, state
+            before = draft.total
+            for i in range(len(draft.pairs)):
+                draft.relocate(i, least)
+            draft.turn_loops(least)
+            if draft.total >= before - least:
+                state = draft.state
+                return self.value(state), state
 
     def with_loops(self, state: State) -> State:
         """The same singularities with the loops' curvatures that make the value least."""
-        while True:
-            around = [State(state.seat, state.index, _plus(state.loops, move)) for move in self.moves]
-            best = min(around, key=self.value)
-            if self.value(best) >= self.value(state) - GAIN * self.constant:
-                return state
-            state = best
+        draft = _Draft(self, state)
+        draft.turn_loops(GAIN * self.constant)
+        return draft.state
 
     def refined(self, state: State) -> tuple[float, State]:
         """Moved from seat to neighbouring seat, and loops by one, for the least uncovered area."""
         sizes = self.rules.sizes
         if sizes is None:
-            return 0.0, state
+            return self.value(state), state
         least = np.inf
         for _ in range(ROUNDS):
             around = [state, *self._neighbours(state)]
@@ -233,6 +211,87 @@ class Search:
     def complete(self, state: State) -> bool:
         """Whether the curvatures add up."""
         return self.model.total is None or sum(state.index) == self.model.total
+
+
+class _Draft:
+    """A state that is being changed: what its value and derivative are, and which seats are taken, is kept up."""
+
+    def __init__(self, search: Search, state: State) -> None:
+        self.search, self.pairs, self.loops = search, state.pairs, state.loops
+        self.value, self.gradient = search._seen(state)
+        self.turn = 0.0
+        if search.model.turn is not None:
+            self.turn = float(search.model.turn[list(state.seat)] @ np.array(state.index, dtype=float))
+        self.crowd = [np.zeros(search.seats, dtype=np.int8) for _ in range(2)]  # for k < 0, for k > 0
+        for seat, k in self.pairs:
+            self._crowd(seat, k, 1)
+
+    @property
+    def total(self) -> float:
+        cost = self.search._cost_of_turn(self.turn) if self.search.model.turn is not None else 0.0
+        return float(self.value + cost)
+
+    @property
+    def state(self) -> State:
+        return State.of(self.pairs, self.loops)
+
+    def _crowd(self, seat: int, k: int, by: int) -> None:
+        for positive in (0, 1):
+            self.crowd[positive] += by * self.search._close[int((k > 0) == bool(positive))][seat]
+
+    def with_one_more(self, k: int, crowd: Ints) -> Floats:
+        """(moves, q) value with one more of index k on each seat, loops changed by each move; ∞ where crowded."""
+        search, q = self.search, self.search.seats
+        change, more = search._moves
+        base = self.value + 2 * change @ self.gradient[q:] + search._quadratic
+        values = 2 * k * (self.gradient[:q] + more) + base[:, None] + k * k * search.alone[:q]
+        if search.model.turn is not None:
+            values += search._cost_of_turn(self.turn + k * search.model.turn)
+        values[:, crowd > 0] = np.inf
+        return np.asarray(values)
+
+    def _change(self, seat: int, k: int, sign: int) -> None:
+        """Adds (1) or takes away (−1) a singularity; for those taken away the gradient is changed first."""
+        search = self.search
+        if sign < 0:
+            self.gradient = self.gradient - k * search.square[seat]
+        self.value += sign * (2 * k * float(self.gradient[seat]) + k * k * float(search.alone[seat]))
+        if sign > 0:
+            self.gradient = self.gradient + k * search.square[seat]
+        if search.model.turn is not None:
+            self.turn += sign * k * float(search.model.turn[seat])
+        self._crowd(seat, k, sign)
+
+    def _turn(self, move: int) -> None:
+        search, q = self.search, self.search.seats
+        change = search._moves[0][move]
+        self.value += float(2 * change @ self.gradient[q:] + search._quadratic[move])
+        self.gradient = self.gradient + change @ search.square[q:]
+        self.loops = _plus(self.loops, search.moves[move])
+
+    def relocate(self, i: int, least: float) -> None:
+        """The singularity to the best seat, if that gains at least so much."""
+        seat, k = self.pairs[i]
+        before = self.total
+        self._change(seat, k, -1)
+        values = self.with_one_more(k, self.crowd[int(k > 0)])
+        move, best = divmod(int(values.argmin()), self.search.seats)
+        if values[move, best] < before - least:
+            seat = best
+            if any(self.search.moves[move]):
+                self._turn(move)
+        self._change(seat, k, 1)
+        self.pairs[i] = (seat, k)
+
+    def turn_loops(self, least: float) -> None:
+        """Loops changed as long as that gains."""
+        change, q = self.search._moves[0], self.search.seats
+        while True:
+            gains = 2 * change @ self.gradient[q:] + self.search._quadratic
+            best = int(gains.argmin())
+            if gains[best] >= -least:
+                return
+            self._turn(best)
 
 
 def _plus(loops: tuple[int, ...], move: tuple[int, ...]) -> tuple[int, ...]:
