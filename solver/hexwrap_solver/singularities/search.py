@@ -10,13 +10,16 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
-from hexwrap_solver.arrays import Bools, Floats, Ints
+from hexwrap_solver.arrays import Bools, Floats
 from hexwrap_solver.singularities.linear import Model
 from hexwrap_solver.singularities.sizes import uncovered, uncovered_of_many
 from hexwrap_solver.singularities.types import Proposal, Rules
+
+Counts = NDArray[np.int8]
 
 #: States carried from one number of singularities to the next; random starts for each number.
 BEAM, STARTS = 5, 16
@@ -68,7 +71,7 @@ class Search:
     _moves: tuple[Floats, Floats] = field(init=False)
     _quadratic: Floats = field(init=False)
     _near: cKDTree = field(init=False)
-    _close: tuple[Ints, Ints] = field(init=False)
+    _close: list[Counts] = field(init=False)
 
     def __post_init__(self) -> None:
         model = self.model
@@ -86,9 +89,9 @@ class Search:
         self._quadratic = np.einsum("mf,fg,mg->m", change, self.square[self.seats :, self.seats :], change)
         self._near = cKDTree(model.place)
         apart = cdist(model.place, model.place) / self.rules.cell
-        self._close = tuple(  # too near for opposite signs, and for equal ones
+        self._close = [  # too near for opposite signs, and for equal ones
             (apart < least).astype(np.int8) for least in (self.rules.opposite, self.rules.apart)
-        )
+        ]
 
     @property
     def seats(self) -> int:
@@ -134,7 +137,9 @@ class Search:
         """The best ways to add a singularity of index k, loops changed along with it."""
         draft = _Draft(self, state)
         values = draft.with_one_more(k, draft.crowd[int(k > 0)])
-        best = np.argpartition(values.ravel(), min(most, values.size) - 1)[:most] if values.size else []
+        if not values.size:
+            return []
+        best = np.argpartition(values.ravel(), min(most, values.size) - 1)[:most]
         found = []
         for i in best:
             move, seat = divmod(int(i), self.seats)
@@ -214,7 +219,8 @@ class Search:
 
 
 class _Draft:
-    """A state that is being changed: what its value and derivative are, and which seats are taken, is kept up."""
+    """A state that is being changed: what its value and derivative are, and which seats are taken, is kept
+    up."""
 
     def __init__(self, search: Search, state: State) -> None:
         self.search, self.pairs, self.loops = search, state.pairs, state.loops
@@ -239,8 +245,9 @@ class _Draft:
         for positive in (0, 1):
             self.crowd[positive] += by * self.search._close[int((k > 0) == bool(positive))][seat]
 
-    def with_one_more(self, k: int, crowd: Ints) -> Floats:
-        """(moves, q) value with one more of index k on each seat, loops changed by each move; ∞ where crowded."""
+    def with_one_more(self, k: int, crowd: Counts) -> Floats:
+        """(moves, q) value with one more of index k on each seat, loops changed by each move; ∞ where
+        crowded."""
         search, q = self.search, self.search.seats
         change, more = search._moves
         base = self.value + 2 * change @ self.gradient[q:] + search._quadratic

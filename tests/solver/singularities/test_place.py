@@ -66,7 +66,8 @@ def test_heptagons_where_a_tube_has_a_waist(on_waist):
     best = on_waist.proposal
     assert (best.index == -1).all()
     assert best.count >= 4
-    assert best.uncovered < 0.4 * on_waist.proposals[0].uncovered
+    assert best.uncovered < on_waist.proposals[0].uncovered
+    assert best.spread < 0.4 * on_waist.proposals[0].spread
     assert sum(best.loops) == best.count
 
 
