@@ -172,7 +172,8 @@ def _patches(surface: Surface, area: Floats) -> tuple[Ints, Ints]:
     """(n,) patch of each vertex, and (p,) the vertex in its middle; the same whatever the numbering."""
     vertices = surface.vertices
     if len(vertices) <= PATCHES:
-        return np.arange(len(vertices)), np.arange(len(vertices))
+        middle = np.lexsort(vertices.T)
+        return np.argsort(middle), middle
     size = float(np.sqrt(area.sum() / PATCHES))
     low = vertices.min(axis=0)
     for _ in range(4):  # a surface meets more cubes than squares of its size
@@ -183,7 +184,8 @@ def _patches(surface: Surface, area: Floats) -> tuple[Ints, Ints]:
     off = np.linalg.norm(vertices - _means(vertices, cube, area)[cube], axis=1)
     order = np.lexsort((*vertices.T, off, cube))
     first = np.flatnonzero(np.diff(cube[order], prepend=-1))
-    middle = np.sort(order[first])
+    middle = order[first]
+    middle = middle[np.lexsort(vertices[middle].T)]
     return np.asarray(cKDTree(vertices[middle]).query(vertices)[1], dtype=np.int64), middle
 
 
