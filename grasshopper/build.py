@@ -1,4 +1,6 @@
-"""Builds ``dist/`` from ``src/``: user objects, the example network, the package for Rhino's package manager.
+"""Builds ``dist/`` from ``src/``: user objects, examples, packages for Rhino's package manager.
+
+One folder and one package per form of script component: ``rhino7`` (Rhino 6 and later), ``rhino8``.
 
 Run ``python grasshopper/build.py``. The same sources give the same files, whenever and wherever it runs.
 """
@@ -14,7 +16,7 @@ if __package__ in (None, ""):  # started as a script: its own folder is on the p
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from grasshopper import components, icons, network
-from grasshopper.archive import to_xml
+from grasshopper.archive import deflate
 
 DIST = Path(__file__).resolve().parent / "dist"
 #: The earliest time a ZIP can hold; a real one would make every build differ.
@@ -50,11 +52,15 @@ def draw_icons() -> dict[Path, bytes]:
 
 
 def built() -> dict[str, bytes]:
-    """Every file of ``dist/``, by name."""
+    """Every file of ``dist/``, by its path in there."""
     all_components = [components.load(folder) for folder in components.folders()]
-    files = {f"hexwrap-{c.folder}.ghuser": components.user_object(c) for c in all_components}
-    files["hexwrap-example.ghx"] = to_xml(network.example(all_components)).encode("utf-8")
-    files["hexwrap.yak"] = package(files)
+    files = {}
+    for form in components.FORMS:
+        made = {f"hexwrap-{c.folder}.ghuser": components.user_object(c, form) for c in all_components}
+        for wanted in network.EXAMPLES:
+            made[f"hexwrap-{wanted.name}.gh"] = deflate(network.example(all_components, form, wanted))
+        files |= {f"{form.name}/{name}": data for name, data in made.items()}
+        files[f"hexwrap-{version()}-{form.yak}.yak"] = package(made)
     return files
 
 
@@ -72,9 +78,12 @@ def package(files: dict[str, bytes]) -> bytes:
 def main() -> None:
     for path, data in draw_icons().items():
         path.write_bytes(data)
-    DIST.mkdir(exist_ok=True)
+    for stale in DIST.rglob("*.*"):
+        stale.unlink()
     for name, data in built().items():
-        (DIST / name).write_bytes(data)
+        path = DIST / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(data)
         print(f"{name}: {len(data)} bytes")
 
 

@@ -1,7 +1,12 @@
-"""From ``src/<Name>/`` to Grasshopper's chunks: one script component per folder, shared source inlined."""
+"""From ``src/<Name>/`` to Grasshopper's chunks: one script component per folder, shared source inlined.
+
+The same sources fill two forms of script component: the one of Rhino 6 and 7 (IronPython), which Rhino 8
+still loads, and Rhino 8's own (CPython).
+"""
 
 from __future__ import annotations
 
+import base64
 import json
 import re
 from dataclasses import dataclass
@@ -15,10 +20,59 @@ SOURCE = Path(__file__).resolve().parent / "src"
 SHARED = SOURCE / "shared"
 INCLUDE = re.compile(r"^# include: (.+)$", re.MULTILINE)
 
-#: The script component of Rhino 6 and 7; Rhino 8 still loads it.
-GHPYTHON = UUID("410755b1-224a-4c1e-a407-bf32fb45ea7e")
-INPUT_ID = UUID("84fa917c-1ed8-4db3-8be1-7bdc4a6495a2")
-OUTPUT_ID = UUID("8ec86459-bf01-4409-baee-174d0d2b13d0")
+#: Type hints that both forms share.
+_HINTS = {
+    "bool": UUID("d60527f5-b5af-4ef6-8970-5f96fe412559"),
+    "int": UUID("48d01794-d3d8-4aef-990e-127168822244"),
+    "point": UUID("e1937b56-b1da-4c12-8bd8-e34ee81746ef"),
+    "curve": UUID("9ba89ec2-5315-435f-a621-b66c5fa2f301"),
+    "mesh": UUID("794a1f9d-21d5-4379-b987-9e8bbf433912"),
+}
+
+
+@dataclass(frozen=True)
+class Form:
+    """How a kind of Rhino stores script components.
+
+    base: its script component. input, output: its parameters. hints: GUIDs of type hints by the names that
+    ``metadata.json`` uses. yak: the part of a package's file name that says which Rhino it is for.
+    """
+
+    name: str
+    base: UUID
+    input: UUID
+    output: UUID
+    hints: dict[str, UUID]
+    yak: str
+
+
+RHINO7 = Form(
+    "rhino7",
+    UUID("410755b1-224a-4c1e-a407-bf32fb45ea7e"),
+    UUID("84fa917c-1ed8-4db3-8be1-7bdc4a6495a2"),
+    UUID("8ec86459-bf01-4409-baee-174d0d2b13d0"),
+    {
+        **_HINTS,
+        "none": UUID("35915213-5534-4277-81b8-1bdc9e7383d2"),
+        "float": UUID("39fbc626-7a01-46ab-a18e-ec1c0c41685b"),
+        "str": UUID("37261734-eec7-4f50-b6a8-b8d1f3c4396b"),
+    },
+    "rh7_0-any",
+)
+RHINO8 = Form(
+    "rhino8",
+    UUID("719467e6-7cf5-4848-99b0-c5dd57e5442c"),
+    UUID("08908df5-fa14-4982-9ab2-1aa0927566aa"),
+    UUID("08908df5-fa14-4982-9ab2-1aa0927566aa"),
+    {
+        **_HINTS,
+        "none": UUID("6a184b65-baa3-42d1-a548-3915b401de53"),
+        "float": UUID("9d51e32e-c038-4352-9554-f4137ca91b9a"),
+        "str": UUID("3aceb454-6dbd-4c5b-9b6b-e71f8c1cdf88"),
+    },
+    "rh8_0-any",
+)
+FORMS = (RHINO7, RHINO8)
 
 
 @dataclass(frozen=True)
@@ -30,9 +84,10 @@ class Component:
     code: str
     icon: bytes
 
-    @property
-    def guid(self) -> UUID:
-        return UUID(self.metadata["instanceGuid"])
+    def guid(self, form: Form) -> UUID:
+        """InstanceGuid of the user object; both forms may lie in one folder."""
+        legacy = UUID(self.metadata["instanceGuid"])
+        return legacy if form is RHINO7 else uuid5(legacy, form.name)
 
     @property
     def inputs(self) -> list[dict[str, Any]]:
@@ -65,38 +120,60 @@ def complete(code: str) -> str:
     return INCLUDE.sub(shared, code)
 
 
-def user_object(component: Component) -> bytes:
+def user_object(component: Component, form: Form) -> bytes:
     """The ``.ghuser`` file."""
     metadata = component.metadata
     chunk = Chunk("UserObject")
-    chunk.add("gh_guid", "BaseID", GHPYTHON)
+    chunk.add("gh_guid", "BaseID", form.base)
     chunk.add("gh_string", "Category", metadata["category"])
     chunk.add("gh_string", "SubCategory", metadata["subcategory"])
     chunk.add("gh_string", "Description", metadata["description"])
     chunk.add("gh_int32", "Exposure", metadata["exposure"])
     chunk.add("gh_bytearray", "Icon", component.icon)
-    chunk.add("gh_guid", "InstanceGuid", component.guid)
+    chunk.add("gh_guid", "InstanceGuid", component.guid(form))
     chunk.add("gh_string", "Name", metadata["name"])
     chunk.add("gh_string", "NickName", metadata["nickname"])
     inner = Chunk("UserObject")
-    script(inner, component)
-    inner.chunks.append(parameters(component, component.guid))
+    script(inner, component, form)
+    inner.chunks.insert(0, parameters(component, component.guid(form), form))
     chunk.add("gh_bytearray", "Object", deflate(inner))
     return deflate(chunk)
 
 
-def script(chunk: Chunk, component: Component) -> None:
-    """The items of a script component itself."""
+def script(chunk: Chunk, component: Component, form: Form) -> None:
+    """The items of a script component itself, and for Rhino 8 the chunk that holds its code."""
     metadata, own = component.metadata, component.metadata["ghpython"]
-    chunk.add("gh_string", "CodeInput", component.code)
     chunk.add("gh_string", "Description", metadata["description"])
-    chunk.add("gh_bool", "HideInput", own["hideInput"])
-    chunk.add("gh_bool", "HideOutput", own["hideOutput"])
     chunk.add("gh_int32", "IconDisplay", own["iconDisplay"])
-    chunk.add("gh_bool", "IsAdvancedMode", own["isAdvancedMode"])
-    chunk.add("gh_bool", "MarshalOutGuids", own["marshalOutGuids"])
+    chunk.add("gh_drawing_bitmap", "IconOverride", component.icon)
     chunk.add("gh_string", "Name", metadata["name"])
     chunk.add("gh_string", "NickName", metadata["nickname"])
+    if form is RHINO7:
+        chunk.add("gh_string", "CodeInput", component.code)
+        chunk.add("gh_bool", "HideInput", own["hideInput"])
+        chunk.add("gh_bool", "HideOutput", own["hideOutput"])
+        chunk.add("gh_bool", "IsAdvancedMode", own["isAdvancedMode"])
+        chunk.add("gh_bool", "MarshalOutGuids", own["marshalOutGuids"])
+        return
+    chunk.add("gh_bool", "MarshalGuids", own["marshalOutGuids"])
+    chunk.add("gh_bool", "UsingLibraryInputParam", False)
+    chunk.add("gh_bool", "UsingScriptInputParam", False)
+    chunk.add("gh_bool", "UsingStandardOutputParam", not own["hideOutput"])
+    code = chunk.child("Script")
+    code.add("gh_string", "Text", base64.b64encode(component.code.encode("utf-8")).decode("ascii"))
+    code.add("gh_string", "Title", metadata["name"])
+    language = code.child("LanguageSpec")
+    language.add("gh_string", "Taxon", "*.*.python").add("gh_string", "Version", "3.*")
+
+
+def code_of(chunk: Chunk) -> str | None:
+    """The code of a stored script component of either form; None if the chunk is none."""
+    items = {item.name: item.value for item in chunk.items}
+    if "CodeInput" in items:
+        return str(items["CodeInput"])
+    if any(child.name == "Script" for child in chunk.chunks):
+        return base64.b64decode(chunk.find("Script")["Text"]).decode("utf-8")
+    return None
 
 
 def parameter_guid(instance: UUID, side: str, name: str) -> UUID:
@@ -104,28 +181,31 @@ def parameter_guid(instance: UUID, side: str, name: str) -> UUID:
     return uuid5(instance, f"{side} {name}")
 
 
-def parameters(component: Component, instance: UUID, sources: dict[str, list[UUID]] | None = None) -> Chunk:
+def parameters(
+    component: Component, instance: UUID, form: Form, sources: dict[str, list[UUID]] | None = None
+) -> Chunk:
     """ParameterData. sources: per input, the outputs that are wired to it."""
     chunk = Chunk("ParameterData")
     chunk.add("gh_int32", "InputCount", len(component.inputs))
     chunk.add("gh_int32", "OutputCount", len(component.outputs))
     for i, spec in enumerate(component.inputs):
-        chunk.add("gh_guid", "InputId", INPUT_ID, index=i)
-        _input(chunk.child("InputParam", i), spec, instance, (sources or {}).get(spec["name"], []))
+        chunk.add("gh_guid", "InputId", form.input, index=i)
+        made = chunk.child("InputParam", i)
+        _input(made, spec, instance, form, (sources or {}).get(spec["name"], []))
     for i, spec in enumerate(component.outputs):
-        chunk.add("gh_guid", "OutputId", OUTPUT_ID, index=i)
+        chunk.add("gh_guid", "OutputId", form.output, index=i)
         _output(chunk.child("OutputParam", i), spec, instance)
     return chunk
 
 
-def _input(chunk: Chunk, spec: dict[str, Any], instance: UUID, sources: list[UUID]) -> None:
+def _input(chunk: Chunk, spec: dict[str, Any], instance: UUID, form: Form, sources: list[UUID]) -> None:
     _parameter(chunk, spec, parameter_guid(instance, "input", spec["name"]), spec["optional"], len(sources))
     chunk.add("gh_bool", "AllowTreeAccess", True)
     if spec["scriptParamAccess"]:
         chunk.add("gh_int32", "Access", spec["scriptParamAccess"])
     chunk.add("gh_int32", "ScriptParamAccess", spec["scriptParamAccess"])
     chunk.add("gh_bool", "ShowTypeHints", True)
-    chunk.add("gh_guid", "TypeHintID", UUID(spec["typeHintID"]))
+    chunk.add("gh_guid", "TypeHintID", form.hints[spec["typeHintID"]])
     chunk.add("gh_int32", "WireDisplay", 0)
     for k, source in enumerate(sources):
         chunk.add("gh_guid", "Source", source, index=k)
@@ -133,6 +213,8 @@ def _input(chunk: Chunk, spec: dict[str, Any], instance: UUID, sources: list[UUI
 
 def _output(chunk: Chunk, spec: dict[str, Any], instance: UUID) -> None:
     _parameter(chunk, spec, parameter_guid(instance, "output", spec["name"]), False, 0)
+    if spec.get("hidden"):
+        chunk.add("gh_bool", "Hidden", True)
 
 
 def _parameter(chunk: Chunk, spec: dict[str, Any], guid: UUID, optional: bool, sources: int) -> None:

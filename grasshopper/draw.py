@@ -1,6 +1,7 @@
-"""Draws the network of a ``.ghx`` file as SVG, much as Grasshopper shows it.
+"""Draws the network of a ``.gh`` file as SVG, much as Grasshopper lays it out on opening.
 
-Run ``python grasshopper/draw.py`` to draw the example for the README: nothing in that picture is made up.
+Run ``python grasshopper/draw.py`` to draw the examples for README and docs. Places come from each object's
+Pivot, as in Grasshopper; of the Bounds in the file only the size of panels, sliders and the like counts.
 """
 
 from __future__ import annotations
@@ -15,14 +16,21 @@ from xml.sax.saxutils import escape
 if __package__ in (None, ""):
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from grasshopper import components
-from grasshopper.archive import Chunk, from_xml
-from grasshopper.network import ICON
+from grasshopper import layout, network
+from grasshopper.archive import Chunk, inflate
+from grasshopper.layout import Box
 
 ROOT = Path(__file__).resolve().parents[1]
-EXAMPLE = ROOT / "grasshopper" / "dist" / "hexwrap-example.ghx"
-PICTURE = ROOT / "docs" / "grasshopper.svg"
+#: Example → its picture.
+PICTURES = {
+    ROOT / "grasshopper" / "dist" / "rhino7" / f"hexwrap-{example.name}.gh": ROOT
+    / "docs"
+    / ("grasshopper.svg" if example.name == "example" else f"grasshopper-{example.name}.svg")
+    for example in network.EXAMPLES
+}
 MARGIN = 40.0
+#: From one line of a panel to the next.
+LINE = 15.0
 
 STYLE = """
 text { font-family: 'Segoe UI', 'Helvetica Neue', 'DejaVu Sans', Arial, sans-serif; font-size: 11px;
@@ -36,7 +44,7 @@ text { font-family: 'Segoe UI', 'Helvetica Neue', 'DejaVu Sans', Arial, sans-ser
 .plug { fill: #ffffff; stroke: #546e7a; stroke-width: 1 }
 .note { fill: #fffbe0; stroke: #c9b458; stroke-width: 1 }
 .value { fill: #ffffff; stroke: #78909c; stroke-width: 1 }
-.groove { stroke: #90a4ae; stroke-width: 2 }
+.groove { fill: #eceff1; stroke: #90a4ae; stroke-width: 2 }
 """
 
 
@@ -80,11 +88,39 @@ def picture(root: Chunk) -> str:
     return _page(drawing)
 
 
+def place(name: str, container: Chunk) -> Box:
+    """The box in which Grasshopper draws an object of the canvas. name: of its kind."""
+    kept = container.find("Attributes")
+    made = _columns(container)
+    if made is not None:
+        return layout.box(name, kept["Pivot"], (made.width, made.height), made.left + made.middle / 2)
+    offset = layout.label_width(container["NickName"]) if name == "Value List" else 0.0
+    return layout.box(name, kept["Pivot"], kept["Bounds"][2:], offset)
+
+
+def _columns(container: Chunk) -> layout.Columns | None:
+    """None for objects without parameters of their own."""
+    inputs, outputs = _sides(container)
+    if not inputs and not outputs:
+        return None
+    shown = "NickName" if any(chunk.name == "ParameterData" for chunk in container.chunks) else "Name"
+    return layout.columns([c[shown] for c in inputs], [c[shown] for c in outputs])
+
+
+def _sides(container: Chunk) -> tuple[list[Chunk], list[Chunk]]:
+    data = [chunk for chunk in container.chunks if chunk.name == "ParameterData"]
+    held = data[0].chunks if data else container.chunks
+    return [c for c in held if c.name in ("InputParam", "param_input")], [
+        c for c in held if c.name == "OutputParam"
+    ]
+
+
 def _draw(drawing: Drawing, name: str, container: Chunk) -> None:
-    box = container.find("Attributes")["Bounds"]
+    box = place(name, container)
     drawing.boxes[container["InstanceGuid"]] = box
-    if any(item.name == "CodeInput" for item in container.items):
-        _component(drawing, container, box)
+    made = _columns(container)
+    if made is not None:
+        _component(drawing, container, box, made)
         return
     x, y, w, h = box
     middle = y + h / 2
@@ -93,65 +129,70 @@ def _draw(drawing: Drawing, name: str, container: Chunk) -> None:
     drawing.ends += [(source, (x, middle)) for source in sources]
     if name == "Panel":
         _panel(drawing, container, box)
-    elif name in ("Number Slider", "Value List", "Boolean Toggle"):
+    elif name in ("Number Slider", "Value List", "Boolean Toggle", "Button"):
         _control(drawing, name, container, box)
     else:
         drawing.rect(box, "core", h / 2)
         drawing.text(x + w / 2, middle + 4, container["NickName"], "middle", "core-text")
     if sources:
         drawing.plug(x, middle)
-    if name != "Panel" or not container["UserText"].count("\n"):
+    if name != "Panel" or container["NickName"] != "Start here":
         drawing.plug(x + w, middle)
 
 
-def _component(drawing: Drawing, container: Chunk, box: tuple[float, ...]) -> None:
+def _component(drawing: Drawing, container: Chunk, box: Box, made: layout.Columns) -> None:
     x, y, w, h = box
     drawing.rect(box, "box", 5)
-    data = container.find("ParameterData")
-    inputs = [c for c in data.chunks if c.name == "InputParam"]
-    outputs = [c for c in data.chunks if c.name == "OutputParam"]
-    left = inputs[0].find("Attributes")["Bounds"][2]
-    drawing.rect((x + left + 2, y + 3, ICON, h - 6), "core", 4)
-    icon = base64.b64encode(_icon(container["Name"])).decode("ascii")
-    drawing.things.append(
-        f'<image x="{x + left + 4:g}" y="{y + h / 2 - 10:g}" width="20" height="20" '
-        f'href="data:image/png;base64,{icon}"/>'
-    )
-    for chunk in inputs:
-        bx, by, bw, bh = chunk.find("Attributes")["Bounds"]
-        middle = by + bh / 2
-        drawing.text(bx + bw - 4, middle + 4, chunk["NickName"], "end")
+    drawing.rect((x + made.left + 2, y + 3, made.middle, h - 6), "core", 4)
+    drawing.things.append(_middle(container, x + made.left + 2 + made.middle / 2, y + h / 2))
+    inputs, outputs = _sides(container)
+    script = any(chunk.name == "ParameterData" for chunk in container.chunks)
+    for k, chunk in enumerate(inputs):
+        middle = y + 2 + (k + 0.5) * (h - 4) / len(inputs)
+        words = chunk["NickName"] if script else chunk["Name"]
+        drawing.text(x + made.left - 2, middle + 4, words, "end")
         drawing.plug(x, middle)
         drawing.ends += [(item.value, (x, middle)) for item in chunk.items if item.name == "Source"]
-    for chunk in outputs:
-        bx, by, _, bh = chunk.find("Attributes")["Bounds"]
-        middle = by + bh / 2
-        drawing.text(bx + 8, middle + 4, chunk["NickName"])
+    for k, chunk in enumerate(outputs):
+        middle = y + 2 + (k + 0.5) * (h - 4) / len(outputs)
+        drawing.text(x + made.left + made.middle + 8, middle + 4, chunk["NickName"])
         drawing.plug(x + w, middle)
         drawing.starts[chunk["InstanceGuid"]] = (x + w, middle)
-    drawing.text(x + w / 2, y - 5, container["NickName"], "middle", "title")
+    if script:
+        drawing.text(x + w / 2, y - 5, container["NickName"], "middle", "title")
 
 
-def _icon(name: str) -> bytes:
-    for folder in components.folders():
-        component = components.load(folder)
-        if component.metadata["name"] == name:
-            return component.icon
-    raise KeyError(name)
+def _middle(container: Chunk, x: float, y: float) -> str:
+    """A component's icon, or its name upright where it has none of its own."""
+    icons = [item.value for item in container.items if item.name == "IconOverride"]
+    if not icons:
+        return (
+            f'<text class="core-text" x="{x:g}" y="{y:g}" text-anchor="middle" dominant-baseline="central" '
+            f'transform="rotate(-90 {x:g} {y:g})" font-size="9">{escape(container["NickName"])}</text>'
+        )
+    data = base64.b64encode(icons[0]).decode("ascii")
+    return (
+        f'<image x="{x - 10:g}" y="{y - 10:g}" width="20" height="20" href="data:image/png;base64,{data}"/>'
+    )
 
 
 def _panel(drawing: Drawing, container: Chunk, box: tuple[float, ...]) -> None:
-    x, y, _, _ = box
+    x, y = box[:2]
     drawing.rect(box, "note", 3)
     drawing.text(x + 7, y + 15, container["NickName"], kind="title")
-    for k, line in enumerate(container["UserText"].split("\n")):
-        drawing.text(x + 7, y + 33 + 15 * k, line, kind="small")
+    height = box[3]
+    words = container["UserText"].split("\n") if container["UserText"] else []
+    room = int((height - 24) // LINE) if len(words) > (height - 24) // LINE else len(words)
+    for k, line in enumerate(words[:room]):
+        drawing.text(
+            x + 7, y + 33 + LINE * k, line if k + 1 < room or room == len(words) else "…", kind="small"
+        )
 
 
 def _control(drawing: Drawing, name: str, container: Chunk, box: tuple[float, ...]) -> None:
     """A slider, a value list or a toggle: its name in the dark part, its value in the light one."""
     x, y, w, h = box
-    label = min(w / 2, 6.4 * len(container["NickName"]) + 14)
+    label = layout.label_width(container["NickName"])
     drawing.rect(box, "value", 4)
     drawing.rect((x, y, label, h), "core", 4)
     drawing.text(x + label / 2, y + h / 2 + 4, container["NickName"], "middle", "core-text")
@@ -170,8 +211,10 @@ def _control(drawing: Drawing, name: str, container: Chunk, box: tuple[float, ..
     elif name == "Value List":
         drawing.text(x + label + 8, middle + 4, container.find(("ListItem", 0))["Name"])
         drawing.text(x + w - 16, middle + 3, "\N{BLACK DOWN-POINTING SMALL TRIANGLE}", "middle")
-    else:
+    elif name == "Boolean Toggle":
         drawing.text(x + label + 8, middle + 4, str(container["ToggleValue"]))
+    else:
+        drawing.rect((x + label + 4, y + 4, w - label - 8, h - 8), "groove", 3)
 
 
 def _group(drawing: Drawing, container: Chunk) -> None:
@@ -221,9 +264,10 @@ def _page(drawing: Drawing) -> str:
 
 
 def main() -> None:
-    PICTURE.parent.mkdir(exist_ok=True)
-    PICTURE.write_text(picture(from_xml(EXAMPLE.read_text(encoding="utf-8"))), encoding="utf-8", newline="\n")
-    print(f"drew {PICTURE.relative_to(ROOT)}")
+    for source, target in PICTURES.items():
+        drawn = picture(inflate(source.read_bytes()))
+        target.write_text(drawn, encoding="utf-8", newline="\n")
+        print(f"drew {target.relative_to(ROOT)}")
 
 
 if __name__ == "__main__":

@@ -183,7 +183,28 @@ def _server(c: Canvas) -> None:
     c.line([(12, 5.6), (12, 11.8)], 2.4, INK)
 
 
+def _bake(c: Canvas) -> None:
+    c.polygon(hexagon(12, 7.6, 6.6, 30), TEAL)
+    c.ring(hexagon(12, 7.6, 6.6, 30), 1.5, INK)
+    c.line([(12, 6.2), (12, 16.2)], 2.2, WHITE)
+    c.polygon([(7.8, 13.6), (12, 19.2), (16.2, 13.6)], AMBER)
+    c.ring([(7.8, 13.6), (12, 19.2), (16.2, 13.6)], 1.0, INK)
+    c.line([(2.2, 17.2), (2.2, 22.2), (21.8, 22.2), (21.8, 17.2)], 2.0, INK)
+
+
+def _singularities(c: Canvas) -> None:
+    five = [(12 + 5.6 * np.cos(a), 12.4 + 5.6 * np.sin(a)) for a in np.deg2rad(np.arange(5) * 72 - 90)]
+    out = [(12 + 11.0 * np.cos(a), 12.4 + 11.0 * np.sin(a)) for a in np.deg2rad(np.arange(5) * 72 - 90)]
+    c.polygon(out, PALE)
+    c.ring(out, 1.5, INK)
+    for a, b in zip(five, out, strict=True):
+        c.line([a, b], 1.5, INK)
+    c.polygon(five, CORAL)
+    c.ring(five, 1.5, INK)
+
+
 DRAWINGS = {
+    "Bake": _bake,
     "BoundaryAngles": _angles,
     "Collect": _collect,
     "Domain": _domain,
@@ -191,6 +212,7 @@ DRAWINGS = {
     "Panels": _panels,
     "Pattern": _pattern,
     "Send": _send,
+    "Singularities": _singularities,
     "StartServer": _server,
     "Support": _support,
 }

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from grasshopper import archive
+from grasshopper import archive, components
 
 ROOT = Path(__file__).resolve().parents[2]
 HEADLESS = Path(__file__).parent / "headless"
@@ -27,19 +27,33 @@ Runner = Callable[[str, dict[str, str]], None]
 
 @pytest.fixture(scope="session")
 def unpacked(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with the code and the parameter names out of every built ``.ghuser``."""
+    """A folder per form with the code and the parameters out of every built ``.ghuser``."""
     folder = tmp_path_factory.mktemp("components")
-    for path in DIST.glob("*.ghuser"):
-        inner = archive.inflate(archive.inflate(path.read_bytes())["Object"])
-        data = inner.find("ParameterData")
-        name = path.stem.removeprefix("hexwrap-")
-        (folder / f"{name}.py").write_text(inner["CodeInput"], encoding="ascii")
-        names = {
-            "inputs": [c["NickName"] for c in data.chunks if c.name == "InputParam"],
-            "outputs": [c["NickName"] for c in data.chunks if c.name == "OutputParam"],
-        }
-        (folder / f"{name}.json").write_text(json.dumps(names), encoding="utf-8")
+    for form in components.FORMS:
+        (folder / form.name).mkdir()
+        for path in (DIST / form.name).glob("*.ghuser"):
+            unpack(path, form, folder / form.name)
     return folder
+
+
+def unpack(path: Path, form: components.Form, folder: Path) -> None:
+    inner = archive.inflate(archive.inflate(path.read_bytes())["Object"])
+    data = inner.find("ParameterData")
+    inputs = [c for c in data.chunks if c.name == "InputParam"]
+    name = path.stem.removeprefix("hexwrap-")
+    code = components.code_of(inner)
+    assert code is not None
+    (folder / f"{name}.py").write_text(code, encoding="ascii")
+    hint = {guid: word for word, guid in form.hints.items()}
+    # The new form takes its variables from the names, the old one from the nicknames.
+    key = "NickName" if form is components.RHINO7 else "Name"
+    described = {
+        "inputs": [c[key] for c in inputs],
+        "outputs": [c[key] for c in data.chunks if c.name == "OutputParam"],
+        "hints": {c[key]: hint[c["TypeHintID"]] for c in inputs},
+        "lists": [c[key] for c in inputs if c["ScriptParamAccess"] == 1],
+    }
+    (folder / f"{name}.json").write_text(json.dumps(described), encoding="utf-8")
 
 
 SERVE = (
@@ -90,10 +104,14 @@ def is_ready(port: int) -> bool:
 
 @pytest.fixture(params=["cpython", "jython"])
 def run_scenarios(request: pytest.FixtureRequest, unpacked: Path) -> Runner:
-    """Runs a file of scenarios in another interpreter; its failures are this test's."""
+    """Runs a file of scenarios in another interpreter; its failures are this test's.
+
+    Each runs the form that its Rhino has: IronPython's rules for Rhino 7, Python.NET's for Rhino 8.
+    """
     if request.param == "cpython":
-        command = [sys.executable]
+        command, form = [sys.executable], components.RHINO8
     else:
+        form = components.RHINO7
         found = shutil.which("jython")
         if found is None:
             pytest.skip(
@@ -101,7 +119,11 @@ def run_scenarios(request: pytest.FixtureRequest, unpacked: Path) -> Runner:
             )
         command = [found]
 
-    settings = {"HEXWRAP_BUILT": str(unpacked), "HEXWRAP_PYTHON": sys.executable}
+    settings = {
+        "HEXWRAP_BUILT": str(unpacked / form.name),
+        "HEXWRAP_RULES": form.name,
+        "HEXWRAP_PYTHON": sys.executable,
+    }
 
     def run(name: str, environment: dict[str, str]) -> None:
         done = subprocess.run(

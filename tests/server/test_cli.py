@@ -12,9 +12,11 @@ import rhino3dm
 from hexwrap_server import __version__, samples
 from hexwrap_server.cli.local import task
 from hexwrap_server.cli.main import ENDINGS, file_kind, main, make_parser
-from hexwrap_server.cli.options import ANGLES, OPTIONS, SUPPORT, field_paths
+from hexwrap_server.cli.options import OPTIONS
+from hexwrap_server.input.form import Body, leaves
 from hexwrap_server.input.schemas import parse_request
 from hexwrap_server.output.writers import WRITERS
+from hexwrap_solver.surface.types import SurfaceSettings
 
 TUBE_ROWS, TUBE_COLUMNS = 9, 24
 
@@ -43,7 +45,9 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_every_field_of_a_request_has_an_option() -> None:
-    assert sorted([*(option.path for option in OPTIONS), ANGLES, SUPPORT]) == sorted(field_paths())
+    settings = [*leaves(Body), *leaves(SurfaceSettings, ("surface",))]
+    assert [option.path for option in OPTIONS] == [leaf.path for leaf in settings]
+    assert len({option.flag for option in OPTIONS}) == len(OPTIONS)
 
 
 def test_every_file_of_the_service_has_an_ending() -> None:

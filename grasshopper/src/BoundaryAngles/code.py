@@ -79,28 +79,27 @@ def boundary_text(points, degrees, unit):
     """The boundary of a request, in the unit that was typed, so that no digit is lost."""
     wire_unit, factor = ("rad", math.pi / 180.0) if unit == "rad" else ("deg", 1.0)
     corners = [{"point": [p.X, p.Y, p.Z], "angle": a * factor} for p, a in zip(points, degrees)]
-    return json.dumps({"boundary": {"mode": "angles", "angle_unit": wire_unit, "angles": corners}})
+    return json_text({"boundary": {"mode": "angles", "angle_unit": wire_unit, "angles": corners}})
+
+
+def solve():
+    offer(component, {"Unit": UNITS})
+    given = [p for p in Points or [] if p is not None]
+    if not given:
+        component.Message = "no corners"
+        remark(component, "Points is empty: wire points on the boundary and an angle for each.")
+        return None, None, None, []
+    unit = choice(Unit, UNITS, "Unit") or "deg"
+    degrees = corner_angles(given, list(Angle or []), unit)
+    loops = boundary_of(Mesh) if Mesh is not None else []
+    places = snapped(given, loops) if loops else []
+    corners = [corner for corner, _ in places] or given
+    balance, missing = balance_text(degrees, [number for _, number in places])
+    component.Message = "balanced" if missing == 0.0 else "%+g deg missing" % round(missing, 3)
+    if missing != 0.0:
+        warning(component, balance)
+    return boundary_text(corners, degrees, unit), balance, missing, corners
 
 
 component = ghenv.Component
-offer(component, {"Unit": UNITS})
-Angles, Balance, Missing, Corners = None, None, None, []
-
-if not Points:
-    component.Message = "no corners"
-    remark(component, "Points is empty: wire points on the boundary and an angle for each.")
-else:
-    try:
-        unit = choice(Unit, UNITS, "Unit") or "deg"
-        degrees = corner_angles(list(Points), list(Angle or []), unit)
-        loops = boundary_of(Mesh) if Mesh is not None else []
-        places = snapped(Points, loops) if loops else []
-        Corners = [corner for corner, _ in places] or list(Points)
-        Balance, Missing = balance_text(degrees, [number for _, number in places])
-        Angles = boundary_text(Corners, degrees, unit)
-        component.Message = "balanced" if Missing == 0.0 else "%+g deg missing" % round(Missing, 3)
-        if Missing != 0.0:
-            warning(component, Balance)
-    except Refusal as refused:
-        component.Message = "failed"
-        fail(component, refused.message)
+Angles, Balance, Missing, Corners = solved(component, solve, 4)

@@ -15,7 +15,7 @@ def collect(token, url):
         raise Refusal("This job has no panels: it was sent without a pattern or without panels.")
     panels, pattern, sizes = result["panels"], result["pattern"], result["sizes"]
     token.say("%d panels" % len(panels["polygons"]))
-    place = [(pattern["ring"][cell], pattern["place"][cell]) for cell in panels["face"]]
+    place = places(pattern, panels["face"])
     order = sorted(range(len(place)), key=lambda k: place[k])
     label_of = dict(zip(panels["face"], panels["label"]))
 
@@ -25,6 +25,8 @@ def collect(token, url):
             branches.setdefault(place[k][0], []).append(value(k))
         return tree_of(branches)
 
+    index = pattern.get("index") or [0] * len(pattern["faces"])
+    groups = by_size(panels["size"])
     frames = [frame(points, panels["normal"][k]) for k, points in enumerate(panels["polygons"])]
     flat = [flattened(points, frames[k]) for k, points in enumerate(panels["polygons"])]
     return {
@@ -38,8 +40,27 @@ def collect(token, url):
         "gaps": tree(lambda k: panels["gap_tangential"][k] if panels["gap_tangential"] else None),
         "convex": tree(lambda k: is_convex(flat[k])),
         "neighbours": tree(lambda k: neighbour_labels(pattern["neighbours"][panels["face"][k]], label_of)),
+        "index": tree(lambda k: index[panels["face"][k]]),
+        "shapes": [joined([panels["polygons"][k] for k in rows]) for _, rows in groups],
+        "shape_colours": [size_colour(sizes, size) for size, _ in groups],
         "report": report(result),
     }
+
+
+def places(pattern, cells):
+    """(ring, place in it) of each panel; without rings everything is one ring."""
+    rings, numbers = pattern.get("ring"), pattern.get("place")
+    if not rings or not numbers:
+        return [(0, k) for k in range(len(cells))]
+    return [(rings[cell], numbers[cell]) for cell in cells]
+
+
+def by_size(sizes):
+    """(size, its panels), cut panels without a size last."""
+    found = {}
+    for k, size in enumerate(sizes):
+        found.setdefault(size, []).append(k)
+    return sorted(found.items(), key=lambda item: (item[0] < 0, item[0]))
 
 
 def frame(points, normal):
@@ -115,25 +136,24 @@ def percent(fraction):
     return None if fraction is None else 100.0 * fraction
 
 
+RESULTS = [
+    "panels", "labels", "sizes", "colours", "planes", "outlines", "planarity",
+    "gaps", "convex", "neighbours", "index", "shapes", "shape_colours", "report",
+]  # fmt: skip
+
+
+def solve():
+    slot = slot_of(component)
+    if not Job:
+        stop(slot)
+        component.Message = "no job yet"
+    else:
+        in_background(component, slot, TEXT(Job), lambda token, url=TEXT(Job): collect(token, url))
+        state_message(component, slot, "collected")
+    found = slot["result"] or {}
+    return [found.get(name) for name in RESULTS]
+
+
 component = ghenv.Component
-slot = slot_of(component)
-
-if not Job:
-    stop(slot)
-    component.Message = "no job yet"
-else:
-    in_background(component, slot, TEXT(Job), lambda token, url=TEXT(Job): collect(token, url))
-    state_message(component, slot, "collected")
-
-found = slot["result"] or {}
-Panels = found.get("panels")
-Labels = found.get("labels")
-Sizes = found.get("sizes")
-Colours = found.get("colours")
-Planes = found.get("planes")
-Outlines = found.get("outlines")
-Planarity = found.get("planarity")
-Gaps = found.get("gaps")
-Convex = found.get("convex")
-Neighbours = found.get("neighbours")
-Report = found.get("report")
+Panels, Labels, Sizes, Colours, Planes, Outlines, Planarity, \
+    Gaps, Convex, Neighbours, Index, Shapes, ShapeColours, Report = solved(component, solve, len(RESULTS))

@@ -120,20 +120,17 @@ def summary(unrolled):
     return "cone of %.6g degrees" % degrees
 
 
+def solve():
+    slot = slot_of(component)
+    if not Job:
+        stop(slot)
+        component.Message = "no job yet"
+    else:
+        in_background(component, slot, TEXT(Job), lambda token, url=TEXT(Job): domain(token, url))
+        state_message(component, slot, "unrolled")
+    found = slot["result"] or {}
+    return [found.get(name) for name in ("boundary", "cut", "corners", "angles", "pattern", "summary")]
+
+
 component = ghenv.Component
-slot = slot_of(component)
-
-if not Job:
-    stop(slot)
-    component.Message = "no job yet"
-else:
-    in_background(component, slot, TEXT(Job), lambda token, url=TEXT(Job): domain(token, url))
-    state_message(component, slot, "unrolled")
-
-found = slot["result"] or {}
-Boundary = found.get("boundary")
-Cut = found.get("cut")
-Corners = found.get("corners")
-CornerAngles = found.get("angles")
-Pattern = found.get("pattern")
-Summary = found.get("summary")
+Boundary, Cut, Corners, CornerAngles, Pattern, Summary = solved(component, solve, 6)

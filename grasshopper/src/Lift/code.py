@@ -62,25 +62,29 @@ def runs(inside):
     return found
 
 
-def request(component, slot):
-    drawn = [samples(curve, int(Steps or STEPS)) for curve in Curves]
+def request(slot, curves):
+    drawn = [samples(curve, int(Steps or STEPS)) for curve in curves]
     url = TEXT(Job)
-    in_background(component, slot, (url, json.dumps(drawn)), lambda token: lift(token, url, drawn))
+    in_background(component, slot, (url, json_text(drawn)), lambda token: lift(token, url, drawn))
+
+
+def solve():
+    slot = slot_of(component)
+    curves = [curve for curve in Curves or [] if curve is not None]
+    if not Job or not curves:
+        stop(slot)
+        component.Message = "no curves" if Job else "no job yet"
+    else:
+        request(slot, curves)
+        state_message(component, slot, "lifted")
+    found = slot["result"] or {}
+    if found.get("outside"):
+        warning(
+            component,
+            "%d points lie outside of the unrolled domain and were left out." % len(found["outside"]),
+        )
+    return found.get("curves"), found.get("normals"), found.get("outside")
 
 
 component = ghenv.Component
-slot = slot_of(component)
-
-if not Job or not Curves:
-    stop(slot)
-    component.Message = "no curves" if Job else "no job yet"
-else:
-    request(component, slot)
-    state_message(component, slot, "lifted")
-
-found = slot["result"] or {}
-Lifted = found.get("curves")
-Normals = found.get("normals")
-Outside = found.get("outside")
-if Outside:
-    warning(component, "%d points lie outside of the unrolled domain and were left out." % len(Outside))
+Lifted, Normals, Outside = solved(component, solve, 3)

@@ -54,13 +54,12 @@ def panel_settings():
     return chosen
 
 
-component = ghenv.Component
-offer(component, {"Mode": MODES, "Target": TARGETS, "Orientation": LIES, "Method": METHODS})
-Panels = None
-try:
+def solve():
+    offer(component, {"Mode": MODES, "Target": TARGETS, "Orientation": LIES, "Method": METHODS})
     chosen = panel_settings()
-    Panels = json.dumps({"panels": chosen, "support": bool(BeamDepth)}, sort_keys=True)
     component.Message = chosen.get("mode", "split")
-except Refusal as refused:
-    component.Message = "failed"
-    fail(component, refused.message)
+    return (json_text({"panels": chosen, "support": bool(BeamDepth)}),)
+
+
+component = ghenv.Component
+(Panels,) = solved(component, solve, 1)

@@ -42,13 +42,12 @@ def pattern_settings():
     )
 
 
-component = ghenv.Component
-offer(component, {"Kind": KINDS, "Align": ALIGN, "Boundary": EDGES, "Rotation": TURNS[:2]})
-Pattern = None
-try:
+def solve():
+    offer(component, {"Kind": KINDS, "Align": ALIGN, "Boundary": EDGES, "Rotation": TURNS[:2]})
     chosen = pattern_settings()
-    Pattern = json.dumps({"pattern": chosen}, sort_keys=True)
     component.Message = chosen.get("kind", "hex")
-except Refusal as refused:
-    component.Message = "failed"
-    fail(component, refused.message)
+    return (json_text({"pattern": chosen}),)
+
+
+component = ghenv.Component
+(Pattern,) = solved(component, solve, 1)

@@ -11,7 +11,7 @@ MODES = ["straight", "angles", "isometric", "isometric optimal"]
 
 
 def part_of_request(text, name):
-    """What Boundary Angles, Pattern or Panels put out. Raises Refusal."""
+    """What Boundary Angles, Pattern, Panels or Singularities put out. Raises Refusal."""
     try:
         part = json.loads(text)
     except (ValueError, TypeError):
@@ -21,10 +21,10 @@ def part_of_request(text, name):
     return part
 
 
-def request_body(mode, angles, pattern, panels, name):
-    """Everything of the request but the surface. Raises Refusal."""
+def request_body(mode, parts, name):
+    """Everything of the request but the surface. parts: (text, key of the request). Raises Refusal."""
     body = {"name": TEXT(name) if name else "grasshopper"}
-    for text, key in ((angles, "boundary"), (pattern, "pattern"), (panels, "panels")):
+    for text, key in parts:
         if text:
             body.update(part_of_request(text, key))
     mode = choice(mode, MODES, "Mode")
@@ -77,7 +77,7 @@ def post(token, slot, server, key, geometry, body):
     return call_json(server, "POST", "/v1/jobs", request, timeout=SLOW)["id"]
 
 
-def solve(token, slot, server, key, geometry, body, limit):
+def send(token, slot, server, key, geometry, body, limit):
     """Work of the background thread: the address and the summary of the finished job."""
     give_up_at = time.time() + limit if limit else None
     for _ in range(3):
@@ -111,41 +111,46 @@ def summary(job, slot):
     return "\n".join(lines + ["repair: " + text for text in slot.get("repairs") or []])
 
 
-def request(component, slot):
-    server = "http://%s:%d" % (IP or "127.0.0.1", int(Port or 6789))
+def request(slot):
+    if not hasattr(Mesh, "DataCRC"):  # a circle, a line, a box: structures, not geometry with a checksum
+        raise not_a_surface(Mesh)
+    server = "http://%s:%d" % (TEXT(IP).strip() if IP else "127.0.0.1", int(Port or 6789))
     TOKENS[server] = TEXT(Token) if Token else None
-    body = request_body(Mode, Angles, Pattern, Panels, Name)
+    parts = ((Angles, "boundary"), (Pattern, "pattern"), (Panels, "panels"), (Singularities, "singularities"))
+    body = request_body(Mode, parts, Name)
     key = "%s %d" % (type(Mesh).__name__, Mesh.DataCRC(0))
-    wanted = (server, key, json.dumps(body, sort_keys=True))
+    wanted = (server, key, json_text(body))
     if slot["wanted"] != wanted:
         geometry = Mesh.Duplicate()  # the background thread reads a copy that nobody else changes
         limit = float(TimeOut or 0)
-        work = lambda token: solve(token, slot, server, key, geometry, body, limit)
+        work = lambda token: send(token, slot, server, key, geometry, body, limit)
         in_background(component, slot, wanted, work)
 
 
-component = ghenv.Component
-slot = slot_of(component)
-listen_for_escape(slot, component)
-offer(component, {"Mode": MODES})
-Faults, FaultEdges = [], []
-
-if not Run:
-    stop(slot)
-    component.Message = "Run is off"
-elif Mesh is None:
-    stop(slot)
-    component.Message = "no mesh"
-    warning(component, "Mesh is empty: wire a mesh or a surface that runs around like a tube.")
-else:
-    try:
-        request(component, slot)
-    except Refusal as refused:
+def solve():
+    slot = slot_of(component)
+    listen_for_escape(slot, component)
+    offer(component, {"Mode": MODES})
+    faults, fault_edges = [], []
+    if not Run:
         stop(slot)
-        slot["error"] = refused
-    if slot["error"] is not None and slot.get("sent"):
-        Faults, FaultEdges = faulty_geometry(slot["error"].problem, *slot["sent"])
-    state_message(component, slot, "done")
+        component.Message = "Run is off"
+    elif Mesh is None:
+        stop(slot)
+        component.Message = "no mesh"
+        warning(component, "Mesh is empty: wire a mesh or a surface.")
+    else:
+        try:
+            request(slot)
+        except Exception as fault:
+            stop(slot)
+            slot["error"] = as_refusal(fault)
+        if slot["error"] is not None and slot.get("sent"):
+            faults, fault_edges = faulty_geometry(slot["error"].problem, *slot["sent"])
+        state_message(component, slot, "done")
+    last = slot["result"] or {}
+    return last.get("job"), last.get("status") or component.Message, faults, fault_edges
 
-Job = slot["result"]["job"] if slot["result"] else None
-Status = slot["result"]["status"] if slot["result"] else component.Message
+
+component = ghenv.Component
+Job, Status, Faults, FaultEdges = solved(component, solve, 4)

@@ -83,7 +83,7 @@ def start_server(token, server, port, program):
     )
 
 
-def request(component, slot):
+def request(slot):
     port = int(Port or 6789)
     server = "http://127.0.0.1:%d" % port
     program = TEXT(Program) if Program else None
@@ -92,16 +92,17 @@ def request(component, slot):
     )
 
 
+def solve():
+    slot = slot_of(component)
+    if not Start:
+        stop(slot)
+        slot["result"] = None
+        component.Message = "Start is off"
+    else:
+        request(slot)
+        state_message(component, slot, "running")
+    return slot["result"] or component.Message, slot["result"] is not None
+
+
 component = ghenv.Component
-slot = slot_of(component)
-
-if not Start:
-    stop(slot)
-    slot["result"] = None
-    component.Message = "Start is off"
-else:
-    request(component, slot)
-    state_message(component, slot, "running")
-
-Status = slot["result"] or component.Message
-Running = slot["result"] is not None
+Status, Running = solved(component, solve, 2)

@@ -21,20 +21,17 @@ def support(token, url):
     }
 
 
+def solve():
+    slot = slot_of(component)
+    if not Job:
+        stop(slot)
+        component.Message = "no job yet"
+    else:
+        in_background(component, slot, TEXT(Job), lambda token, url=TEXT(Job): support(token, url))
+        state_message(component, slot, "collected")
+    found = slot["result"] or {}
+    return [found.get(name) for name in ("nodes", "axes", "beams", "lines", "torsion", "tilt")]
+
+
 component = ghenv.Component
-slot = slot_of(component)
-
-if not Job:
-    stop(slot)
-    component.Message = "no job yet"
-else:
-    in_background(component, slot, TEXT(Job), lambda token, url=TEXT(Job): support(token, url))
-    state_message(component, slot, "collected")
-
-found = slot["result"] or {}
-Nodes = found.get("nodes")
-Axes = found.get("axes")
-Beams = found.get("beams")
-Lines = found.get("lines")
-Torsion = found.get("torsion")
-Tilt = found.get("tilt")
+Nodes, Axes, Beams, Lines, Torsion, Tilt = solved(component, solve, 6)

@@ -87,10 +87,11 @@ def cancel(slot, component):
     component.OnDisplayExpired(True)
 
 
-def in_background(component, slot, wanted, work):
+def in_background(component, slot, wanted, work, finish=None):
     """Has work(token) done in a thread, once per request; the component is solved again when it ended.
 
     A request that is running, finished or failed already is not started again; another one supersedes it.
+    finish(result) is what only the user interface's thread may do with it; it returns the result to keep.
     """
     if slot["wanted"] == wanted:
         return
@@ -107,10 +108,8 @@ def in_background(component, slot, wanted, work):
             result = work(token)
         except Superseded:
             return
-        except Refusal as refused:
-            error = refused
-        except Exception as unexpected:
-            error = Refusal("Unexpected %s: %s" % (type(unexpected).__name__, unexpected))
+        except Exception as fault:
+            error = as_refusal(fault)
 
         def settle():  # on the UI thread, where requests are made: no race with a newer one
             if token.stale():
@@ -118,7 +117,10 @@ def in_background(component, slot, wanted, work):
             slot["busy"] = False
             slot["error"] = error
             if error is None:
-                slot["result"] = result
+                try:
+                    slot["result"] = finish(result) if finish else result
+                except Exception as fault:
+                    slot["error"] = as_refusal(fault)
             solve_again(component)
 
         on_ui_thread(settle)
@@ -126,6 +128,26 @@ def in_background(component, slot, wanted, work):
     thread = threading.Thread(target=run)
     thread.daemon = True
     thread.start()
+
+
+def as_refusal(fault):
+    """Any exception as one sentence for the balloon."""
+    if isinstance(fault, Refusal):
+        return fault
+    return Refusal(
+        "hexwrap did not expect this (%s: %s). Check what is wired to the inputs; if it is right, please report it."
+        % (type(fault).__name__, words_of(fault))
+    )
+
+
+def solved(component, solve, count):
+    """What solve() puts out; after a fault, ``count`` times nothing and one sentence in the balloon."""
+    try:
+        return solve()
+    except Exception as fault:
+        component.Message = "failed"
+        fail(component, as_refusal(fault).message)
+        return (None,) * count
 
 
 def solve_again(component):
@@ -180,5 +202,10 @@ def tree_of(branches):
     for number in sorted(branches):
         path = Grasshopper.Kernel.Data.GH_Path(number)
         for item in branches[number]:
-            tree.Add(item, path)
+            tree.Add(boxed(item), path)
     return tree
+
+
+def boxed(item):
+    """Whole numbers as .NET's own: where an object is taken, CPython would hand over one of Python's."""
+    return System.Int32(item) if type(item) is int else item

@@ -25,6 +25,8 @@ def offer(component, choices):
     document = component.OnPingDocument()
     for parameter in component.Params.Input:
         for source in parameter.Sources:
+            # CPython sees no more than the interface that the list of sources promises.
+            source = getattr(source, "__implementation__", source)
             items = getattr(source, "ListItems", None)
             if parameter.Name not in choices or items is None:
                 continue

@@ -10,7 +10,7 @@ def as_mesh(geometry):
     if brep is None and hasattr(geometry, "ToBrep"):
         brep = geometry.ToBrep()
     if brep is None:
-        raise Refusal("Mesh must be a mesh or a surface, not %s." % type(geometry).__name__)
+        raise not_a_surface(geometry)
     settings = Rhino.Geometry.MeshingParameters()
     settings.GridMinCount = 2000  # a straight cylinder would otherwise become a single row of quads
     settings.GridAspectRatio = 1.0
@@ -21,6 +21,10 @@ def as_mesh(geometry):
     if joined.Faces.Count == 0:
         raise Refusal("Rhino could not mesh this surface. Repair it, or mesh it yourself and wire the mesh.")
     return joined, joined.Normals if joined.Normals.Count == joined.Vertices.Count else None
+
+
+def not_a_surface(geometry):
+    return Refusal("Mesh must be a mesh or a surface, not %s." % type(geometry).__name__)
 
 
 def mesh_arrays(mesh):
@@ -63,6 +67,33 @@ def polyline(points):
 
 def closed_polyline(points):
     return polyline(list(points) + [points[0]])
+
+
+def joined(polygons):
+    """One mesh of flat polygons, each a fan around its own centre: what shades in one colour."""
+    mesh = Rhino.Geometry.Mesh()
+    start = 0
+    for points in polygons:
+        n = len(points)
+        centre = [sum(p[i] for p in points) / float(n) for i in range(3)]
+        for p in [centre] + list(points):
+            mesh.Vertices.Add(float(p[0]), float(p[1]), float(p[2]))
+        for k in range(n):
+            mesh.Faces.AddFace(start, start + 1 + k, start + 1 + (k + 1) % n)
+        start += n + 1
+    mesh.Normals.ComputeNormals()
+    return mesh
+
+
+def triangles(points, corners):
+    """A mesh from points and corner numbers, three to a triangle, in one row."""
+    mesh = Rhino.Geometry.Mesh()
+    for p in points:
+        mesh.Vertices.Add(float(p[0]), float(p[1]), float(p[2]))
+    for k in range(0, len(corners), 3):
+        mesh.Faces.AddFace(corners[k], corners[k + 1], corners[k + 2])
+    mesh.Normals.ComputeNormals()
+    return mesh
 
 
 def colour(text):

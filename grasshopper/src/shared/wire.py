@@ -73,15 +73,29 @@ def call(server, method, path, body=None, kind="application/json", timeout=QUICK
             error.close()
         raise refusal(error.code, content)
     except (EnvironmentError, socket.error, HTTPException) as error:  # refused, reset, timed out, cut short
-        if isinstance(error, socket.timeout) or "timed out" in TEXT(error):
+        if isinstance(error, socket.timeout) or "timed out" in words_of(error):
             raise Offline("The server at %s did not answer within %g seconds." % (server, timeout))
         raise offline(server)
 
 
 def call_json(server, method, path, document=None, timeout=QUICK):
-    body = None if document is None else json.dumps(document).encode("ascii")
+    body = None if document is None else json_text(document).encode("utf-8")
     content = call(server, method, path, body, timeout=timeout)
     return json.loads(content.decode("utf-8")) if content else None
+
+
+def json_text(document):
+    """JSON with every letter as it is: IronPython, whose str holds any letter, takes those beyond ASCII for
+    bytes when it is to escape them, and fails."""
+    return json.dumps(document, ensure_ascii=False, sort_keys=True)
+
+
+def words_of(error):
+    """What an exception says; Python 2 may hold it as bytes of the system's own language."""
+    try:
+        return TEXT(error)
+    except UnicodeError:
+        return str(error).decode("utf-8", "replace")  # novermin
 
 
 def refusal(status, content):

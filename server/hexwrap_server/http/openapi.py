@@ -6,7 +6,8 @@ from typing import Any
 
 from hexwrap_server.http.openapi_result import RESULT as _RESULT
 from hexwrap_server.http.schema_words import NUMBER, PLANE, POINT, listed, nullable, record
-from hexwrap_server.input.schemas import Body, Meshing
+from hexwrap_server.input.form import Body, schema
+from hexwrap_solver.surface.types import MeshSettings
 
 _MESH = record(
     ("vertices", "faces"),
@@ -26,7 +27,7 @@ _NURBS = record(
         control_points=listed(listed(listed(NUMBER) | {"minItems": 3, "maxItems": 4})),
         closed=listed({"type": "boolean"}, 2),
     ),
-    mesh=nullable(Meshing.model_json_schema()),
+    mesh=nullable(schema(MeshSettings)),
 )
 _SURFACE = {"anyOf": [_MESH, _NURBS, record(("id",), more=False, id={"type": "string"})]}
 
@@ -73,25 +74,8 @@ def _route(answers: dict[str, Any], body: dict[str, Any] | None = None) -> dict[
 
 def _request_schema() -> dict[str, Any]:
     """The request with its definitions inside, so that it can stand anywhere in the document."""
-    schema = _inlined(Body.model_json_schema())
-    schema["properties"] = {"surface": _SURFACE} | schema["properties"]
-    schema["required"] = ["surface"]
-    return schema
-
-
-def _inlined(schema: dict[str, Any]) -> dict[str, Any]:
-    definitions = schema.pop("$defs", {})
-
-    def resolve(part: Any) -> Any:
-        if isinstance(part, dict):
-            if "$ref" in part:
-                target = resolve(definitions[part["$ref"].rpartition("/")[2]])
-                return target | {k: v for k, v in part.items() if k != "$ref"}
-            return {k: resolve(v) for k, v in part.items()}
-        return [resolve(p) for p in part] if isinstance(part, list) else part
-
-    resolved: dict[str, Any] = resolve(schema)
-    return resolved
+    rest = schema(Body)
+    return rest | {"properties": {"surface": _SURFACE} | rest["properties"], "required": ["surface"]}
 
 
 _BODY_FAULTS = (400, 413, 415)

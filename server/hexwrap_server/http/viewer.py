@@ -18,7 +18,7 @@ from hexwrap_server.http import openapi
 from hexwrap_server.http.answers import json_response, packed_response
 from hexwrap_server.http.bodies import read_body
 from hexwrap_server.http.routes import JobId, service_of
-from hexwrap_server.input.recall import request_document
+from hexwrap_server.input.form import document
 from hexwrap_server.input.uploads import sent_file
 from hexwrap_server.jobs.worker import Report
 from hexwrap_server.problems import body_is_the_surface, not_found
@@ -73,7 +73,7 @@ async def job_request(request: Request, id: JobId) -> Response:
     work = service.store.work(job.identity)
     if work is None:
         raise not_found("request", "The request of this job is no longer kept.")
-    return json_response(request_document(job.name, work.surface, work.wanted))
+    return json_response({"name": job.name, "surface": {"id": work.surface}} | document(work.wanted))
 
 
 @router.post("/v1/surfaces/preview", openapi_extra=openapi.PREVIEW)

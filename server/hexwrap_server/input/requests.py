@@ -5,29 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from hexwrap_solver.conformal.types import BoundaryCondition
-from hexwrap_solver.panels.types import PanelSettings
-from hexwrap_solver.pattern.types import PatternSettings
-from hexwrap_solver.surface.types import MeshSettings, NurbsSurface, SentMesh
+from hexwrap_solver.pipeline import SolveSettings
+from hexwrap_solver.surface.types import NurbsSurface, SentMesh, SurfaceSettings
 
 
 @dataclass(frozen=True)
 class SentSurface:
-    """A surface as it was sent: a mesh, or a NURBS surface and how to mesh it."""
+    """A surface as it was sent: a mesh or a NURBS surface, and how to take it in."""
 
     mesh: SentMesh | None = None
     nurbs: NurbsSurface | None = None
-    meshing: MeshSettings | None = None
-
-
-@dataclass(frozen=True)
-class Wanted:
-    """What is to be done with a surface; identical for identical work."""
-
-    boundary: BoundaryCondition
-    pattern: PatternSettings | None
-    panels: PanelSettings | None
-    support: bool = False
+    settings: SurfaceSettings = field(default_factory=SurfaceSettings)
 
 
 @dataclass(frozen=True)
@@ -37,7 +25,7 @@ class ParsedRequest:
     name: str
     surface_id: str
     surface: bytes | None
-    wanted: Wanted
+    wanted: SolveSettings
 
 
 @dataclass(frozen=True)
@@ -58,7 +46,7 @@ class Order:
 
     surface_id: str
     surface: bytes | str
-    wanted: Wanted
+    wanted: SolveSettings
     files: tuple[str, str] | None
     job: str = ""
 

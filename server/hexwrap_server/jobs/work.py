@@ -10,7 +10,7 @@ from pathlib import Path
 
 from hexwrap_server import logs
 from hexwrap_server.input.json_text import loads
-from hexwrap_server.input.requests import CacheSettings, Intake, Order, Outcome, SentSurface, Wanted
+from hexwrap_server.input.requests import CacheSettings, Intake, Order, Outcome, SentSurface
 from hexwrap_server.input.schemas import parse_surface
 from hexwrap_server.jobs import codec, later
 from hexwrap_server.jobs.cache import CachingRunner, StageCache
@@ -22,6 +22,7 @@ from hexwrap_server.output.writers import WRITERS, Meta
 from hexwrap_server.problems import FormError, body_is_the_surface
 from hexwrap_solver import pipeline
 from hexwrap_solver.errors import HexwrapError
+from hexwrap_solver.pipeline import SolveSettings
 from hexwrap_solver.surface import surface_from_mesh, surface_from_nurbs
 from hexwrap_solver.surface.types import Surface
 
@@ -76,23 +77,20 @@ def _sent(order: Order) -> SentSurface:
     return sent
 
 
-def run_stages(sent: SentSurface, wanted: Wanted, runner: CachingRunner) -> pipeline.Solution:
+def run_stages(sent: SentSurface, wanted: SolveSettings, runner: CachingRunner) -> pipeline.Solution:
     """A sent surface and what is wanted of it → the solution. Raises HexwrapError."""
     return _staged(codec.digest(sent), lambda: sent, wanted, runner)
 
 
 def _staged(
-    surface_id: str, sent: Callable[[], SentSurface], wanted: Wanted, runner: CachingRunner
+    surface_id: str, sent: Callable[[], SentSurface], wanted: SolveSettings, runner: CachingRunner
 ) -> pipeline.Solution:
     """sent: asked only where the checked surface is not remembered."""
     return pipeline.solve(
         lambda: take_in(sent()),
-        wanted.boundary,
-        wanted.pattern,
-        wanted.panels,
+        wanted,
         runner,
         source=surface_id,
-        with_support=wanted.support,
     )
 
 
@@ -101,7 +99,7 @@ def take_in(sent: SentSurface) -> Surface:
     if sent.mesh is not None:
         return surface_from_mesh(sent.mesh)
     assert sent.nurbs is not None
-    return surface_from_nurbs(sent.nurbs, sent.meshing)
+    return surface_from_nurbs(sent.nurbs, sent.settings.mesh)
 
 
 @body_is_the_surface()

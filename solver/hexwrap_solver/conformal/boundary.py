@@ -90,7 +90,7 @@ def spread_evenly(angles: Floats, curvature: float) -> Floats:
             raise BoundaryError(
                 f"The angles of a boundary loop of {len(angles)} vertices sum to {total:.4g} rad, too "
                 f"little to turn by {-missing:.4g} rad to a quantized cone angle; send a finer mesh.",
-                field=("boundary", "quantum"),
+                field=("quantum",),
             )
         return np.asarray(angles * (1 + missing / total))
     change = np.zeros_like(angles)

@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 
 from hexwrap_solver.arrays import Bools, Floats, Ints
 from hexwrap_solver.conformal.boundary import nearest_multiple
-from hexwrap_solver.conformal.types import ANGLE_UNITS, AngleUnit, BoundaryCondition
+from hexwrap_solver.conformal.types import ANGLE_UNITS, QUANTA, AngleUnit, BoundaryAngle, BoundaryCondition
 from hexwrap_solver.errors import BoundaryError, GaussBonnetError
 from hexwrap_solver.surface.types import Surface
 
@@ -22,21 +22,21 @@ def boundary_angles(surface: Surface, condition: BoundaryCondition) -> tuple[Flo
     each loop's sum is that near to a multiple of the quantum, loop by loop, so that K is a multiple.
     Raises BoundaryError (vertices or angles that cannot be used), GaussBonnetError (equation (1) fails).
     """
-    angles = np.zeros(0) if condition.angles is None else np.asarray(condition.angles, dtype=float)
-    _check_angles(angles, condition.unit)
-    vertices = _place(surface, condition, len(angles))
+    unit, angles = condition.angle_unit, np.array([entry.angle for entry in condition.angles], dtype=float)
+    _check_angles(angles, unit)
+    vertices = _place(surface, condition.angles)
     target = np.full(len(surface.vertices), np.pi)
     target[vertices] = angles
     listed = np.zeros(len(surface.vertices), dtype=bool)
     listed[vertices] = True
     sums = [float((np.pi - target[loop]).sum()) for loop in surface.loops]
     if abs(sum(sums)) > GAUSS_BONNET_TOLERANCE:
-        raise _gauss_bonnet_error(surface, vertices, angles, sums, condition.unit)
-    return _close(surface, target, listed, sums, condition.quantum)
+        raise _gauss_bonnet_error(surface, vertices, angles, sums, unit)
+    return _close(surface, target, listed, sums, QUANTA.get(condition.quantum))
 
 
 def _field(i: int, name: str) -> tuple[str | int, ...]:
-    return ("boundary", "angles", int(i), name)
+    return ("angles", int(i), name)
 
 
 def _told(angle: float, unit: AngleUnit, digits: int = 6) -> str:
@@ -56,17 +56,16 @@ def _check_angles(angles: Floats, unit: AngleUnit) -> None:
         )
 
 
-def _place(surface: Surface, condition: BoundaryCondition, k: int) -> Ints:
+def _place(surface: Surface, entries: tuple[BoundaryAngle, ...]) -> Ints:
     """(k,) mesh vertices the listed angles belong to."""
-    if k == 0:
-        return np.zeros(0, dtype=np.int64)
-    sent = np.full(k, -1, dtype=np.int64) if condition.vertices is None else np.asarray(condition.vertices)
-    by_point = sent < 0
-    placed = np.zeros(k, dtype=np.int64)
-    placed[~by_point] = _of_sent(surface, sent, np.flatnonzero(~by_point))
-    if by_point.any():
-        points = np.full((k, 3), np.nan) if condition.points is None else np.asarray(condition.points)
-        placed[by_point] = _nearest(surface, points, np.flatnonzero(by_point))
+    placed = np.zeros(len(entries), dtype=np.int64)
+    sent = np.array([entry.vertex or 0 for entry in entries], dtype=np.int64)
+    points = np.array([entry.point or (np.nan,) * 3 for entry in entries], dtype=float).reshape(-1, 3)
+    is_named = np.array([entry.vertex is not None for entry in entries], dtype=bool)
+    named, by_point = np.flatnonzero(is_named), np.flatnonzero(~is_named)
+    placed[named] = _of_sent(surface, sent, named)
+    if len(by_point):
+        placed[by_point] = _nearest(surface, points, by_point)
     _check_distinct(surface, placed)
     return placed
 
@@ -74,7 +73,7 @@ def _place(surface: Surface, condition: BoundaryCondition, k: int) -> Ints:
 def _of_sent(surface: Surface, sent: Ints, entries: Ints) -> Ints:
     """Vertices of entries that name a sent vertex."""
     wanted = sent[entries]
-    unknown = entries[wanted >= len(surface.vertex_of_input)]
+    unknown = entries[(wanted < 0) | (wanted >= len(surface.vertex_of_input))]
     if len(unknown):
         raise BoundaryError(
             f"Boundary angle {unknown[0]} names vertex {sent[unknown[0]]}, but only vertices 0 to "
@@ -110,7 +109,7 @@ def _nearest(surface: Surface, points: Floats, entries: Ints) -> Ints:
     bad = entries[~np.isfinite(points[entries]).all(axis=1)]
     if len(bad):
         raise BoundaryError(
-            f"Boundary angle {bad[0]} names neither a vertex nor a point with three finite coordinates.",
+            f"The point of boundary angle {bad[0]} has coordinates that are not finite numbers.",
             field=_field(bad[0], "point"),
         )
     boundary = np.concatenate(surface.loops)
@@ -190,6 +189,7 @@ def _gauss_bonnet_error(
         f"make {_told(missing, unit)}{degrees}, so the angles must add up to "
         f"{_told(abs(missing), unit)} {'more' if missing > 0 else 'less'}: {sentence}.",
         vertices=surface.input_vertex[vertices],
+        field=("angles",),
         data={"loop_sums": sums, "missing": missing, "example": example, "example_unit": unit},
     )
 

@@ -15,7 +15,7 @@ from hexwrap_solver.conformal.newton import Minimum, minimise
 from hexwrap_solver.conformal.orientation import faithful, positive
 from hexwrap_solver.conformal.robust import FlatMetric, metric_with_flips, solve_with_flips, with_inserted
 from hexwrap_solver.conformal.span import MAX_SPAN, check_reach, check_span
-from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap, Deck, Targets
+from hexwrap_solver.conformal.types import QUANTA, BoundaryCondition, ConformalMap, Deck, Targets
 from hexwrap_solver.surface.types import Surface
 
 #: Cone angles this near to a multiple of the quantum are one, radians.
@@ -41,7 +41,7 @@ def conformal_map(
     notes: tuple[str, ...] = ()
     if condition.mode == "angles":
         targets = boundary.prescribed(surface, boundary_angles(surface, condition))
-        if condition.angles is None or not len(condition.angles):
+        if not condition.angles:
             notes = (NO_ANGLES,)
     found = _map(surface, targets, None, progress)
     found = replace(found, notes=(*notes, *found.notes))
@@ -51,7 +51,8 @@ def conformal_map(
 def _isometric(surface: Surface, condition: BoundaryCondition, progress: Progress) -> ConformalMap:
     """The paper's two steps: u = 0 on the boundary, then again with the cone angle rounded to the quantum."""
     targets = boundary.isometric(surface)
-    if condition.quantum is None:
+    quantum = QUANTA.get(condition.quantum)
+    if quantum is None:
         return _map(surface, targets, None, progress)
     plain = _plain(surface, targets, None, _part(progress, 0.0))
     first = plain.metric if plain.holds else metric_with_flips(surface, targets, progress, plain.start)
@@ -59,7 +60,7 @@ def _isometric(surface: Surface, condition: BoundaryCondition, progress: Progres
     surface, loops = first.surface, first.surface.loops
     angles = first.sums[loops[0]], first.sums[loops[1]]
     found = (boundary.cone_angle(angles[0]) - boundary.cone_angle(angles[1])) / 2
-    rounded = boundary.nearest_multiple(found, condition.quantum)
+    rounded = boundary.nearest_multiple(found, quantum)
     if condition.spread == "optimal":
         targets = boundary.constant_on_loops(surface, rounded)
     else:

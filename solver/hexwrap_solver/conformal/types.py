@@ -3,18 +3,42 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 
 from hexwrap_solver.arrays import Complexes, Floats, Ints
+from hexwrap_solver.errors import SettingError
+from hexwrap_solver.setting import Setting
 from hexwrap_solver.surface.types import Surface
 
 AngleUnit = Literal["rad", "deg", "pi"]
 #: Radians of one unit.
 ANGLE_UNITS: dict[AngleUnit, float] = {"rad": 1.0, "deg": np.pi / 180, "pi": np.pi}
+Quantum = Literal["auto", "hex", "triangle", "quad", "none"]
+#: Names of the quanta (π/3 and π/2) that the cone angle of a pattern must be a multiple of.
+QUANTUM_OF: dict[str, Quantum] = {"hex": "hex", "triangle": "hex", "quad": "quad"}
+QUANTA: dict[Quantum, float] = {"hex": np.pi / 3, "triangle": np.pi / 3, "quad": np.pi / 2}
+
+
+@dataclass(frozen=True)
+class BoundaryAngle:
+    """A target angle sum, radians, at a boundary vertex: the one of this index in the sent mesh, or the one
+    nearest to a point. Raises SettingError unless exactly one of the two is given."""
+
+    angle: Annotated[float, Setting("target angle sum", unit="angle")]
+    vertex: Annotated[
+        int | None, Setting("boundary vertex, an index of the sent mesh", ge=0, lt=2**53, unit="vertex")
+    ] = None
+    point: Annotated[
+        tuple[float, float, float] | None, Setting("instead: the boundary vertex nearest to this point")
+    ] = None
+
+    def __post_init__(self) -> None:
+        if (self.vertex is None) == (self.point is None):
+            raise SettingError("give either 'vertex' or 'point'")
 
 
 @dataclass(frozen=True)
@@ -23,20 +47,34 @@ class BoundaryCondition:
 
     mode ``straight``: every boundary angle is π. ``angles``: the listed ones, π elsewhere.
     ``isometric``: boundary lengths kept up to scale, the cone angle rounded to a multiple of quantum.
-    vertices: (k,) *sent* vertex indices, −1 where points gives a place instead. points: (k, 3).
-    angles: (k,) radians. unit: in which problems tell of them and give an example.
-    quantum: π/3, π/2, or None to leave the cone angle as it comes.
+    quantum: π/3, π/2 or none, by the pattern that is meant; ``auto``: that of the pattern that is laid.
     spread: how ``isometric`` distributes the rounding: ``even`` (the paper) or ``optimal`` (u constant on
-    each loop).
+    each loop). angle_unit: in which problems give angles; the same condition whatever it is.
     """
 
-    mode: Literal["straight", "angles", "isometric"] = "straight"
-    vertices: Ints | None = None
-    points: Floats | None = None
-    angles: Floats | None = None
-    unit: AngleUnit = "rad"
-    quantum: float | None = None
-    spread: Literal["even", "optimal"] = "even"
+    mode: Annotated[
+        Literal["straight", "angles", "isometric"], Setting("what the boundary becomes in the domain")
+    ] = "straight"
+    angles: Annotated[
+        tuple[BoundaryAngle, ...], Setting("target angles at boundary vertices, for mode angles", most=10_000)
+    ] = ()
+    angle_unit: Annotated[AngleUnit, Setting("unit of the angles", rare=True)] = field(
+        default="rad", compare=False
+    )
+    quantum: Annotated[Quantum, Setting("what the cone angle is a multiple of", rare=True)] = "auto"
+    spread: Annotated[
+        Literal["even", "optimal"], Setting("how an isometric boundary takes up the rounding", rare=True)
+    ] = "even"
+
+    def adapted(self, kind: str | None) -> BoundaryCondition:
+        """The condition for a pattern of this kind (None: no pattern), without what has no effect on the map:
+        equal for equal maps."""
+        name = self.quantum if self.quantum != "auto" else (kind or "none")
+        return replace(
+            self,
+            quantum=QUANTUM_OF.get(name, "none"),
+            angles=self.angles if self.mode == "angles" else (),
+        )
 
 
 @dataclass(frozen=True)

@@ -1,14 +1,18 @@
 """Regular tilings in integers, and the motions that carry them to themselves.
 
 Cells and nodes of a tiling are points of one ring of integers ℤ[ζ], ζ = e^{iπ/3} (hexagons, triangles) or
-ζ = i (quads), told apart by their colour, the residue modulo √−3 (three colours) or 1 + i (two):
+ζ = i (quads), told apart by their coset, the residue modulo √−3 (three cosets) or 1 + i (two):
 
-    hexagons    cell centres: colour 0      nodes: colours 1, 2     edges: units ζ^j
-    triangles   cell centres: colours 1, 2  nodes: colour 0         edges: (1 + ζ)·ζ^j
-    quads       cell centres: colour 1      nodes: colour 0         edges: (1 + i)·i^j
+    hexagons    cell centres: coset 0      nodes: cosets 1, 2     edges: units ζ^j
+    triangles   cell centres: cosets 1, 2  nodes: coset 0         edges: (1 + ζ)·ζ^j
+    quads       cell centres: coset 1      nodes: coset 0         edges: (1 + i)·i^j
 
-A motion p ↦ ζ^k p + τ with τ of colour 0 keeps the colour 0 and so the tiling; its fixed points are exactly
+An isometry p ↦ ζ^k p + τ with τ of coset 0 keeps the coset 0 and so the tiling; its fixed points are exactly
 the centres of 6-, 3-, 2- or 4-fold symmetry that k allows (paper, definition 2). All of it is exact.
+
+An isometry is a row (k, a, b, w): k modulo the order of ζ, τ = a + bζ, and w, an integer that adds up under
+composition and acts on nothing. On annuli it counts turns around the surface, which k and τ cannot tell where
+a power of the deck transformation is the identity; elsewhere it is 0.
 """
 
 from __future__ import annotations
@@ -26,13 +30,13 @@ from hexwrap_solver.pattern.types import Kind
 class Lattice:
     """A point a + bζ is the integer pair (a, b); arrays of points have shape (…, 2).
 
-    order: of the unit ζ. colours: number of residues. first_step: an edge as a lattice vector, direction 0.
+    order: of the unit ζ. cosets: number of residues. first_step: an edge as a lattice vector, direction 0.
     turn: directions by which a face on the left turns left at each of its corners. sides: of a cell.
     """
 
     kind: Kind
     order: int
-    colours: int
+    cosets: int
     first_step: tuple[int, int]
     turn: int
     sides: int
@@ -72,7 +76,7 @@ class Lattice:
 
     @cached_property
     def basis(self) -> Ints:
-        """(2, 2) generators e1, e2 = ζ·e1 of the points of colour 0, the tiling's translations."""
+        """(2, 2) generators e1, e2 = ζ·e1 of the points of coset 0, the tiling's translations."""
         first = np.array([1, 1])
         return np.stack([first, self.rotations[1] @ first])
 
@@ -81,19 +85,59 @@ class Lattice:
         turned = self.rotations[np.asarray(j) % self.order] @ np.asarray(points)[..., None]
         return np.asarray(turned[..., 0])
 
-    def colour(self, points: Ints) -> Ints:
+    def compose(self, outer: Ints, inner: Ints) -> Ints:
+        """(…, 4) the isometries p ↦ outer(inner(p))."""
+        result = outer + inner
+        result[..., 0] %= self.order
+        turned = (outer[..., 0] != 0) & (inner[..., 1:3] != 0).any(axis=-1)
+        if turned.any():
+            rows, steps = np.broadcast_to(outer, result.shape), np.broadcast_to(inner, result.shape)
+            moved = self.rotate(steps[turned][:, 1:3], rows[turned][:, 0])
+            result[turned, 1:3] = rows[turned][:, 1:3] + moved
+        return np.asarray(result)
+
+    def invert(self, isometry: Ints) -> Ints:
+        """(…, 4) the inverse isometries."""
+        result = -isometry
+        result[..., 0] %= self.order
+        turned = result[..., 0] != 0
+        if turned.any():
+            result[turned, 1:3] = self.rotate(result[turned][:, 1:3], result[turned][:, 0])
+        return np.asarray(result)
+
+    def apply(self, isometry: Ints, points: Ints) -> Ints:
+        """(…, 2) images of points (…, 2) under isometries (…, 4)."""
+        return np.asarray(self.rotate(points, isometry[..., 0]) + isometry[..., 1:3])
+
+    def carry(self, isometry: Ints, places: Complexes) -> Complexes:
+        """(…) images of places of the plane under isometries (…, 4)."""
+        k, b = isometry[..., 0], isometry[..., 2]
+        turn = np.exp(1j * self.quantum * np.arange(self.order))[k]
+        return np.asarray(turn * places + (isometry[..., 1] + b * self.unit))
+
+    def partial_products(self, isometry: Ints) -> Ints:
+        """(n + 1, 4) the products of the first 0, 1, …, n of (n, 4) isometries, the first one outermost."""
+        products = np.zeros((len(isometry) + 1, 4), dtype=np.int64)
+        products[1:] = isometry
+        known = 1  # after each round, products[i] is that of the last ``known`` factors up to i
+        while known < len(products):
+            products[known:] = self.compose(products[:-known], products[known:])
+            known *= 2
+        return products
+
+    def coset(self, points: Ints) -> Ints:
         a, b = points[..., 0], points[..., 1]
         return np.asarray((a - b) % 3 if self.order == 6 else (a + b) % 2)
 
     def is_node(self, points: Ints) -> Bools:
-        colour = self.colour(points)
-        return np.asarray(colour != 0 if self.kind == "hex" else colour == 0)
+        coset = self.coset(points)
+        return np.asarray(coset != 0 if self.kind == "hex" else coset == 0)
 
     def has_edge(self, nodes: Ints, direction: Ints) -> Bools:
         """Whether an edge leaves a node in a direction: at a node of hexagons every second one does."""
         if self.kind != "hex":
             return np.ones(np.broadcast_shapes(nodes.shape[:-1], np.shape(direction)), dtype=bool)
-        return np.asarray((self.colour(nodes) + direction) % 2 == 1)
+        return np.asarray((self.coset(nodes) + direction) % 2 == 1)
 
     def position(self, points: Ints) -> Complexes:
         """Where points stand in the plane."""
@@ -158,22 +202,34 @@ LATTICES: dict[Kind, Lattice] = {
 
 
 @dataclass(frozen=True)
-class Motion:
-    """The deck transformation on integers: G(p) = ζ^turns · p + shift, shift of colour 0."""
+class Isometry:
+    """The deck transformation of an annulus on integers: G(p) = ζ^turns · p + shift, shift of coset 0.
+
+    turns counts the quanta of the cone angle and is not reduced; shift: (a, b)."""
 
     lattice: Lattice
     turns: int
     shift: tuple[int, int]
 
     @cached_property
-    def _shifts(self) -> Ints:
-        """(order of the rotation, 2) translation parts of G^0, G^1, …"""
-        order = self.lattice.order
-        period = order // int(np.gcd(self.turns, order))
-        shifts = [np.zeros(2, dtype=np.int64)]
-        for _ in range(period - 1):
-            shifts.append(self.lattice.rotate(shifts[-1], self.turns) + np.array(self.shift))
-        return np.stack(shifts)
+    def _first(self) -> Ints:
+        """(period, 4) the powers G^0, G^1, … until the rotation repeats; w counts them."""
+        lattice, order = self.lattice, self.lattice.order
+        once = np.array([self.turns % order, *self.shift, 1])
+        rows = [np.zeros(4, dtype=np.int64)]
+        for _ in range(order // int(np.gcd(self.turns, order)) - 1):
+            rows.append(lattice.compose(rows[-1], once))
+        return np.stack(rows)
+
+    def power(self, s: Ints) -> Ints:
+        """(…, 4) G^s as isometries, see the module."""
+        s = np.asarray(s)
+        period = len(self._first)
+        result = self._first[s % period]
+        if period == 1:
+            result[..., 1:3] = s[..., None] * np.array(self.shift)
+        result[..., 3] = s
+        return np.asarray(result)
 
     def rotation(self, s: Ints) -> Ints:
         """By how many units ζ the power G^s turns, modulo the order."""
@@ -181,17 +237,8 @@ class Motion:
 
     def carry(self, places: Complexes, s: Ints) -> Complexes:
         """G^s for places of the plane."""
-        s = np.asarray(s)
-        period = len(self._shifts)
-        if period == 1:
-            return np.asarray(places + s * complex(self.lattice.position(np.array(self.shift))))
-        turned = np.exp(1j * self.lattice.quantum * self.rotation(np.arange(period)))
-        return np.asarray(turned[s % period] * places + self.lattice.position(self._shifts)[s % period])
+        return self.lattice.carry(self.power(s), places)
 
     def apply(self, points: Ints, s: Ints) -> Ints:
         """G^s(points), s broadcast over the points."""
-        s = np.asarray(s)
-        period = len(self._shifts)
-        if period == 1:
-            return np.asarray(points + s[..., None] * np.array(self.shift))
-        return np.asarray(self.lattice.rotate(points, self.rotation(s)) + self._shifts[s % period])
+        return self.lattice.apply(self.power(s), points)

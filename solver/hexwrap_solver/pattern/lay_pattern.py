@@ -11,10 +11,10 @@ from scipy.sparse.csgraph import connected_components
 
 from hexwrap_solver.arrays import Bools, Floats, Ints, Progress, Ragged, no_progress
 from hexwrap_solver.conformal.types import ConformalMap
-from hexwrap_solver.domain.cover import Cover, cover_of
 from hexwrap_solver.domain.interpolate import surface_weights
 from hexwrap_solver.domain.lift import points_at
 from hexwrap_solver.domain.locate import barycentric
+from hexwrap_solver.domain.net import net_of
 from hexwrap_solver.errors import PatternError
 from hexwrap_solver.pattern.lattice import LATTICES, Lattice
 from hexwrap_solver.pattern.lay.cells import (
@@ -23,15 +23,18 @@ from hexwrap_solver.pattern.lay.cells import (
     largest_part,
     manifold_corners,
     only_whole_cells,
+    whole_cells,
 )
-from hexwrap_solver.pattern.lay.edges import link_nodes
+from hexwrap_solver.pattern.lay.edges import find_edges
 from hexwrap_solver.pattern.lay.labels import places, rows_from, turns_around, winding
-from hexwrap_solver.pattern.lay.nodes import Layout, find_nodes
+from hexwrap_solver.pattern.lay.layout import Layout
+from hexwrap_solver.pattern.lay.nodes import find_nodes
 from hexwrap_solver.pattern.place.choose import Placing
 from hexwrap_solver.pattern.place.placement import Placement, anchor_vertex, edge_angle
 from hexwrap_solver.pattern.place.rotation import with_rotation
 from hexwrap_solver.pattern.place.size import ASKED, fitting_number
 from hexwrap_solver.pattern.trim.arrangement import Points
+from hexwrap_solver.pattern.trim.boundary import boundary_of
 from hexwrap_solver.pattern.trim.trim import TooCoarse, Trimmed, trim
 from hexwrap_solver.pattern.types import Pattern, PatternSettings
 from hexwrap_solver.surface.normals import with_tangents
@@ -45,8 +48,8 @@ MANY = 1e12
 #: Differences of u that alone make so many: areas e^24 = 3e10 times as large as others.
 STEEP = 12.0
 
-#: Rounding of the layout, relative to its extent; points this near to an edge count as on it.
-REACH = 1e-11
+#: Of the layout, relative to its extent; points this near to an edge count as on it.
+ROUNDING = 1e-11
 
 
 def lay_pattern(cmap: ConformalMap, settings: PatternSettings, progress: Progress = no_progress) -> Pattern:
@@ -88,15 +91,16 @@ def _lay(placing: Placing, settings: PatternSettings, progress: Progress) -> Pat
     if not nodes.n:
         raise _too_coarse(cmap, settings, placement)
     progress(0.3, f"{nodes.n} nodes")
-    links = link_nodes(layout, nodes)
+    edges = find_edges(layout, nodes)
     progress(0.6, "edges")
+    whole = whole_cells(lattice, edges)
     if settings.boundary == "trim":
         try:
-            trimmed = trim(cmap, layout, nodes, links)
+            trimmed = trim(layout, boundary_of(cmap.surface, layout), nodes, edges, whole)
         except TooCoarse:
             raise _too_coarse(cmap, settings, placement) from None
     else:
-        cells = only_whole_cells(lattice, layout.motion, links)
+        cells = only_whole_cells(lattice, edges, whole)
         own = nodes.own
         points = Points(nodes.face[own], lattice.position(nodes.point[own]), np.zeros(nodes.n, dtype=bool))
         trimmed = Trimmed(cells, np.ones(cells.n, dtype=bool), points)
@@ -106,10 +110,16 @@ def _lay(placing: Placing, settings: PatternSettings, progress: Progress) -> Pat
 
 def layout_of(cmap: ConformalMap, lattice: Lattice, placement: Placement) -> Layout:
     """The domain's triangles in lattice units."""
+    net = net_of(cmap)
     corners = placement.motion.carry(placement.place[cmap.surface.faces], cmap.sheet)
+    winding = net.winding
+    assert winding is not None, "an annulus"
+    isometries = placement.motion.power(winding)
     extent = float(abs(corners).max())
-    reach = max(1e-9, REACH * extent, 2 * cmap.closing_error * extent)
-    return Layout(corners, cover_of(cmap), lattice, placement.motion, reach)
+    tolerance = max(1e-9, ROUNDING * extent, 2 * cmap.closing_error * extent)
+    return Layout(
+        corners, net.across, net.crossing, isometries, net.inverse, cmap.surface.twin, lattice, tolerance
+    )
 
 
 def _check_count(cmap: ConformalMap, layout: Layout, settings: PatternSettings) -> None:
@@ -145,7 +155,7 @@ def _finish(
     on_surface = surface_weights(cmap, triangle, weights)
     vertices, normals = _on_input_surface(cmap, triangle, on_surface)
     faces, neighbours = Ragged(corner, cells.corner.offsets), cells.neighbours()
-    first = _at_first_loop(cmap, layout.cover, faces, neighbours, cells.turns)
+    first = _at_first_loop(cmap, layout, faces, neighbours, cells.isometry[:, 3])
     if first is None:
         raise _too_coarse(cmap, settings, placement)
     ring = rows_from(neighbours, first)
@@ -153,7 +163,7 @@ def _finish(
         ring = ring // 2  # a row of triangles: those that stand and those that hang
     vertex_turn = turns_around(cmap)
     turn = (weights * (vertex_turn[cmap.surface.faces] + cmap.sheet)[triangle]).sum(axis=1)
-    turn = turn[corner] - vertex_turn[anchor_vertex(cmap)] + cells.turns
+    turn = turn[corner] - vertex_turn[anchor_vertex(cmap)] + cells.isometry[:, 3]
     turn_of_cell = np.add.reduceat(turn, faces.offsets[:-1]) / faces.lengths
     return Pattern(
         kind=settings.kind,
@@ -161,7 +171,7 @@ def _finish(
         normals=normals,
         uv=uv,
         faces=faces,
-        sheet=cells.turns,
+        sheet=cells.isometry[:, 3],
         neighbours=neighbours,
         triangle=triangle,
         barycentric=on_surface,
@@ -260,7 +270,7 @@ def _that_fits(cmap: ConformalMap, settings: PatternSettings, placement: Placeme
 
 
 def _at_first_loop(
-    cmap: ConformalMap, cover: Cover, faces: Ragged, neighbours: Ragged, sheet: Ints
+    cmap: ConformalMap, layout: Layout, faces: Ragged, neighbours: Ragged, sheet: Ints
 ) -> Bools | None:
     """(c,) cells with an edge on the loop of the pattern that faces the surface's loop 0.
 
@@ -278,7 +288,7 @@ def _at_first_loop(
     euler = n - (len(faces.values) + len(edge)) // 2 + faces.n_rows
     if len(loops) != 2 or sorted(np.rint(gained)) != [-1, 1] or euler != 0:
         return None
-    side = int(np.argmax(gained * winding(cmap, cover)))
+    side = int(np.argmax(gained * winding(cmap, layout)))
     first = np.zeros(faces.n_rows, dtype=bool)
     first[faces.row[edge[which == side]]] = True
     return first

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 
 from hexwrap_solver.arrays import Floats, Ints, Ragged
+from hexwrap_solver.setting import Setting
 from hexwrap_solver.surface.closest import TriangleTree
 from hexwrap_solver.surface.topology import edge_groups, edge_lengths, half_edges, twins_of
 
@@ -26,16 +28,28 @@ class SentMesh:
 
 @dataclass(frozen=True)
 class MeshSettings:
-    """How finely a NURBS surface is meshed (paper, Figure 2), lengths in model units.
+    """How finely a NURBS surface is meshed (paper, Figure 2).
 
-    max_edge: no edge is longer; None: chosen from the surface's area, about 6,000 vertices.
-    tolerance: chord height, greatest distance of the middle of an edge from the surface; None: not asked for.
-    max_vertices: a finer mesh than this is refused (SurfaceError) before any large array is made.
+    With neither size, edges are chosen from the surface's area, for about 6,000 vertices.
     """
 
-    max_edge: float | None = None
-    tolerance: float | None = None
-    max_vertices: int = 1_000_000
+    max_edge: Annotated[
+        float | None, Setting("NURBS surfaces: longest edge of the mesh", gt=0, unit="length")
+    ] = None
+    tolerance: Annotated[
+        float | None,
+        Setting("NURBS surfaces: greatest distance of the mesh (chord height)", gt=0, unit="length"),
+    ] = None
+    max_vertices: Annotated[
+        int, Setting("finer meshes are refused before any large array is made", limit=True)
+    ] = 1_000_000
+
+
+@dataclass(frozen=True)
+class SurfaceSettings:
+    """How a sent surface is taken in."""
+
+    mesh: Annotated[MeshSettings | None, Setting("how a NURBS surface is meshed", rare=True)] = None
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ import sys
 import types
 
 import Rhino
+import rules
 import System
 
 
@@ -51,7 +52,7 @@ class _Tree(object):
 
     def Add(self, item, path):
         assert isinstance(path, GH_Path)
-        self.branches.setdefault(path.indices, []).append(item)
+        self.branches.setdefault(path.indices, []).append(rules.as_object(item))
 
     def flat(self):
         return [item for path in sorted(self.branches) for item in self.branches[path]]

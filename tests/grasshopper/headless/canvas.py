@@ -13,6 +13,7 @@ import uuid
 
 import Grasshopper
 import Rhino
+import rules
 
 try:
     from Queue import Empty
@@ -30,7 +31,11 @@ def execute(code, scope):  # Python 2 allows exec only in functions without inne
 class Parameter(object):
     def __init__(self, name):
         self.Name = name
-        self.Sources = []
+        self.wired = []
+
+    @property
+    def Sources(self):
+        return [rules.behind_interface(source) for source in self.wired]
 
 
 class Parameters(object):
@@ -64,6 +69,7 @@ class Component(object):
         with io.open(os.path.join(BUILT, name + ".json"), encoding="utf-8") as file:
             described = json.load(file)
         self.inputs, self.outputs = described["inputs"], described["outputs"]
+        self.hints, self.lists = described["hints"], described["lists"]
         self.InstanceGuid = uuid.uuid4()
         self.RunCount = 1
         self.Params = Parameters(self.inputs)
@@ -114,7 +120,7 @@ class Component(object):
     def solve(self):
         """One solution; an unwired input is None, as in GhPython."""
         for name in self.inputs:
-            self.scope[name] = self.wired.get(name)
+            self.scope[name] = self.cast(name, self.wired.get(name))
         for name in self.outputs:
             self.scope.pop(name, None)
         self.messages = []
@@ -127,6 +133,16 @@ class Component(object):
         for name in self.inputs:
             self.scope.pop(name, None)
         return self
+
+    def cast(self, name, value):
+        """What the input's type hint makes of what is wired."""
+        hint = self.hints[name]
+        if name in self.lists:
+            return None if value is None else [rules.cast(item, hint) for item in value]
+        return rules.cast(value, hint)
+
+    def slot(self):
+        return self.scope["scriptcontext"].sticky["hexwrap/%s/%d" % (self.InstanceGuid, self.RunCount)]
 
     def __getattr__(self, name):
         if name in self.__dict__.get("values", {}):

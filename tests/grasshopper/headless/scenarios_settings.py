@@ -7,7 +7,7 @@ import math
 
 import world
 from canvas import Component, ValueList, pump
-from Rhino.Geometry import Point3d
+from Rhino.Geometry import Brep, Circle, Point, Point3d, Surface
 
 RIM = [Point3d(2.75, 0.0, 0.0), Point3d(-2.75, 0.0, 0.0), Point3d(0.0, 2.75, 0.0), Point3d(0.0, -2.75, 0.0)]
 
@@ -143,7 +143,7 @@ def wrong_panel_settings_are_refused():
 def a_fresh_value_list_fills_itself_once():
     made = Component("Pattern")
     wired = ValueList()
-    made.Params.Input[0].Sources.append(wired)
+    made.Params.Input[0].wired.append(wired)
     made.solve()
     pump([made], lambda: wired.expired == 1)
     assert [item.Expression for item in wired.ListItems] == ['"hex"', '"triangle"', '"quad"']
@@ -152,12 +152,78 @@ def a_fresh_value_list_fills_itself_once():
     assert json.loads(made.set(Kind='"quad"').Pattern)["pattern"]["kind"] == "quad"
 
 
+def singularities():
+    assert Component("Singularities").solve().Singularities is None
+    for given, sent in (("auto", "auto"), ("4", 4), ('"8"', 8), ("0", 0)):
+        made = Component("Singularities").set(Count=given)
+        assert json.loads(made.Singularities) == {"singularities": {"count": sent}}
+    made = Component("Singularities").set(Points=RIM[:2], Index=[-1])
+    assert json.loads(made.Singularities)["singularities"]["at"] == [
+        {"point": p.xyz(), "index": -1} for p in RIM[:2]
+    ]
+    made.set(Points=[Point(p) for p in RIM[:3]], Index=[1, -1, 1], Count="auto")
+    assert [row["index"] for row in json.loads(made.Singularities)["singularities"]["at"]] == [1, -1, 1]
+
+
+def wrong_singularities_are_refused():
+    for values, word in (
+        ({"Count": "many"}, "Count"),
+        ({"Count": "1.5"}, "whole"),
+        ({"Count": "-2"}, "negative"),
+        ({"Points": RIM, "Index": [1, 1]}, "4 points and 2 indices"),
+        ({"Points": RIM[:1], "Index": [0]}, "no singularity"),
+    ):
+        made = Component("Singularities").set(**values)
+        assert len(made.said("error")) == 1 and word in made.said("error")[0], made.messages
+        assert made.Singularities is None
+
+
+def umlauts_in_refusals_and_settings():
+    made = Component("Pattern").set(Kind="F\u00fcnfeck")
+    assert "F\u00fcnfeck" in made.said("error")[0]
+    made = Component("Panels").set(Target="gr\u00f6\u00dfte")
+    assert "gr\u00f6\u00dfte" in made.said("error")[0]
+
+
+def surfaces_and_points_wired_to_angles():
+    """A Surface where a mesh is asked for, Point objects where points are: the hints see to it."""
+    for surface in (Surface([world.tube()]), Brep([world.tube()])):
+        made = Component("BoundaryAngles").set(
+            Points=[Point(p) for p in RIM[:2]], Angle=[240, 120], Mesh=surface
+        )
+        assert not made.messages and "loop 0 bends by 0 degrees" in made.Balance, made.messages
+    made = Component("BoundaryAngles").set(Points=RIM[:1], Angle=[180.0], Mesh=Circle(0.0, 0.0, 1.0))
+    assert made.Missing == 0.0 and not made.said("error")  # nothing that the hint could make a mesh of
+    made = Component("BoundaryAngles").set(Points=[Circle(0.0, 0.0, 1.0)], Angle=[180.0])
+    assert "empty" in made.said("remark")[0] and not made.said("error")
+
+
+def no_traceback_reaches_the_balloon():
+    """What nobody thought of becomes one sentence, and nothing is put out."""
+
+    class Broken(Point3d):
+        def __init__(self):
+            Point3d.__init__(self, 0.0, 0.0, 0.0)
+            del self.X
+
+    for name, values in (
+        ("BoundaryAngles", {"Points": [Broken()], "Angle": [180.0]}),
+        ("Singularities", {"Points": [Broken()]}),
+    ):
+        made = Component(name).set(**values)
+        (sentence,) = made.said("error")
+        assert "did not expect" in sentence and "AttributeError" in sentence, sentence
+        assert "Traceback" not in sentence and "\n" not in sentence
+        assert made.Message == "failed" and all(value is None for value in made.values.values())
+
+
 def nothing_wired_is_told_without_an_error():
     for name, word in (
         ("Collect", "job"),
         ("Domain", "job"),
         ("Lift", "job"),
         ("Support", "job"),
+        ("Bake", "job"),
         ("Send", "Run"),
     ):
         made = Component(name).solve()
@@ -178,6 +244,11 @@ world.run([
     wrong_pattern_settings_are_refused,
     panel_settings,
     wrong_panel_settings_are_refused,
+    singularities,
+    wrong_singularities_are_refused,
+    umlauts_in_refusals_and_settings,
+    surfaces_and_points_wired_to_angles,
+    no_traceback_reaches_the_balloon,
     a_fresh_value_list_fills_itself_once,
     nothing_wired_is_told_without_an_error,
 ])  # fmt: skip

@@ -12,7 +12,7 @@ import Grasshopper
 import Rhino
 import world
 from canvas import FREEZE, Component, pump, settle
-from Rhino.Geometry import Brep, CircleCurve, Point3d, PolylineCurve, Surface
+from Rhino.Geometry import Brep, Circle, CircleCurve, Point3d, PolylineCurve, Surface
 from System import Array
 
 PORT = int(os.environ["HEXWRAP_PORT"])
@@ -44,10 +44,6 @@ def done(**values):
 
 def collected(name, **values):
     return settle(Component(name).set(**values), 2)
-
-
-def job_of(send):
-    return send.scope["slot"]
 
 
 def running(port=PORT):
@@ -118,6 +114,10 @@ def check_panels(collect):
         assert max(abs(a - b) for a, b in zip(first, x)) < 1e-9, "x runs along the first edge"
         outward = [x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2]]
         assert outward[0] * plane.Origin.X + outward[1] * plane.Origin.Y > 0, "z points outward"
+    assert set(collect.Index.flat()) == set([0])
+    counts = [collect.Sizes.flat().count(size) for size in sorted(set(collect.Sizes.flat()))]
+    assert [mesh.Faces.Count for mesh in collect.Shapes] == [6 * n for n in counts]
+    assert len(collect.ShapeColours) == len(counts)
     assert max(collect.Planarity.flat()) < 1e-9 and all(collect.Convex.flat())
     assert min(collect.Sizes.flat()) == 0 and max(collect.Sizes.flat()) < 11
     for words in collect.Neighbours.flat():
@@ -318,7 +318,7 @@ def unbalanced_angles_are_refused_with_figures():
     angles = {"mode": "angles", "angle_unit": "deg", "angles": [{"point": p, "angle": 240.0} for p in corner]}
     send = settle(sender(Angles=json.dumps({"boundary": angles})), 2)
     assert len(send.said("error")) == 1
-    assert send.scope["slot"]["error"].problem["type"].endswith("gauss-bonnet")
+    assert send.slot()["error"].problem["type"].endswith("gauss-bonnet")
 
 
 def wrong_jobs_are_refused():
@@ -388,6 +388,138 @@ def curves_are_lifted_across_the_cut():
     assert len(lift.Outside) > 0 and "outside" in lift.said("warning")[0]
     assert lift.Normals.flat()[0].X != 0.0
     assert lift.solve().Lifted.branches and not lift.document.scheduled
+
+
+def circles_and_lines_are_lifted():
+    """As wires carry them: structures, which the hint of Curves turns into curves."""
+    send = done()
+    low, high = collected("Domain", Job=send.Job).Boundary
+    y = 0.5 * (low.points[0].Y + high.points[0].Y)
+    left, around = min(p.X for p in low.points), abs(low.points[-1].X - low.points[0].X)
+    circle = Circle(left + 0.3 * around, y, 0.02 * around)
+    line = Rhino.Geometry.Line(Point3d(left, y, 0.0), Point3d(left + 0.5 * around, y, 0.0))
+    lift = collected("Lift", Job=send.Job, Curves=[circle, line, None], Steps=40)
+    assert not lift.messages, lift.messages
+    (loop,), (piece,) = lift.Lifted.branches[(0,)], lift.Lifted.branches[(1,)]
+    assert loop.IsClosed and len(piece.points) == 41
+
+
+def circles_sent_as_surfaces_are_refused():
+    made = sender(Mesh=Circle(0.0, 0.0, 1.0))
+    assert made.said("error") == ["Mesh must be a mesh or a surface, not Circle."] and made.Job is None
+
+
+def umlauts_reach_the_server():
+    spy = world.Spy(PORT)
+    send = settle(sender(Port=spy.port, Name="S\u00fcdfassade \u2116 1"), 2)
+    assert send.Job and not send.messages, send.messages
+    name = json.loads(spy.bodies("POST", "/v1/jobs")[0].decode("utf-8"))["name"]
+    assert name == "S\u00fcdfassade \u2116 1"
+    assert world.ask(PORT, "GET", "/v1/jobs/" + send.Job.split("/")[-1])[1]["name"] == name
+    spy.close()
+
+
+def address_on_the_canvas():
+    """Panels hand over texts, with a line's end perhaps."""
+    send = settle(sender(IP="127.0.0.1\n", Port=str(PORT)), 2)
+    assert send.Job and not send.messages, send.messages
+
+
+# --- baking ----------------------------------------------------------------------------------------------
+
+
+def document():
+    Rhino.RhinoDoc.ActiveDoc = Rhino.DocObjects.Document()
+    return Rhino.RhinoDoc.ActiveDoc
+
+
+def pressed(bake, **values):
+    """A button: down, and up again before the work is done."""
+    solved = bake.solved
+    bake.set(Bake=True, **values)
+    bake.set(Bake=False)
+    settle(bake, solved + 3)
+    assert not bake.said("error"), bake.messages
+    return bake
+
+
+def baked_panels():
+    send = done()
+    model = document()
+    collect = collected("Collect", Job=send.Job)
+    bake = pressed(Component("Bake"), Job=send.Job, Layer="facade::panels")
+    n = len(collect.Panels.flat())
+    assert bake.Count == n == len(model.things) and "facade::panels" in bake.Status
+    assert sorted(t.attributes.Name for t in model.things) == sorted(collect.Labels.flat())
+    by_label = dict((t.attributes.Name, t) for t in model.things)
+    for label, size, curve in zip(collect.Labels.flat(), collect.Sizes.flat(), collect.Panels.flat()):
+        thing = by_label[label]
+        path = model.Layers.path(thing.attributes.LayerIndex)
+        assert path.startswith("facade::panels::size-%02d (" % size), path
+        assert thing.geometry.xyz() == curve.xyz()
+        assert thing.attributes.texts["label"] == label and thing.attributes.texts["size"] == str(size)
+        assert len(thing.attributes.texts["neighbours"].split()) == 6
+    assert len(model.Layers) == 2 + len(set(collect.Sizes.flat()))
+    # once more, and from another number of panels: nothing is there twice
+    first = list(model.things)
+    pressed(bake)
+    assert len(model.things) == n and not set(model.things) & set(first)
+    other = done(Pattern=json.dumps({"pattern": {"around": 18}}))
+    model.things[0].hidden = True
+    pressed(bake, Job=other.Job)
+    assert len(model.things) == bake.Count != n
+    # a second component does not touch what the first one baked, and Undo takes back one bake each
+    second = pressed(Component("Bake"), Job=send.Job)
+    assert len(model.things) == bake.Count + second.Count
+    model.undo()
+    assert len(model.things) == bake.Count
+    model.undo()
+    assert len(model.things) == n and model.record is None and model.drawn == 4
+    assert set(words for words, _ in model.history) == set(["hexwrap Bake"])
+
+
+def baked_blocks():
+    panels = Component("Panels").set(Inset=0.02, Thickness=0.05, Sizes=4)
+    send = done(Panels=panels.Panels)
+    model = document()
+    collect = collected("Collect", Job=send.Job)
+    bake = pressed(Component("Bake"), Job=send.Job)
+    blocks = model.InstanceDefinitions
+    assert len(blocks) == len(set(collect.Sizes.flat())), "a block per size"
+    assert all([type(part).__name__ for part in parts] == ["PolylineCurve", "Mesh"] for _, parts in blocks)
+    by_label = dict((t.attributes.Name, t) for t in model.things)
+    assert len(by_label) == bake.Count == len(collect.Panels.flat())
+    for label, plane, panel in zip(collect.Labels.flat(), collect.Planes.flat(), collect.Panels.flat()):
+        index, motion = by_label[label].geometry
+        assert Point3d(*motion.moved([0.0, 0.0, 0.0])).DistanceTo(plane.Origin) < 1e-9
+        corners = [Point3d(*motion.moved(p)) for p in blocks[index][1][0].xyz()]
+        edge = panel.points[0].DistanceTo(panel.points[1])
+        for a, b in zip(corners, panel.points):
+            assert 0.01 < a.DistanceTo(b) < 0.05 + 0.01 * edge, "the inset outline lies beside the panel's"
+    before = [name for name, _ in blocks]
+    pressed(bake)
+    assert [name for name, _ in blocks] == before, "blocks are redefined, not doubled"
+
+
+def baking_keeps_in_step_with_a_toggle():
+    send = done()
+    model = document()
+    bake = settle(Component("Bake").set(Job=send.Job, Bake=True), 2)
+    count = len(model.things)
+    assert count and bake.Message == "baked"
+    bake.solve()
+    assert len(model.history) == 1 and not bake.document.scheduled, "baked once per job"
+    other = done(Pattern=json.dumps({"pattern": {"around": 18}}))
+    settle(bake.set(Job=other.Job), bake.solved + 1)
+    assert len(model.history) == 2 and len(model.things) == bake.Count != count
+
+
+def faults_while_baking_are_one_sentence():
+    send = done()
+    Rhino.RhinoDoc.ActiveDoc = None
+    bake = settle(Component("Bake").set(Job=send.Job, Bake=True), 2)
+    (sentence,) = bake.said("error")
+    assert "did not expect" in sentence and "Traceback" not in sentence
 
 
 def support_of_a_tower():
@@ -471,6 +603,14 @@ world.run([
     domain_of_a_cylinder,
     domain_with_corners,
     curves_are_lifted_across_the_cut,
+    circles_and_lines_are_lifted,
+    circles_sent_as_surfaces_are_refused,
+    umlauts_reach_the_server,
+    address_on_the_canvas,
+    baked_panels,
+    baked_blocks,
+    baking_keeps_in_step_with_a_toggle,
+    faults_while_baking_are_one_sentence,
     support_of_a_tower,
     a_decimal_comma_changes_nothing,
 ])  # fmt: skip

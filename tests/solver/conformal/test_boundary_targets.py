@@ -74,7 +74,7 @@ def test_every_target_satisfies_gauss_bonnet() -> None:
 
 
 def test_optimal_spreading_keeps_u_constant_on_each_loop() -> None:
-    cmap = conformal_map(TOWER, BoundaryCondition("isometric", quantum=np.pi / 3, spread="optimal"))
+    cmap = conformal_map(TOWER, BoundaryCondition("isometric", quantum="hex", spread="optimal"))
     first, second = (cmap.log_scale[loop] for loop in TOWER.loops)
     assert np.ptp(first) == np.ptp(second) == 0
     assert second[0] != first[0]
@@ -85,7 +85,7 @@ def test_no_loop_is_preferred(spread: Literal["even", "optimal"]) -> None:
     """Numbered the other way round, the surface has the same map; boundary lengths are kept on average."""
     wide = grid(40, 12, lambda phi, s: uneven(phi, 1.5 * s))
     n = len(wide.vertices)
-    condition = BoundaryCondition("isometric", quantum=np.pi / 3, spread=spread)
+    condition = BoundaryCondition("isometric", quantum="hex", spread=spread)
     scales = []
     for vertices, faces in ((wide.vertices, wide.faces), (wide.vertices[::-1], n - 1 - wide.faces)):
         surface = surface_from_mesh(SentMesh(vertices, Ragged.from_table(faces)))
@@ -99,7 +99,7 @@ def test_no_loop_is_preferred(spread: Literal["even", "optimal"]) -> None:
 
 
 def test_even_spreading_keeps_boundary_lengths_on_average() -> None:
-    cmap = conformal_map(TOWER, BoundaryCondition("isometric", quantum=np.pi / 3))
+    cmap = conformal_map(TOWER, BoundaryCondition("isometric", quantum="hex"))
     assert np.abs(np.concatenate([cmap.log_scale[loop] for loop in TOWER.loops])).max() < 0.2
     exact = conformal_map(TOWER, BoundaryCondition("isometric"))
     changes = [(a - b) for a, b in zip(cmap.boundary_angles, exact.boundary_angles, strict=True)]

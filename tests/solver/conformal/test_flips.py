@@ -193,7 +193,7 @@ def test_public_meshes_have_a_map(name: str, spread: Literal["even", "optimal"] 
         found = conformal_map(surface, BoundaryCondition())
         assert all(np.abs(angles - np.pi).max() < 1e-9 for angles in found.boundary_angles)
     else:
-        found = conformal_map(surface, BoundaryCondition("isometric", quantum=np.pi / 3, spread=spread))
+        found = conformal_map(surface, BoundaryCondition("isometric", quantum="hex", spread=spread))
         assert abs(found.deck.angle / (np.pi / 3) - np.round(found.deck.angle / (np.pi / 3))) < 1e-12
     assert faults(found) == []
 

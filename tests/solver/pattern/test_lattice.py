@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hexwrap_solver.pattern.lattice import LATTICES, Motion
+from hexwrap_solver.pattern.lattice import LATTICES, Isometry
 from hexwrap_solver.pattern.place.align import symmetry_centres
 
 KINDS = st.sampled_from(list(LATTICES))
@@ -15,10 +15,10 @@ INTEGERS = st.integers(-50, 50)
 POWERS = st.integers(-9, 9)
 
 
-def a_motion(kind: str, turns: int, x: int, y: int) -> Motion:
+def a_motion(kind: str, turns: int, x: int, y: int) -> Isometry:
     lattice = LATTICES[kind]
     shift = x * lattice.basis[0] + y * lattice.basis[1]
-    return Motion(lattice, turns, (int(shift[0]), int(shift[1])))
+    return Isometry(lattice, turns, (int(shift[0]), int(shift[1])))
 
 
 @given(
@@ -70,7 +70,7 @@ def test_symmetry_centres_are_fixed_and_as_many_as_the_motion_has(kind, turns):
     assert len(centres) == round(abs(1 - zeta) ** 2)
     for motion, centre in centres:
         assert motion.carry(np.array(centre), np.array(1)) == pytest.approx(centre)
-        assert lattice.colour(np.array(motion.shift)) == 0
+        assert lattice.coset(np.array(motion.shift)) == 0
 
 
 @pytest.mark.parametrize("kind", list(LATTICES))

@@ -27,7 +27,7 @@ def test_links_that_lead_one_way_only_are_refused():
     """Instead of being followed for ever: 0 is known, 1 knows 0, and nobody leads from 0 to 1."""
     one = np.array([1])
     with pytest.raises(PatternError, match="Rounding"):
-        nodes._turns(np.array([0]), one, 0 * one, one, 2)
+        nodes._seen_from(np.array([0]), one, 0 * one, np.zeros((1, 4), dtype=int), LATTICES["hex"], 2)
 
 
 def test_nodes_beyond_all_integers_are_refused():

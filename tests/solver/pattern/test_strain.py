@@ -8,10 +8,11 @@ from itertools import product
 import numpy as np
 import pytest
 
-from hexwrap_solver.pattern.lattice import LATTICES, Motion
+from hexwrap_solver.pattern.lattice import LATTICES, Isometry
 from hexwrap_solver.pattern.place import align
 from hexwrap_solver.pattern.place.choose import place_lattice
 from hexwrap_solver.pattern.place.deform import System
+from hexwrap_solver.pattern.place.glued import Glued
 from hexwrap_solver.pattern.place.sides import lines_of
 from hexwrap_solver.pattern.place.strain import Strain
 from hexwrap_solver.pattern.types import PatternSettings
@@ -24,9 +25,9 @@ def prepared(case):
     cmap = MAPS[case]
     turns = round(CASES[case][4] / LATTICE.quantum)
     frame = align._frame(cmap, LATTICE, PatternSettings(around=60), turns, [0, 1])
-    motion = Motion(LATTICE, turns, (0, 0))
+    motion = Isometry(LATTICE, turns, (0, 0))
     lines = lines_of(len(cmap.uv), frame.sides, frame.normal, motion)
-    system = System(cmap, motion, lines.normal)
+    system = System(cmap, Glued.by_sheets(cmap, motion), lines.normal)
     strain = Strain.of(system, frame.sides, lines, frame.turned)
     scale = 60 * 1.5 / cmap.circumference * frame.unit
     return frame, lines, system, strain, align._trials_at(frame, strain, scale, 0.0)

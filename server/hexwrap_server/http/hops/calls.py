@@ -16,14 +16,14 @@ from hexwrap_server.http.hops.values import output, read_inputs
 from hexwrap_server.input.curves import Curve, rhino_curve
 from hexwrap_server.input.json_text import loads, packed
 from hexwrap_server.input.readers.rhino import convert
-from hexwrap_server.input.requests import ParsedRequest, SentSurface, Wanted
+from hexwrap_server.input.requests import ParsedRequest, SentSurface
 from hexwrap_server.input.schemas import Request, parse_request
 from hexwrap_server.jobs.lift_curves import lift_curves
 from hexwrap_server.jobs.work import solution_at
 from hexwrap_server.jobs.worker import Report
 from hexwrap_server.output import wire
-from hexwrap_solver.pipeline import Solution
-from hexwrap_solver.surface.types import MeshSettings, SentMesh
+from hexwrap_solver.pipeline import Solution, SolveSettings
+from hexwrap_solver.surface.types import MeshSettings, SentMesh, SurfaceSettings
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ def read_call(report: Report, text: bytes, max_vertices: int, max_panels: int) -
     return Call(pointer, tuple(branch), packed(Request("hops", surface, wanted)))
 
 
-def _wanted(values: dict[str, Any], max_vertices: int, max_panels: int) -> Wanted:
+def _wanted(values: dict[str, Any], max_vertices: int, max_panels: int) -> SolveSettings:
     points, angles = values["Points"], values["Angles"]
     boundary: dict[str, Any] = {"mode": values["Mode"] or ("angles" if points else "straight")}
     if boundary["mode"] == "angles":
@@ -79,7 +79,7 @@ def _wanted(values: dict[str, Any], max_vertices: int, max_panels: int) -> Wante
 def _surface(geometry: Any, max_vertices: int) -> SentSurface:
     read = convert(geometry)
     if not isinstance(read, SentMesh):
-        return SentSurface(nurbs=read, meshing=MeshSettings(max_vertices=max_vertices))
+        return SentSurface(nurbs=read, settings=SurfaceSettings(MeshSettings(max_vertices=max_vertices)))
     if len(read.vertices) > max_vertices:
         raise HopsError(f"The mesh has {len(read.vertices)} vertices, this server takes {max_vertices}.")
     return SentSurface(mesh=read)

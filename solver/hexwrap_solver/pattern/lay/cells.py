@@ -9,20 +9,24 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from hexwrap_solver.arrays import Bools, Ints, Ragged
-from hexwrap_solver.pattern.lattice import Lattice, Motion
-from hexwrap_solver.pattern.lay.edges import Links
+from hexwrap_solver.pattern.lattice import Lattice
+from hexwrap_solver.pattern.lay.edges import PatternEdges
+
+#: A cell at a singularity has at most so many sides more than others.
+MOST_EXTRA_SIDES = 6
 
 
 @dataclass(frozen=True)
 class Cells:
     """Sides are numbered through all cells; side k runs from the corner k to the next one of its cell.
 
-    corner: points per cell, counter-clockwise. turns: (sides,) sheets of the corners' own coordinates, seen
-    from the cell's first one. twin: (sides,) the same side of the neighbouring cell, −1 where there is none.
+    corner: points per cell, counter-clockwise. isometry: (sides, 4) carry the corners' own coordinates to
+    those of the cell's first one. twin: (sides,) the same side of the neighbouring cell, −1 where there is
+    none.
     """
 
     corner: Ragged
-    turns: Ints
+    isometry: Ints
     twin: Ints
 
     @property
@@ -42,58 +46,78 @@ class Cells:
         offsets = np.concatenate([[0], np.cumsum(self.corner.lengths[keep])])
         return Cells(
             Ragged(self.corner.values[side], offsets),
-            self.turns[side],
+            self.isometry[side],
             np.where(twin >= 0, renumber[twin], -1),
         )
 
 
-def whole_cells(lattice: Lattice, motion: Motion, links: Links) -> tuple[Ints, Ints, Ints]:
-    """(c, p) corners, sheets and directions of the cells whose edges all run inside the domain.
+@dataclass(frozen=True)
+class WholeCells:
+    """Cells whose edges all run inside the domain: corner: nodes per cell. direction, isometry: (sides,) and
+    (sides, 4) of each side in its corner's own coordinates, and of these to the cell's first corner's."""
 
-    Each closes up without going around the surface. Such a closed line bounds a disk of the universal
-    cover, so that no boundary can hide inside a cell.
+    corner: Ragged
+    direction: Ints
+    isometry: Ints
+
+    @property
+    def n(self) -> int:
+        return self.corner.n_rows
+
+    def part(self, keep: Bools) -> WholeCells:
+        side = np.repeat(keep, self.corner.lengths)
+        offsets = np.concatenate([[0], np.cumsum(self.corner.lengths[keep])])
+        corner = Ragged(self.corner.values[side], offsets)
+        return WholeCells(corner, self.direction[side], self.isometry[side])
+
+
+def whole_cells(lattice: Lattice, edges: PatternEdges) -> WholeCells:
+    """Walks that come back after as many sides as a cell has, or fewer or more around a singularity.
+
+    A walk that has gone around the surface (w of its isometry) bounds no cell. Otherwise it bounds a disk, or
+    a disk with boundary loops inside that no edge of the pattern meets; see ``enclosed_loops``.
     """
     order = lattice.order
-    start = np.flatnonzero(links.head.ravel() >= 0)
-    node, way, turns = start // order, start % order, np.zeros(len(start), dtype=np.int64)
-    corner_of, way_of, turns_of = [], [], []
-    for _ in range(lattice.sides):
-        corner_of.append(node)
-        way_of.append(way)
-        turns_of.append(turns)
-        across = links.turns[node, way]
-        node = links.head[node, way]
-        way = (way - motion.rotation(across) + lattice.turn) % order
-        turns = turns + across
+    start = np.flatnonzero(edges.head.ravel() >= 0)
+    node, way = start // order, start % order
+    isometry = np.zeros((len(start), 4), dtype=np.int64)
+    walk = np.arange(len(start))
+    first, visits = start, []
+    closed = np.zeros(len(start), dtype=bool)
+    for _ in range(lattice.sides + MOST_EXTRA_SIDES):
+        visits.append((walk, node, way, isometry))
+        across = edges.isometry(node, way)
+        node = edges.head[node, way]
+        way = (way - across[:, 0] + lattice.turn) % order
+        isometry = lattice.compose(isometry, across)
+        slot = node * order + way
+        back = (node >= 0) & (slot == first)
+        closed[walk[back]] = isometry[back, 3] == 0
         # Each cell once, from its lowest side on; a walk that comes to a lower one is another's, or none.
-        going = (node >= 0) & (node * order + way >= start)
-        start, node, way, turns = start[going], node[going], way[going], turns[going]
-        for past in (corner_of, way_of, turns_of):
-            past[:] = [x[going] for x in past]
-    closed = (node * order + way == start) & (turns == 0)
-    corner, sheet, direction = (np.stack(x, axis=1)[closed] for x in (corner_of, turns_of, way_of))
-    return corner, sheet, direction
+        going = (node >= 0) & (slot > first)
+        walk, first, node, way, isometry = (x[going] for x in (walk, first, node, way, isometry))
+        if not len(walk):
+            break
+    kept = [closed[walk] for walk, *_ in visits]
+    walk, node, way, isometry = (
+        np.concatenate([visit[i][keep] for visit, keep in zip(visits, kept, strict=True)]) for i in range(4)
+    )
+    sorted_by_walk = np.argsort(walk, kind="stable")
+    lengths = np.bincount(walk, minlength=len(start))[closed]
+    offsets = np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
+    return WholeCells(Ragged(node[sorted_by_walk], offsets), way[sorted_by_walk], isometry[sorted_by_walk])
 
 
-def link_twins(lattice: Lattice, motion: Motion, links: Links, corner: Ints, direction: Ints) -> Ints:
-    """(c·p,) the side that runs the other way along the same link."""
-    order = lattice.order
-    side_of = np.full(links.head.size, -1, dtype=np.int64)
-    side_of[corner * order + direction] = np.arange(corner.size).reshape(corner.shape)
-    return np.asarray(side_of[reverse_links(lattice, motion, links, corner, direction)].ravel())
+def sides_by_edge(lattice: Lattice, edges: PatternEdges, cells: WholeCells) -> Ints:
+    """(n·order,) the side that runs along each directed edge, −1 where there is none."""
+    side = np.full(edges.head.size, -1, dtype=np.int64)
+    side[cells.corner.values * lattice.order + cells.direction] = np.arange(len(cells.direction))
+    return side
 
 
-def reverse_links(lattice: Lattice, motion: Motion, links: Links, tail: Ints, direction: Ints) -> Ints:
-    """Number order·node + direction of the link back."""
-    order = lattice.order
-    back = (direction - motion.rotation(links.turns[tail, direction]) + order // 2) % order
-    return np.asarray(links.head[tail, direction] * order + back)
-
-
-def only_whole_cells(lattice: Lattice, motion: Motion, links: Links) -> Cells:
-    corner, turns, direction = whole_cells(lattice, motion, links)
-    twin = link_twins(lattice, motion, links, corner, direction)
-    return Cells(Ragged.from_table(corner), turns.ravel(), twin)
+def only_whole_cells(lattice: Lattice, edges: PatternEdges, cells: WholeCells) -> Cells:
+    reverse = edges.reverse(lattice, cells.corner.values.astype(np.int64), cells.direction)
+    return Cells(cells.corner, cells.isometry, sides_by_edge(lattice, edges, cells)[reverse])
 
 
 def largest_part(cells: Cells) -> Bools:

@@ -8,7 +8,7 @@ from scipy.sparse.csgraph import breadth_first_order
 
 from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged
 from hexwrap_solver.conformal.types import ConformalMap
-from hexwrap_solver.domain.cover import Cover
+from hexwrap_solver.pattern.lay.layout import Layout
 
 
 def turns_around(cmap: ConformalMap) -> Floats:
@@ -42,9 +42,9 @@ def turns_around(cmap: ConformalMap) -> Floats:
     return np.asarray((angle + np.angle(cmap.uv[0] - apex)) / deck.angle)
 
 
-def winding(cmap: ConformalMap, cover: Cover) -> int:
+def winding(cmap: ConformalMap, layout: Layout) -> int:
     """+1 or −1: the sheets gained by following loop 0 once."""
-    face, edge = np.nonzero(cover.across < 0)
+    face, edge = np.nonzero(layout.across < 0)
     tail = cmap.surface.faces[face, edge]
     gained = cmap.sheet[face, (edge + 1) % 3] - cmap.sheet[face, edge]
     return int(gained[np.isin(tail, cmap.surface.loops[0])].sum())

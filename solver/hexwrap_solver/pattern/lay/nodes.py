@@ -9,12 +9,12 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints
-from hexwrap_solver.domain.cover import Cover
 from hexwrap_solver.domain.locate import runs
 from hexwrap_solver.errors import PatternError
-from hexwrap_solver.pattern.lattice import Lattice, Motion
+from hexwrap_solver.pattern.lattice import Lattice
+from hexwrap_solver.pattern.lay.layout import Layout
 
-#: Sightings are told apart by one integer each.
+#: Incidences are told apart by one integer each.
 MOST_KEYS = 1 << 62
 UNCLEAR = (
     "Rounding hides which cells lie in the domain: it is too large for the cells, or too uneven. Ask for "
@@ -23,37 +23,22 @@ UNCLEAR = (
 
 
 @dataclass(frozen=True)
-class Layout:
-    """The unrolled domain in lattice units.
-
-    corners: (m, 3) complex, the triangles; motion: the deck transformation; reach: distance below which a
-    point counts as lying on an edge, in lattice units.
-    """
-
-    corners: Complexes
-    cover: Cover
-    lattice: Lattice
-    motion: Motion
-    reach: float
-
-
-@dataclass(frozen=True)
 class Nodes:
-    """Nodes, each known by every triangle that touches it ("sighting").
+    """Nodes, and their incidences: a node and a triangle that touches it.
 
-    face, point: (k,) and (k, 2) sightings, sorted by key. node: (k,) which node is seen.
-    turns: (k,) the triangle (face, turns) of the cover is the one beside the node's own sighting, so that
-    G^turns(point) = point of the own sighting. own: (n,) position of the sighting that stands for the node.
-    starts: (n + 1,) and sighting: (k,) the sightings of node i are sighting[starts[i]:starts[i + 1]].
+    face, point: (k,) and (k, 2) of the incidences, sorted by key. node: (k,) which node each is of.
+    isometry: (k, 4) carries the point to that of the node's own incidence. own: (n,) position of the
+    incidence that stands for the node.
+    starts: (n + 1,) and incidence: (k,) those of node i are incidence[starts[i]:starts[i + 1]].
     """
 
     face: Ints
     point: Ints
     node: Ints
-    turns: Ints
+    isometry: Ints
     own: Ints
     starts: Ints
-    sighting: Ints
+    incidence: Ints
     _keys: Ints
     _low: Ints
     _span: Ints
@@ -62,13 +47,13 @@ class Nodes:
     def n(self) -> int:
         return len(self.own)
 
-    def near_edges(self, layout: Layout, reach: float) -> Bools:
-        """(k, 3) which edges of its triangle each sighting lies on."""
+    def near_edges(self, layout: Layout, distance: float) -> Bools:
+        """(k, 3) which edges of its triangle each incidence lies on."""
         place = layout.lattice.position(self.point)
-        return np.asarray(abs(edge_distances(layout.corners[self.face], place)) <= reach)
+        return np.asarray(abs(edge_distances(layout.corners[self.face], place)) <= distance)
 
     def find(self, face: Ints, point: Ints) -> Ints:
-        """Position of a sighting, −1 where there is none."""
+        """Position of an incidence, −1 where there is none."""
         key = _key(face, point, self._low, self._span)
         at = np.minimum(np.searchsorted(self._keys, key), max(len(self._keys) - 1, 0))
         found = ((point >= self._low) & (point < self._low + self._span)).all(axis=-1)
@@ -81,14 +66,14 @@ def _key(face: Ints, point: Ints, low: Ints, span: Ints) -> Ints:
     return np.asarray((face * span[0] + (point[..., 0] - low[0])) * span[1] + (point[..., 1] - low[1]))
 
 
-def lattice_points_in_triangles(triangles: Floats, reach: float) -> tuple[Ints, Ints]:
-    """(triangle, point (·, 2)) of every integer point inside or within about reach of a triangle.
+def lattice_points_in_triangles(triangles: Floats, tolerance: float) -> tuple[Ints, Ints]:
+    """(triangle, point (·, 2)) of every integer point inside or within about tolerance of a triangle.
 
     triangles: (m, 3, 2) in lattice coordinates. Row by row, so that slivers cost no more than their rows.
     """
     a, b = triangles[..., 0], triangles[..., 1]
-    first_row = np.ceil(b.min(axis=1) - reach).astype(np.int64)
-    rows = np.maximum(np.floor(b.max(axis=1) + reach).astype(np.int64) - first_row + 1, 0)
+    first_row = np.ceil(b.min(axis=1) - tolerance).astype(np.int64)
+    rows = np.maximum(np.floor(b.max(axis=1) + tolerance).astype(np.int64) - first_row + 1, 0)
     owner, step = runs(rows)
     row = first_row[owner] + step
     low = np.full(len(owner), np.inf)
@@ -98,16 +83,16 @@ def lattice_points_in_triangles(triangles: Floats, reach: float) -> tuple[Ints, 
         rise = b[owner, (c + 1) % 3] - b0
         run = a[owner, (c + 1) % 3] - a0
         steep = np.where(rise == 0, 1.0, rise)
-        for margin in (-reach, reach):  # a shallow edge stays within reach of the row for a while
+        for margin in (-tolerance, tolerance):  # a shallow edge stays within tolerance of the row for a while
             t = np.where(rise == 0, 0.0, np.clip((row + margin - b0) / steep, 0, 1))
-            meets = abs(b0 + t * rise - row) <= 1.5 * reach
+            meets = abs(b0 + t * rise - row) <= 1.5 * tolerance
             at = a0 + t * run
             low = np.where(meets, np.minimum(low, at), low)
             high = np.where(meets, np.maximum(high, at), high)
     met = low <= high
     owner, row = owner[met], row[met]
-    first = np.ceil(low[met] - reach).astype(np.int64)
-    count = np.maximum(np.floor(high[met] + reach).astype(np.int64) - first + 1, 0)
+    first = np.ceil(low[met] - tolerance).astype(np.int64)
+    count = np.maximum(np.floor(high[met] + tolerance).astype(np.int64) - first + 1, 0)
     span, step = runs(count)
     return owner[span], np.stack([first[span] + step, row[span]], axis=1)
 
@@ -122,8 +107,8 @@ def edge_distances(corners: Complexes, place: Complexes) -> Floats:
 
 def find_nodes(layout: Layout) -> Nodes:
     """All lattice nodes in the domain, each once, also on edges, at vertices and at the cut."""
-    lattice, cover = layout.lattice, layout.cover
-    face, point = lattice_points_in_triangles(lattice.coordinates(layout.corners), layout.reach)
+    lattice = layout.lattice
+    face, point = lattice_points_in_triangles(lattice.coordinates(layout.corners), layout.tolerance)
     wanted = lattice.is_node(point)
     face, point = face[wanted], point[wanted]
     low = point.min(axis=0, initial=0)
@@ -134,30 +119,32 @@ def find_nodes(layout: Layout) -> Nodes:
     order = np.argsort(keys, kind="stable")
     face, point, keys = face[order], point[order], keys[order]
     empty = np.zeros(0, dtype=np.int64)
-    seen = Nodes(face, point, empty, empty, empty, empty, empty, keys, low, span)
-    first, second, shift = _same_place(layout, seen, cover)
+    found = Nodes(face, point, empty, empty, empty, empty, empty, keys, low, span)
+    first, second, step = _same_place(layout, found)
     graph = coo_array((np.ones(len(first)), (first, second)), shape=(len(face), len(face)))
     n, part = connected_components(graph, directed=False)
     node = part.astype(np.int64)
-    sighting = np.argsort(node, kind="stable")
-    starts = np.searchsorted(node[sighting], np.arange(n + 1))
-    own = sighting[starts[:-1]]
-    turns = _turns(own, first, second, shift, len(face))
-    return Nodes(face, point, node, turns, own, starts, sighting, keys, low, span)
+    incidence = np.argsort(node, kind="stable")
+    starts = np.searchsorted(node[incidence], np.arange(n + 1))
+    own = incidence[starts[:-1]]
+    isometry = _seen_from(own, first, second, layout.isometries[step], lattice, len(face))
+    return Nodes(face, point, node, isometry, own, starts, incidence, keys, low, span)
 
 
-def _same_place(layout: Layout, seen: Nodes, cover: Cover) -> tuple[Ints, Ints, Ints]:
-    """Pairs of sightings of one node across an edge it lies on, with the shift of that edge."""
-    at, c = np.nonzero(seen.near_edges(layout, 4 * layout.reach) & (cover.across[seen.face] >= 0))
-    across, shift = cover.across[seen.face[at], c], cover.shift[seen.face[at], c]
-    other = seen.find(across, layout.motion.apply(seen.point[at], -shift))
-    found = other >= 0
-    return at[found], other[found], shift[found]
+def _same_place(layout: Layout, found: Nodes) -> tuple[Ints, Ints, Ints]:
+    """Pairs of incidences of one node across an edge it lies on, and what that edge's crossing is."""
+    near = found.near_edges(layout, 4 * layout.tolerance)
+    at, c = np.nonzero(near & (layout.across[found.face] >= 0))
+    across, crossing = layout.across[found.face[at], c], layout.crossing[found.face[at], c]
+    other = found.find(across, layout.lattice.apply(layout.into(crossing), found.point[at]))
+    same = other >= 0
+    return at[same], other[same], crossing[same]
 
 
-def _turns(own: Ints, first: Ints, second: Ints, shift: Ints, size: int) -> Ints:
-    """Sheet of each sighting relative to its node's own one, carried along the links."""
-    turns = np.zeros(size, dtype=np.int64)
+def _seen_from(own: Ints, first: Ints, second: Ints, step: Ints, lattice: Lattice, size: int) -> Ints:
+    """(size, 4) isometries that carry incidences to their nodes' own ones, composed along the pairs, of which
+    step (…, 4) carries the second to the first."""
+    isometry = np.zeros((size, 4), dtype=np.int64)
     known = np.ones(size, dtype=bool)
     known[first] = False
     known[own] = True
@@ -165,6 +152,6 @@ def _turns(own: Ints, first: Ints, second: Ints, shift: Ints, size: int) -> Ints
         new = known[first] & ~known[second]
         if not new.any():  # "the same place" was not symmetric: the layout is finer than its rounding
             raise PatternError(UNCLEAR)
-        turns[second[new]] = turns[first[new]] + shift[new]
+        isometry[second[new]] = lattice.compose(isometry[first[new]], step[new])
         known[second[new]] = True
-    return turns
+    return isometry

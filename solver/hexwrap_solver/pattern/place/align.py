@@ -9,8 +9,9 @@ import numpy as np
 
 from hexwrap_solver.arrays import Complexes, Floats, Ints
 from hexwrap_solver.conformal.types import ConformalMap
-from hexwrap_solver.pattern.lattice import Lattice, Motion
+from hexwrap_solver.pattern.lattice import Isometry, Lattice
 from hexwrap_solver.pattern.place.deform import System, deform, distortion_of
+from hexwrap_solver.pattern.place.glued import Glued
 from hexwrap_solver.pattern.place.placement import Placement, edge_angle
 from hexwrap_solver.pattern.place.rows import Rows, rows_along
 from hexwrap_solver.pattern.place.sides import Lines, Sides, lines_of, sides_of
@@ -44,7 +45,7 @@ class _Trial:
 
     scale: complex
     origin: complex
-    motion: Motion
+    motion: Isometry
     depth: Floats
     moved: Floats
     extra: float
@@ -102,9 +103,9 @@ class Straightening:
     ) -> Straightening:
         """settings: their sizes do not matter. loops: the ones to straighten, polygons."""
         frame = _frame(cmap, lattice, settings, turns, loops)
-        rotation = Motion(lattice, turns, (0, 0))
+        rotation = Isometry(lattice, turns, (0, 0))
         lines = lines_of(len(cmap.uv), frame.sides, frame.normal, rotation)
-        system = System(cmap, rotation, lines.normal)
+        system = System(cmap, Glued.by_sheets(cmap, rotation), lines.normal)
         return cls(frame, lines, system, Strain.of(system, frame.sides, lines, frame.turned))
 
 
@@ -126,8 +127,9 @@ def place_by_sides(straightening: Straightening, settings: PatternSettings) -> P
     tried = []
     for trial in _best_of(trials, strain)[:DEFORMED]:
         rest = trial.scale * (cmap.uv - (cmap.deck.apex or 0)) + trial.origin
-        place = deform(system, trial.motion, trial.scale, rest, lines.depths(trial.depth, trial.motion))
-        tried.append((distortion_of(cmap, trial.motion, place), trial, place))
+        glued = Glued.by_sheets(cmap, trial.motion)
+        place = deform(system, glued, trial.scale, rest, lines.depths(trial.depth, trial.motion))
+        tried.append((distortion_of(cmap, glued, place), trial, place))
         if tried[-1][0] < ENOUGH:
             break
     distortion, best, place = min(tried, key=lambda found: found[0] + found[1].extra)
@@ -227,21 +229,21 @@ def _mean_depth(cmap: ConformalMap, sides: Sides, normal: Complexes, turn: Compl
     return np.asarray(np.bincount(sides.side, weights=value) / np.bincount(sides.side))
 
 
-def _origins(frame: _Frame, scale: complex) -> list[tuple[Motion, complex]]:
+def _origins(frame: _Frame, scale: complex) -> list[tuple[Isometry, complex]]:
     """Every way in which g can be a motion of the lattice, and where the apex, or the layout's origin, stands
     then: on a cone at the kinds of symmetry centres; for a translation as two sides may lie on lines."""
     lattice, rows, normal = frame.lattice, frame.rows, frame.normal
     if frame.cmap.deck.apex is not None:
         return symmetry_centres(lattice, frame.turns)
     shift = _translation(frame, scale * frame.cmap.deck.translation)
-    motion = Motion(lattice, frame.turns, (int(shift[0]), int(shift[1])))
+    motion = Isometry(lattice, frame.turns, (int(shift[0]), int(shift[1])))
     depth = frame.depth * abs(scale)
     across = np.flatnonzero(abs((normal.conj() * normal[0]).imag) > 1e-6)
     if not len(across):
         return [(motion, complex(normal[0] * (rows.first - depth[0])))]
     p, q = normal[0], normal[across[0]]
     d = rows.first - depth[0]
-    lines = rows.first + rows.period * np.arange(lattice.colours) - depth[across[0]]
+    lines = rows.first + rows.period * np.arange(lattice.cosets) - depth[across[0]]
     return [(motion, complex(1j * (e * p - d * q) / (np.conj(p) * q).imag)) for e in lines]
 
 
@@ -259,12 +261,12 @@ def _translation(frame: _Frame, wanted: complex) -> Ints:
     return lattice.translation_near(wanted)
 
 
-def symmetry_centres(lattice: Lattice, turns: int) -> list[tuple[Motion, complex]]:
+def symmetry_centres(lattice: Lattice, turns: int) -> list[tuple[Isometry, complex]]:
     """Motions p ↦ ζ^turns·p + τ that differ by more than a translation of the lattice, with their fixed
     points: centres of 6-, 4-, 3- or 2-fold symmetry, the highest first."""
     zeta = np.exp(1j * lattice.quantum * turns)
     e1 = complex(lattice.position(lattice.basis[0]))
-    found: list[tuple[Motion, complex]] = []
+    found: list[tuple[Isometry, complex]] = []
     reach = range(-2, 3)
     shifts = sorted(((x, y) for x in reach for y in reach), key=lambda v: abs(v[0] + v[1] * lattice.unit))
     for x, y in shifts:
@@ -272,11 +274,11 @@ def symmetry_centres(lattice: Lattice, turns: int) -> list[tuple[Motion, complex
         centre = complex(lattice.position(shift)) / (1 - zeta)
         apart = [lattice.coordinates(np.array((centre - other) / e1)) for _, other in found]
         if all(abs(a - np.rint(a)).max() > 1e-9 for a in apart):
-            found.append((Motion(lattice, turns, (int(shift[0]), int(shift[1]))), centre))
+            found.append((Isometry(lattice, turns, (int(shift[0]), int(shift[1]))), centre))
     return found
 
 
-def _misplaced_corners(frame: _Frame, motion: Motion, line: Floats) -> float:
+def _misplaced_corners(frame: _Frame, motion: Isometry, line: Floats) -> float:
     """Part of the corners between successive sides that stand badly.
 
     Corners stand well on nodes. Where three edges meet there, though, the lattice is mirrored at the

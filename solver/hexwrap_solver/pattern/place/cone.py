@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexwrap_solver.conformal.types import ConformalMap
-from hexwrap_solver.pattern.lattice import Lattice, Motion
+from hexwrap_solver.pattern.lattice import Isometry, Lattice
 from hexwrap_solver.pattern.place.deform import System, deform, distortion_of
+from hexwrap_solver.pattern.place.glued import Glued
 from hexwrap_solver.pattern.place.placement import Placement, anchor_vertex, edge_angle
 from hexwrap_solver.pattern.place.size import ASKED, edges_around, wanted_edge, width_per_cell
 from hexwrap_solver.pattern.types import PatternSettings
@@ -77,7 +78,7 @@ def place_on_cone(cmap: ConformalMap, lattice: Lattice, settings: PatternSetting
     factor = frame.factor * np.exp(1j * turn) * max(1 + up * lattice.edge / radius, LEAST_GROWTH)
     place = (cmap.uv - _middle(cmap)) * factor
     around = round(cmap.circumference * abs(factor) / frame.width)
-    return Placement(place, Motion(lattice, turns, (0, 0)), frame.angle, around, 0.0, ())
+    return Placement(place, Isometry(lattice, turns, (0, 0)), frame.angle, around, 0.0, ())
 
 
 def place_on_flat_ring(
@@ -93,7 +94,7 @@ def place_on_flat_ring(
     wanted = frame.factor * cmap.deck.translation
     shift = lattice.translation_near(wanted)
     nearest = complex(lattice.position(shift))
-    motion = Motion(lattice, turns, (int(shift[0]), int(shift[1])))
+    motion = Isometry(lattice, turns, (int(shift[0]), int(shift[1])))
     phase = lattice.without_translations(
         complex(frame.width * settings.phase[0], lattice.edge * settings.phase[1])
     )
@@ -107,5 +108,6 @@ def place_on_flat_ring(
     if fits:
         return Placement(place, motion, angle, around, 0.0, ())
     nowhere = np.zeros((len(place), 2))
-    place = deform(System(cmap, motion, nowhere.astype(complex)), motion, factor, place, nowhere)
-    return Placement(place, motion, angle, around, distortion_of(cmap, motion, place), ())
+    glued = Glued.by_sheets(cmap, motion)
+    place = deform(System(cmap, glued, nowhere.astype(complex)), glued, factor, place, nowhere)
+    return Placement(place, motion, angle, around, distortion_of(cmap, glued, place), ())

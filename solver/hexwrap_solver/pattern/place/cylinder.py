@@ -9,7 +9,7 @@ import numpy as np
 
 from hexwrap_solver.arrays import Complexes, Floats, Ints
 from hexwrap_solver.conformal.types import ConformalMap
-from hexwrap_solver.pattern.lattice import Lattice, Motion
+from hexwrap_solver.pattern.lattice import Isometry, Lattice
 from hexwrap_solver.pattern.place.placement import BEARABLE, Placement, anchor_vertex, edge_angle, is_straight
 from hexwrap_solver.pattern.place.rows import Rows, rows_along
 from hexwrap_solver.pattern.place.size import edges_around, fitting_number, size_spread, width_per_cell
@@ -70,7 +70,7 @@ def place_on_cylinder(
     distortion = max(stretch, 1 / stretch) - 1
     return Placement(
         place,
-        Motion(lattice, 0, (int(T[0]), int(T[1]))),
+        Isometry(lattice, 0, (int(T[0]), int(T[1]))),
         angle_taken(lattice, along, angle),
         around,
         distortion,

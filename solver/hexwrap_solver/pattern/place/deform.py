@@ -1,6 +1,6 @@
 """The smallest smooth deformation of the layout that brings sides of the domain onto lattice lines.
 
-Unknown are the vertices W in lattice units, with the deck transformation an exact motion of the lattice.
+Unknown are the vertices W in lattice units, the motions of the domain being exact isometries of the lattice.
 Least squares over the triangles of √area · (|∂W/∂z̄|² + SIZE·|∂W/∂z − a|²): the first for angles
 (least-squares conformal maps, Lévy et al. 2002), the second, lightly, for sizes. Vertices on a side slide
 along their line; corners stand where two lines meet. Lines are met exactly, whatever the least squares leave.
@@ -16,7 +16,7 @@ from scipy import sparse
 from hexwrap_solver.arrays import Complexes, Floats, Ints
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.linalg.normal_matrix import NormalMatrix
-from hexwrap_solver.pattern.lattice import Motion
+from hexwrap_solver.pattern.place.glued import Glued
 
 #: Weight of sizes against angles.
 SIZE = 0.1
@@ -31,13 +31,14 @@ FINE = 0.03
 REST = 1e-9
 
 
-def deform(system: System, motion: Motion, scale: complex, rest: Complexes, depth: Floats) -> Complexes:
+def deform(system: System, glued: Glued, scale: complex, rest: Complexes, depth: Floats) -> Complexes:
     """(n,) vertices in lattice units, on the lines of the system.
 
-    rest: (n,) where they would stand undeformed, with scale = ∂W/∂z. depth: (n, 2) of the lines.
+    glued: with the rotations of the system's. rest: (n,) where the vertices would stand undeformed, with
+    scale = ∂W/∂z. depth: (n, 2) of the lines.
     """
     change, freedom = system.change, system.freedom
-    shift = change.of_shift(_shifts(system.cmap, motion))
+    shift = change.of_shift(glued.shift)
     fixed = freedom.place_on_lines(depth)
     start = freedom.basis.T @ _parts(rest - fixed)  # the basis is orthonormal
     angles, sizes = change.of(fixed, shift)
@@ -57,10 +58,10 @@ def deform(system: System, motion: Motion, scale: complex, rest: Complexes, dept
     return best
 
 
-def distortion_of(cmap: ConformalMap, motion: Motion, place: Complexes) -> float:
+def distortion_of(cmap: ConformalMap, glued: Glued, place: Complexes) -> float:
     """Worst ratio of singular values − 1 over the triangles; infinite where one is turned over."""
-    change = derivatives(cmap, motion)
-    return _worst(*change.strains(place, change.of_shift(_shifts(cmap, motion))))
+    change = derivatives(cmap, glued)
+    return _worst(*change.strains(place, change.of_shift(glued.shift)))
 
 
 def _worst(bent: Floats, kept: Floats) -> float:
@@ -93,26 +94,19 @@ class Derivatives:
         return (self.gradient * shift).sum(axis=1), (self.gradient.conj() * shift).sum(axis=1)
 
 
-def derivatives(cmap: ConformalMap, motion: Motion) -> Derivatives:
-    """They depend on the rotation of the motion alone."""
+def derivatives(cmap: ConformalMap, glued: Glued) -> Derivatives:
+    """They depend on the rotations alone."""
     z = cmap.corners()
     faces = cmap.surface.faces
-    m, n = len(faces), len(cmap.uv)
+    m, n = len(faces), len(cmap.surface.vertices)
     opposite = np.roll(z, -2, axis=1) - np.roll(z, -1, axis=1)
     area = ((z[:, 1] - z[:, 0]).conj() * (z[:, 2] - z[:, 0])).imag / 2
     gradient = 1j * opposite / (4 * area)[:, None]
-    turn = np.exp(1j * motion.lattice.quantum * motion.rotation(cmap.sheet))
     where = (np.repeat(np.arange(m), 3), faces.ravel())
     angles, sizes = (
-        sparse.csr_array(((g * turn).ravel(), where), shape=(m, n)) for g in (gradient, gradient.conj())
+        sparse.csr_array(((g * glued.turn).ravel(), where), shape=(m, n)) for g in (gradient, gradient.conj())
     )
     return Derivatives(angles, sizes, gradient, np.asarray(area))
-
-
-def _shifts(cmap: ConformalMap, motion: Motion) -> Complexes:
-    """(m, 3) by how much the triangles' corners are shifted on their sheets."""
-    zero = np.zeros((*cmap.sheet.shape, 2), dtype=np.int64)
-    return motion.lattice.position(motion.apply(zero, cmap.sheet))
 
 
 @dataclass(frozen=True)
@@ -149,11 +143,11 @@ class Freedom:
 class System:
     """The least-squares problem for all choices of depths, and its factorised normal matrix."""
 
-    def __init__(self, cmap: ConformalMap, motion: Motion, normal: Complexes) -> None:
-        """motion: any with the rotation of the deck transformation. normal: (n, 2) up to two lines
+    def __init__(self, cmap: ConformalMap, glued: Glued, normal: Complexes) -> None:
+        """glued: of which the rotations alone matter. normal: (n, 2) up to two lines
         Re(conj(normal)·W) = depth that each vertex must lie on; normal 0 where there is none."""
         self.cmap = cmap
-        self.change = derivatives(cmap, motion)
+        self.change = derivatives(cmap, glued)
         self.freedom = Freedom.of(normal)
         # Both errors of a triangle as one matrix: angles, then sizes, each in real and imaginary parts.
         parts = (_real(part) @ self.freedom.basis for part in (self.change.angles, self.change.sizes))

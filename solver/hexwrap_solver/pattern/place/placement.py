@@ -9,7 +9,7 @@ import numpy as np
 from hexwrap_solver.arrays import Complexes
 from hexwrap_solver.conformal.types import ConformalMap, Deck
 from hexwrap_solver.errors import NotAdaptedError, PatternError
-from hexwrap_solver.pattern.lattice import Lattice, Motion
+from hexwrap_solver.pattern.lattice import Isometry, Lattice
 from hexwrap_solver.pattern.types import PatternSettings
 
 #: Largest |k| of a cone angle k·π/3 or k·π/2.
@@ -34,7 +34,7 @@ class Placement:
     """
 
     place: Complexes
-    motion: Motion
+    motion: Isometry
     rotation: float
     around: int
     distortion: float
@@ -75,7 +75,7 @@ def check_phase(settings: PatternSettings) -> None:
         raise PatternError(
             f"The phase is {settings.phase[0]:.6g}, {settings.phase[1]:.6g} cells, but at most "
             f"{MAX_PHASE:,.0f} are understood.",
-            field=("pattern", "phase"),
+            field=("phase",),
         )
 
 

@@ -12,7 +12,7 @@ from hexwrap_solver.pattern.lattice import Lattice
 @dataclass(frozen=True)
 class Rows:
     """Parallel lattice lines. A straight boundary lies well at depth ≡ first (mod period), the depth being
-    measured inwards from a point of colour 0, in lattice units."""
+    measured inwards from a point of coset 0, in lattice units."""
 
     first: float
     period: float

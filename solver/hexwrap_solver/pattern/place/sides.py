@@ -9,7 +9,7 @@ import numpy as np
 
 from hexwrap_solver.arrays import Complexes, Floats, Ints
 from hexwrap_solver.conformal.types import ConformalMap
-from hexwrap_solver.pattern.lattice import Lattice, Motion
+from hexwrap_solver.pattern.lattice import Isometry, Lattice
 
 #: A boundary is straight where it turns by less than this altogether, a corner quantized within it; rad.
 QUANTIZED = 0.02
@@ -121,7 +121,7 @@ class Lines:
     sheet: Ints
     entry: Ints
 
-    def depths(self, depth: Floats, motion: Motion) -> Floats:
+    def depths(self, depth: Floats, motion: Isometry) -> Floats:
         """(n, 2) depth of each line from 0 in the vertex's own sheet; depth: (s,) of the sides in the frame
         of their loop."""
         zero = np.zeros((*self.sheet.shape, 2), dtype=np.int64)
@@ -131,7 +131,7 @@ class Lines:
         return np.asarray(np.where(self.side >= 0, own, 0.0))
 
 
-def lines_of(n: int, sides: Sides, normal: Complexes, motion: Motion) -> Lines:
+def lines_of(n: int, sides: Sides, normal: Complexes, motion: Isometry) -> Lines:
     """normal: (s,) of the sides in the frame of their loop. motion: any with the right rotation."""
     own = normal[sides.side] / np.exp(1j * motion.lattice.quantum * motion.rotation(sides.sheet))
     order = np.argsort(sides.vertex, kind="stable")

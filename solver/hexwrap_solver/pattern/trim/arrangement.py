@@ -1,4 +1,4 @@
-"""The arrangement of links and boundary near the boundary, as half-edges between points of both."""
+"""The arrangement of pattern edges and boundary near the boundary, as half-edges between points of both."""
 
 from __future__ import annotations
 
@@ -7,20 +7,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints
-from hexwrap_solver.conformal.types import ConformalMap
-from hexwrap_solver.pattern.lay.cells import reverse_links
-from hexwrap_solver.pattern.lay.edges import Links
-from hexwrap_solver.pattern.lay.nodes import Layout, Nodes
+from hexwrap_solver.pattern.lay.edges import PatternEdges
+from hexwrap_solver.pattern.lay.layout import Layout
+from hexwrap_solver.pattern.lay.nodes import Nodes
 from hexwrap_solver.pattern.trim.boundary import (
+    Boundary,
+    BoundaryPoints,
     Chords,
-    Crossings,
-    Rim,
-    RimPoints,
+    Exits,
     chords,
-    corners_of_rim,
-    crossings,
-    nodes_on_rim,
-    rim_of,
+    corners_of_boundary,
+    exits_of,
+    nodes_on_boundary,
 )
 
 #: Order of half-edges around a point on the boundary: along it, then into the domain by angle, then back.
@@ -39,13 +37,13 @@ class Points:
 
 @dataclass(frozen=True)
 class HalfEdges:
-    """tail, head: points. sheet: of the head's own coordinates, seen from the tail's. key: order around the
-    tail. twin: the same edge the other way. outer: runs along the boundary outside of the domain. name: slot
-    order·node + direction of a link from a node, −1 for others."""
+    """tail, head: points. isometry: (h, 4) from the head's own coordinates to the tail's. key: order around
+    the tail. twin: the same edge the other way. outer: runs along the boundary outside of the domain. name:
+    order·node + direction of a pattern edge from a node, −1 for others."""
 
     tail: Ints
     head: Ints
-    sheet: Ints
+    isometry: Ints
     key: Floats
     twin: Ints
     outer: Bools
@@ -70,92 +68,97 @@ class HalfEdges:
 
 
 def arrangement(
-    cmap: ConformalMap, layout: Layout, nodes: Nodes, links: Links, used: Bools
+    layout: Layout, boundary: Boundary, nodes: Nodes, edges: PatternEdges, used: Bools
 ) -> tuple[Points, HalfEdges]:
     """Points and half-edges near the boundary: everything that does not bound a whole cell."""
     lattice, order = layout.lattice, layout.lattice.order
-    rim = rim_of(cmap, layout)
-    cross, chord = crossings(layout, nodes, links, rim), chords(layout, rim)
-    at_node = nodes_on_rim(layout, nodes, rim)
-    on_rim, new = _points_on_rim(layout, rim, nodes.n, at_node, cross, chord)
+    leaving, chord = exits_of(layout, nodes, edges, boundary), chords(layout, boundary)
+    at_node = nodes_on_boundary(layout, nodes, boundary)
+    on_boundary, new = _points_on_boundary(layout, boundary, nodes.n, at_node, leaving, chord)
+    turns = corners_of_boundary(layout, boundary)
     points = Points(
-        np.concatenate([nodes.face[nodes.own], rim.face[new.edge]]),
-        np.concatenate([lattice.position(nodes.point[nodes.own]), new.places(rim)]),
-        np.concatenate([np.zeros(nodes.n, dtype=bool), (new.t > 0) | ~corners_of_rim(layout, rim)[new.edge]]),
+        np.concatenate([nodes.face[nodes.own], boundary.face[new.edge]]),
+        np.concatenate([lattice.position(nodes.point[nodes.own]), new.places(boundary)]),
+        np.concatenate([np.zeros(nodes.n, dtype=bool), (new.t > 0) | ~turns[new.edge]]),
     )
-    key = _keys(layout, rim, at_node, nodes.n)
+    key = _keys(layout, boundary, at_node, nodes.n)
     near = np.zeros(nodes.n, dtype=bool)
-    near[np.flatnonzero((links.head.ravel() >= 0) & ~used) // order] = True
-    near[cross.node] = True
+    near[np.flatnonzero((edges.head.ravel() >= 0) & ~used) // order] = True
+    near[leaving.node] = True
     near[at_node.point] = True
-    crossing = nodes.n + np.arange(len(cross.node))
-    name = cross.node * order + cross.direction
-    out_key, no_key = key[cross.node, cross.direction], np.zeros(len(crossing))
-    start = nodes.n + len(crossing) + np.arange(len(chord.edge))
+    end = nodes.n + np.arange(len(leaving.node))
+    name = leaving.node * order + leaving.direction
+    out_key, no_key = key[leaving.node, leaving.direction], np.zeros(len(end))
+    start = nodes.n + len(end) + np.arange(len(chord.edge))
     middle = np.zeros(len(start))
+    unnamed = np.full(len(start), -1)
     return points, _join(
         [
-            _among_nodes(layout, links, near, key),
-            _pairs(cross.node, crossing, cross.sheet, out_key, no_key, name),
-            _pairs(start, start + len(start), chord.sheet, middle, middle, np.full(len(start), -1)),
-            _along_rim(rim, on_rim),
+            _among_nodes(layout, edges, near, key),
+            _pairs(layout, leaving.node, end, leaving.isometry, out_key, no_key, name),
+            _pairs(layout, start, start + len(start), chord.isometry, middle, middle, unnamed),
+            _along_boundary(layout, boundary, on_boundary),
         ]
     )
 
 
-def _points_on_rim(
-    layout: Layout, rim: Rim, n: int, at_node: RimPoints, cross: Crossings, chord: Chords
-) -> tuple[RimPoints, RimPoints]:
+def _points_on_boundary(
+    layout: Layout, boundary: Boundary, n: int, at_node: BoundaryPoints, leaving: Exits, chord: Chords
+) -> tuple[BoundaryPoints, BoundaryPoints]:
     """All points on the boundary, and those of them that are no nodes, numbered from n on."""
-    edge = np.concatenate([cross.edge, chord.edge, chord.end_edge])
-    t = np.concatenate([cross.t, chord.t, chord.end_t])
-    taken = np.zeros(len(rim.face), dtype=bool)
+    edge = np.concatenate([leaving.edge, chord.edge, chord.end_edge])
+    t = np.concatenate([leaving.t, chord.t, chord.end_t])
+    taken = np.zeros(len(boundary.face), dtype=bool)
     taken[np.concatenate([at_node.edge[at_node.t == 0], edge[t == 0]])] = True
-    bends = np.flatnonzero(corners_of_rim(layout, rim) & ~taken)
+    bends = np.flatnonzero(corners_of_boundary(layout, boundary) & ~taken)
     edge, t = np.concatenate([edge, bends]), np.concatenate([t, np.zeros(len(bends))])
-    new = RimPoints(n + np.arange(len(edge)), edge, t, np.zeros(len(edge), dtype=np.int64))
-    return RimPoints(
+    none = np.zeros((len(edge), 4), dtype=np.int64)
+    new = BoundaryPoints(n + np.arange(len(edge)), edge, t, none)
+    return BoundaryPoints(
         np.concatenate([at_node.point, new.point]),
         np.concatenate([at_node.edge, new.edge]),
         np.concatenate([at_node.t, new.t]),
-        np.concatenate([at_node.sheet, new.sheet]),
+        np.concatenate([at_node.isometry, new.isometry]),
     ), new
 
 
-def _among_nodes(layout: Layout, links: Links, near: Bools, key: Floats) -> HalfEdges:
-    """Links between nodes near the boundary. Links to other nodes have whole cells on both sides."""
-    order = layout.lattice.order
-    slot = np.flatnonzero((links.head >= 0).ravel() & np.repeat(near, order))
+def _among_nodes(layout: Layout, edges: PatternEdges, near: Bools, key: Floats) -> HalfEdges:
+    """Pattern edges between nodes near the boundary. Those to other nodes have whole cells on both sides."""
+    lattice, order = layout.lattice, layout.lattice.order
+    slot = np.flatnonzero((edges.head >= 0).ravel() & np.repeat(near, order))
     tail, way = slot // order, slot % order
-    kept = near[links.head[tail, way]]
+    kept = near[edges.head[tail, way]]
     slot, tail, way = slot[kept], tail[kept], way[kept]
-    position = np.full(links.head.size, -1, dtype=np.int64)
+    position = np.full(edges.head.size, -1, dtype=np.int64)
     position[slot] = np.arange(len(slot))
-    twin = position[reverse_links(layout.lattice, layout.motion, links, tail, way)]
+    twin = position[edges.reverse(lattice, tail, way)]
     outer = np.zeros(len(slot), dtype=bool)
-    return HalfEdges(tail, links.head[tail, way], links.turns[tail, way], key[tail, way], twin, outer, slot)
+    isometry = edges.isometry(tail, way)
+    return HalfEdges(tail, edges.head[tail, way], isometry, key[tail, way], twin, outer, slot)
 
 
-def _keys(layout: Layout, rim: Rim, at_node: RimPoints, n: int) -> Floats:
+def _keys(layout: Layout, boundary: Boundary, at_node: BoundaryPoints, n: int) -> Floats:
     """(n, order) order of directions around each node; on the boundary counted from the boundary's own."""
     order = layout.lattice.order
     key = np.tile(np.arange(order, dtype=float), (n, 1))
-    along = (rim.head - rim.tail)[at_node.edge]
-    along = along * np.exp(1j * layout.lattice.quantum * layout.motion.rotation(at_node.sheet))
+    along = (boundary.head - boundary.tail)[at_node.edge]
+    along = along * np.exp(1j * layout.lattice.quantum * at_node.isometry[:, 0])
     heading = layout.lattice.position(layout.lattice.steps)
     angle = np.mod(np.angle(heading[None] / along[:, None]), 2 * np.pi)
     key[at_node.point] = np.where(angle > 2 * np.pi - 1e-6, 0.0, angle)
     return key
 
 
-def _pairs(tail: Ints, head: Ints, sheet: Ints, key: Floats, back_key: Floats, name: Ints) -> HalfEdges:
+def _pairs(
+    layout: Layout, tail: Ints, head: Ints, isometry: Ints, key: Floats, back_key: Floats, name: Ints
+) -> HalfEdges:
     """Edges as two half-edges each."""
     k = len(tail)
     number = np.arange(k)
     return HalfEdges(
         np.concatenate([tail, head]),
         np.concatenate([head, tail]),
-        np.concatenate([sheet, -sheet]),
+        np.concatenate([isometry, layout.lattice.invert(isometry)]),
         np.concatenate([key, back_key]),
         np.concatenate([number + k, number]),
         np.zeros(2 * k, dtype=bool),
@@ -163,24 +166,32 @@ def _pairs(tail: Ints, head: Ints, sheet: Ints, key: Floats, back_key: Floats, n
     )
 
 
-def _along_rim(rim: Rim, on_rim: RimPoints) -> HalfEdges:
+def _along_boundary(layout: Layout, boundary: Boundary, on: BoundaryPoints) -> HalfEdges:
     """The boundary between successive points, inside and outside."""
-    order = np.lexsort((on_rim.t, on_rim.edge))
-    point, edge, sheet = on_rim.point[order], on_rim.edge[order], on_rim.sheet[order]
-    loop = rim.loop[edge]
+    lattice = layout.lattice
+    order = np.lexsort((on.t, on.edge))
+    point, edge, isometry = on.point[order], on.edge[order], on.isometry[order]
+    loop = boundary.loop[edge]
     k = len(order)
     following = np.arange(1, k + 1)
     first = np.unique(loop, return_index=True)[1]
     last = np.append(first[1:], k)[: len(first)] - 1
     following[last] = first
-    reached = np.concatenate([[0], np.cumsum(rim.sheet)])
-    total = np.array([rim.sheet[rim.loop == which].sum() for which in (0, 1)])
-    passed = reached[edge[following]] - reached[edge]
-    passed[last] += total[loop[last]]
+    # What is passed from edge to edge, as a quotient of products from the very first edge on; the last point
+    # of a loop is followed by the first one, once around.
+    upto = lattice.partial_products(boundary.step)
+    passed = lattice.compose(lattice.invert(upto[edge]), upto[edge[following]])
+    begin = np.searchsorted(boundary.loop, loop[last], side="left")
+    end = np.searchsorted(boundary.loop, loop[last], side="right")
+    around = lattice.compose(upto[end], lattice.invert(upto[begin]))
+    passed[last] = lattice.compose(
+        lattice.invert(upto[edge[last]]), lattice.compose(around, upto[edge[first]])
+    )
     halves = _pairs(
+        layout,
         point,
         point[following],
-        sheet + passed - sheet[following],
+        lattice.compose(isometry, lattice.compose(passed, lattice.invert(isometry[following]))),
         np.full(k, ALONG),
         np.full(k, BACK),
         np.full(k, -1),

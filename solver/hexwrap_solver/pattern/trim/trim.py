@@ -1,7 +1,28 @@
-"""Cutting the pattern along the boundary: the arrangement of links and boundary, traced face by face.
+"""Cutting the pattern along the boundary.
 
-Every vertex of a cut cell is a node, a place where a link meets the boundary, or a corner of the boundary,
-and is shared by the cells around it; cells that the boundary cuts into several pieces come out as several.
+Near the boundary the edges of the pattern and the boundary itself are a plane graph, the *arrangement*: its
+points are nodes, places where an edge of the pattern meets the boundary, and corners of the boundary; its
+half-edges run along pattern edges, along pieces of them that lie between two places of the boundary
+("chords"), and along the boundary, inside and outside of it.
+
+Around each point the half-edges have an order. The half-edge that follows h, with the same face on its left,
+is the first one clockwise from the twin of h around the head of h:
+
+                    \\  next(h)
+                     \\
+        ---- h ----->  •          turning clockwise from twin(h), the first half-edge met is next(h)
+        <- twin(h) --  |
+
+so that faces are the cycles of h ↦ next(h). Those bounded by whole cells are known already, and the outside
+is no face; what remains are the cut cells. A cell that the boundary cuts into several pieces comes out as
+several. No place is ever compared with another: the order around points, the twins and the lattice isometries
+along half-edges are all that is needed, so that this works on nets that overlap themselves.
+
+Pieces smaller than SLIVER of a cell would be no panels. Taking away the half-edges that part such a piece
+from a cut neighbour joins the two, as it merges two faces of any plane graph. The corner at which the edge
+taken away met a straight piece of boundary then goes, too.
+
+A boundary loop that no edge of the pattern meets lies inside one cell, as a hole. Then that cell is left out.
 """
 
 from __future__ import annotations
@@ -11,22 +32,23 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged
-from hexwrap_solver.conformal.types import ConformalMap
-from hexwrap_solver.pattern.lay.cells import Cells, reverse_links, whole_cells
-from hexwrap_solver.pattern.lay.edges import Links
-from hexwrap_solver.pattern.lay.nodes import Layout, Nodes
+from hexwrap_solver.pattern.lay.cells import Cells, WholeCells, sides_by_edge
+from hexwrap_solver.pattern.lay.edges import PatternEdges
+from hexwrap_solver.pattern.lay.layout import Layout
+from hexwrap_solver.pattern.lay.nodes import Nodes
 from hexwrap_solver.pattern.trim.arrangement import HalfEdges, Points, arrangement
+from hexwrap_solver.pattern.trim.boundary import Boundary
 
 #: Pieces smaller than this part of a cell are joined to a cut neighbour, or dropped where there is none.
 SLIVER = 0.05
 
-#: Faces thinner than this many times the reach, over the length of an edge, are rounding: a boundary that
-#: runs along links.
+#: Faces thinner than this many times the tolerance, over the length of an edge, are rounding: a boundary that
+#: runs along pattern edges.
 NOTHING = 4.0
 
 
 class TooCoarse(Exception):
-    """A face of the arrangement goes around the surface: no link separates it from itself."""
+    """A face of the arrangement goes around the surface: no edge of the pattern separates it from itself."""
 
 
 @dataclass(frozen=True)
@@ -42,97 +64,97 @@ class Trimmed:
     lost: int = 0
 
 
-def trim(cmap: ConformalMap, layout: Layout, nodes: Nodes, links: Links) -> Trimmed:
-    """Whole cells and the cells that the boundary cuts."""
-    lattice, motion = layout.lattice, layout.motion
-    corner, turns, direction = whole_cells(lattice, motion, links)
-    used = np.zeros(links.head.size, dtype=bool)
-    used[corner * lattice.order + direction] = True
-    points, edges = arrangement(cmap, layout, nodes, links, used)
-    faces = _trace(edges, used)
+def trim(layout: Layout, boundary: Boundary, nodes: Nodes, edges: PatternEdges, cells: WholeCells) -> Trimmed:
+    """Whole cells and the cells that the boundary cuts.
+
+    Raises TooCoarse where a face goes around the surface.
+    """
+    lattice = layout.lattice
+    side_of_edge = sides_by_edge(lattice, edges, cells)
+    used = side_of_edge >= 0
+    points, half_edges = arrangement(layout, boundary, nodes, edges, used)
+    faces = _trace(layout, half_edges, used)
     area = _areas(layout, points, faces)
-    nothing, sliver = NOTHING * layout.reach * lattice.edge, SLIVER * lattice.cell_area
-    gone = _slivers(edges, faces, area, (nothing, sliver), _lengths(layout, points, edges))
+    nothing, sliver = NOTHING * layout.tolerance * lattice.edge, SLIVER * lattice.cell_area
+    gone = _slivers(half_edges, faces, area, (nothing, sliver), _lengths(layout, points, half_edges))
     joined = 0
     if gone.any():
         joined = int(((area > nothing) & (area < sliver)).sum())
-        edges = edges.without(gone)
-        faces = _trace(edges, used)
-        linked = np.bincount(edges.tail[~edges.outer], minlength=len(points.face)) > 1
+        half_edges = half_edges.without(gone)
+        faces = _trace(layout, half_edges, used)
+        linked = np.bincount(half_edges.tail[~half_edges.outer], minlength=len(points.face)) > 1
         faces = faces.entries(~points.straight[faces.corner] | linked[faces.corner])
         area = _areas(layout, points, faces)
     small = area < sliver
     lost = int((small & (area > nothing)).sum())
     kept = faces.part(~small)
-    cells = _together(corner, turns, direction, kept, edges, links, layout)
-    whole = np.arange(cells.n) < len(corner)
+    together = _together(layout, cells, side_of_edge, kept, half_edges, edges)
+    whole = np.arange(together.n) < cells.n
     dropped = float(area[small].sum() / lattice.cell_area)
-    return Trimmed(cells, whole, points, dropped, max(joined - lost, 0), lost)
+    return Trimmed(together, whole, points, dropped, max(joined - lost, 0), lost)
 
 
 @dataclass(frozen=True)
 class _Faces:
-    """half_edge: per face, in order; turns: aligned, sheets of the tails seen from the first one."""
+    """half_edge: per face, in order; isometry: aligned, (h, 4), from the tails' own coordinates to those of
+    the first one."""
 
     half_edge: Ragged
-    turns: Ints
+    isometry: Ints
     corner: Ints
 
     def part(self, keep: Bools) -> _Faces:
         """Some of the faces."""
         entry = np.repeat(keep, self.half_edge.lengths)
         offsets = np.concatenate([[0], np.cumsum(self.half_edge.lengths[keep])])
-        return _Faces(Ragged(self.half_edge.values[entry], offsets), self.turns[entry], self.corner[entry])
+        half_edge = Ragged(self.half_edge.values[entry], offsets)
+        return _Faces(half_edge, self.isometry[entry], self.corner[entry])
 
     def entries(self, keep: Bools) -> _Faces:
         """All faces with some of their corners; the side before a corner left out goes on to the next."""
         lengths = np.bincount(self.half_edge.row[keep], minlength=self.half_edge.n_rows)
         offsets = np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
-        return _Faces(Ragged(self.half_edge.values[keep], offsets), self.turns[keep], self.corner[keep])
+        return _Faces(Ragged(self.half_edge.values[keep], offsets), self.isometry[keep], self.corner[keep])
 
 
-def _trace(edges: HalfEdges, used: Bools) -> _Faces:
+def _trace(layout: Layout, edges: HalfEdges, used: Bools) -> _Faces:
     """Cycles of half-edges that bound neither a whole cell nor the outside, all walked at once."""
     following = edges.next()
     taken = edges.outer.copy()
     named = edges.name >= 0
     taken[named] |= used[edges.name[named]]
     start = np.flatnonzero(~taken)
-    at, turns = start.copy(), np.zeros(len(start), dtype=np.int64)
+    at, isometry = start.copy(), np.zeros((len(start), 4), dtype=np.int64)
     walker = np.arange(len(start))
-    who, what, sheets, when = [], [], [], []
-    step = 0
+    nothing = np.zeros(0, dtype=np.int64)
+    who, what, where = [nothing], [nothing], [np.zeros((0, 4), dtype=np.int64)]
     finished = np.zeros(len(start), dtype=bool)
     while len(walker):
         who.append(walker)
         what.append(at)
-        sheets.append(turns)
-        when.append(np.full(len(walker), step))
-        turns = turns + edges.sheet[at]
+        where.append(isometry)
+        isometry = layout.lattice.compose(isometry, edges.isometry[at])
         at = following[at]
-        step += 1
         done = at == start[walker]
         finished[walker[done]] = True
-        if (turns[done] != 0).any():
+        if (isometry[done, 3] != 0).any():
             raise TooCoarse
         going = ~done & (at > start[walker])  # each cycle is walked to its end from its lowest half-edge
-        walker, at, turns = walker[going], at[going], turns[going]
-    all_who = np.concatenate(who) if who else start
+        walker, at, isometry = walker[going], at[going], isometry[going]
+    all_who = np.concatenate(who)
     entry = np.flatnonzero(finished[all_who])
-    time = np.concatenate(when)[entry] if who else start
-    entry = entry[np.lexsort((time, all_who[entry]))]
+    entry = entry[np.argsort(all_who[entry], kind="stable")]
     lengths = np.bincount(all_who[entry], minlength=len(start))[finished]
-    half_edge = np.concatenate(what)[entry] if who else start
+    half_edge = np.concatenate(what)[entry]
     offsets = np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
-    sheet = np.concatenate(sheets)[entry] if who else start
-    return _Faces(Ragged(half_edge, offsets), sheet, edges.tail[half_edge])
+    return _Faces(Ragged(half_edge, offsets), np.concatenate(where)[entry], edges.tail[half_edge])
 
 
 def _areas(layout: Layout, points: Points, faces: _Faces) -> Floats:
     """(f,) in lattice units."""
     if not faces.half_edge.n_rows:
         return np.zeros(0)
-    place = layout.motion.carry(points.place[faces.corner], faces.turns)
+    place = layout.lattice.carry(faces.isometry, points.place[faces.corner])
     place = place - place[faces.half_edge.offsets[:-1]][faces.half_edge.row]
     cross = (place.conj() * place[faces.half_edge.next()]).imag / 2
     return np.asarray(np.add.reduceat(cross, faces.half_edge.offsets[:-1]))
@@ -140,9 +162,8 @@ def _areas(layout: Layout, points: Points, faces: _Faces) -> Floats:
 
 def _lengths(layout: Layout, points: Points, edges: HalfEdges) -> Floats:
     """(h,) lengths of half-edges in lattice units."""
-    return np.asarray(
-        abs(layout.motion.carry(points.place[edges.head], edges.sheet) - points.place[edges.tail])
-    )
+    head = layout.lattice.carry(edges.isometry, points.place[edges.head])
+    return np.asarray(abs(head - points.place[edges.tail]))
 
 
 def _slivers(
@@ -161,13 +182,14 @@ def _slivers(
     mine, other = faces.half_edge.row[entry], face_of[edges.twin[half_edge]]
     fits = other >= 0
     fits &= np.where(fits, area[other] >= between[1], False)
-    after_rim = np.zeros(len(edges.tail), dtype=bool)
-    on_rim = edges.outer[edges.twin[faces.half_edge.values]]
-    after_rim[faces.half_edge.values[faces.half_edge.next()]] = on_rim
+    after_boundary = np.zeros(len(edges.tail), dtype=bool)
+    on_boundary = edges.outer[edges.twin[faces.half_edge.values]]
+    after_boundary[faces.half_edge.values[faces.half_edge.next()]] = on_boundary
     mine, other, half_edge = mine[fits], other[fits], half_edge[fits]
     pair, index = np.unique(np.stack([mine, other]), axis=1, return_inverse=True)
     border, follows = (
-        np.bincount(index.ravel(), weights=w[half_edge], minlength=pair.shape[1]) for w in (length, after_rim)
+        np.bincount(index.ravel(), weights=w[half_edge], minlength=pair.shape[1])
+        for w in (length, after_boundary)
     )
     order = np.lexsort((-follows, -np.round(border, 7), pair[0]))
     best = order[np.unique(pair[0][order], return_index=True)[1]]
@@ -178,28 +200,31 @@ def _slivers(
 
 
 def _together(
-    corner: Ints, turns: Ints, direction: Ints, cut: _Faces, edges: HalfEdges, links: Links, layout: Layout
+    layout: Layout,
+    whole: WholeCells,
+    side_of_edge: Ints,
+    cut: _Faces,
+    half_edges: HalfEdges,
+    edges: PatternEdges,
 ) -> Cells:
-    """Whole and cut cells in one; a side's twin is found by the half-edge or by the link it runs along."""
-    order, size = layout.lattice.order, corner.size
-    side_of_link = np.full(links.head.size, -1, dtype=np.int64)
-    slot = (corner * order + direction).ravel()
-    side_of_link[slot] = np.arange(size)
+    """Whole and cut cells in one; twins are found by half-edges, or by the pattern edges they run along."""
+    lattice, size = layout.lattice, len(whole.direction)
     half_edge = cut.half_edge.values
-    side_of_half = np.full(len(edges.tail), -1, dtype=np.int64)
+    side_of_half = np.full(len(half_edges.tail), -1, dtype=np.int64)
     side_of_half[half_edge] = size + np.arange(len(half_edge))
-    name = edges.name[half_edge]
-    side_of_link[name[name >= 0]] = side_of_half[half_edge[name >= 0]]
-    back = reverse_links(layout.lattice, layout.motion, links, slot // order, slot % order)
-    twin_cut = side_of_half[edges.twin[half_edge]]
-    twin_name = edges.name[edges.twin[half_edge]]
-    twin_cut = np.where((twin_cut < 0) & (twin_name >= 0), side_of_link[twin_name], twin_cut)
-    lengths = np.concatenate([np.full(len(corner), layout.lattice.sides), cut.half_edge.lengths])
+    side_of_edge = side_of_edge.copy()
+    name = half_edges.name[half_edge]
+    side_of_edge[name[name >= 0]] = side_of_half[half_edge[name >= 0]]
+    reverse = edges.reverse(lattice, whole.corner.values.astype(np.int64), whole.direction)
+    twin_cut = side_of_half[half_edges.twin[half_edge]]
+    twin_name = half_edges.name[half_edges.twin[half_edge]]
+    twin_cut = np.where((twin_cut < 0) & (twin_name >= 0), side_of_edge[twin_name], twin_cut)
+    lengths = np.concatenate([whole.corner.lengths, cut.half_edge.lengths])
     return Cells(
         Ragged(
-            np.concatenate([corner.ravel(), cut.corner]),
+            np.concatenate([whole.corner.values, cut.corner]),
             np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64),
         ),
-        np.concatenate([turns.ravel(), cut.turns]),
-        np.concatenate([side_of_link[back], twin_cut]),
+        np.concatenate([whole.isometry, cut.isometry]),
+        np.concatenate([side_of_edge[reverse], twin_cut]),
     )

@@ -36,6 +36,9 @@ class Line(object):
         assert isinstance(start, Point3d) and isinstance(end, Point3d)
         self.From, self.To = start, end
 
+    def ToNurbsCurve(self):
+        return PolylineCurve((self.From, self.To))
+
 
 class MeshFace(object):
     def __init__(self, corners):
@@ -47,6 +50,10 @@ class MeshFace(object):
 class _Vertices(object):
     def __init__(self, points):
         self.points = points
+
+    def Add(self, x, y, z):
+        _floats((x, y, z))
+        self.points.append((x, y, z))
 
     @property
     def Count(self):
@@ -79,8 +86,15 @@ class _Faces(object):
     def __getitem__(self, i):
         return MeshFace(self.rows[i])
 
+    def AddFace(self, *corners):
+        assert 3 <= len(corners) <= 4
+        self.rows.append(corners)
+
 
 class _Normals(list):
+    def ComputeNormals(self):
+        return True
+
     @property
     def Count(self):
         return len(self)
@@ -144,7 +158,15 @@ class MeshingParameters(object):
     pass
 
 
-class Brep(GeometryBase):
+class _Meshed(GeometryBase):
+    def meshed(self):
+        whole = Mesh()
+        for part in self.parts:
+            whole.Append(part)
+        return whole
+
+
+class Brep(_Meshed):
     """parts: what Rhino would mesh its faces to."""
 
     def __init__(self, parts):
@@ -157,7 +179,7 @@ class Brep(GeometryBase):
         return Brep(self.parts)
 
 
-class Surface(GeometryBase):
+class Surface(_Meshed):
     def __init__(self, parts):
         self.parts = parts
 
@@ -173,6 +195,36 @@ class Surface(GeometryBase):
 
 class Curve(GeometryBase):
     pass
+
+
+class Circle(object):
+    """A structure, as a wire of circles carries it: no geometry, no curve."""
+
+    def __init__(self, x, y, radius):
+        self.x, self.y, self.radius = x, y, radius
+
+    def ToNurbsCurve(self):
+        return CircleCurve(self.x, self.y, self.radius)
+
+
+class Point(GeometryBase):
+    def __init__(self, location):
+        self.Location = location
+
+
+class Transform(object):
+    def __init__(self, diagonal):
+        self.entries = dict(((i, j), diagonal * (i == j)) for i in range(4) for j in range(4))
+
+    def __setitem__(self, place, value):
+        _floats((value,))
+        assert place in self.entries
+        self.entries[place] = value
+
+    def moved(self, p):
+        """A point [x, y, z] after the motion."""
+        e = self.entries
+        return [sum(e[i, j] * p[j] for j in range(3)) + e[i, 3] for i in range(3)]
 
 
 class PolylineCurve(Curve):

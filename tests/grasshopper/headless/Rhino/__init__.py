@@ -1,7 +1,8 @@
-"""What the components use of Rhino: the user interface's thread, and geometry."""
+"""What the components use of Rhino: the user interface's thread, geometry, and a document."""
 
 import threading
 
+import Rhino.DocObjects
 import Rhino.Geometry
 
 try:
@@ -40,3 +41,7 @@ class RhinoApp(object):
     def InvokeOnUiThread(action):
         assert isinstance(action, System.Action), "InvokeOnUiThread takes a delegate"
         RhinoApp.waiting.put(action)
+
+
+class RhinoDoc(object):
+    ActiveDoc = None  # a scenario opens one

@@ -7,6 +7,10 @@ class Object(object):
     pass
 
 
+class Int32(int):
+    """A whole number of .NET's own."""
+
+
 class Action(object):
     """A delegate: Rhino's own methods take nothing else."""
 
