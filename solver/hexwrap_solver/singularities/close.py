@@ -55,7 +55,8 @@ class Line:
 class Seen:
     """The map at some moves. place: (3, m) the layout. image: (e,) M(c) − c of every leaf's motion M, c
     being the root's place; turn: (e,) quanta by which M turns. foot: per straight loop a point of it less
-    c, and heading its direction. residual: of the angle sums, radians."""
+    c, and heading its direction. residual: of the angle sums, radians. lengths, metric: (3, m) of the flat
+    triangles."""
 
     surface: Surface
     u: Floats
@@ -66,6 +67,8 @@ class Seen:
     foot: Complexes
     heading: Complexes
     residual: float
+    lengths: Floats
+    metric: Corners
 
 
 class Chart:
@@ -126,14 +129,27 @@ class Chart:
         u, corners, residual = self._solve(enough)
         total = u + factor
         shift = float(self.area @ total / self.area.sum())
-        place = _develop(self.cut.twin, self.energy.scaled_lengths(u - shift), corners)
+        flat_lengths = self.energy.scaled_lengths(u - shift)
+        place = _develop(self.cut.twin, flat_lengths, corners)
         flat = place.T.ravel()
         center = complex(flat[self._root])
         image, turn = self._images(flat, center)
         rims = [(flat[h], flat[next_half_edge(h)]) for h in self.straight]
         foot = np.array([complex((start + end).mean() / 2) - center for start, end in rims])
         heading = np.array([complex((end - start).sum()) for start, end in rims])
-        return Seen(surface, total - shift, place, image, turn, center, foot, heading, residual)
+        return Seen(
+            surface,
+            total - shift,
+            place,
+            image,
+            turn,
+            center,
+            foot,
+            heading,
+            residual,
+            flat_lengths,
+            corners,
+        )
 
     def _solve(self, enough: float) -> tuple[Floats, Corners, float]:
         """Newton's method from the last solution; the Hessian is factorised again where it has aged."""
@@ -246,17 +262,25 @@ class Closing:
     lie on its lines."""
 
     def __init__(
-        self, chart: Chart, width: float, line: Line | None = None, free_scale: float = 0.05
+        self,
+        chart: Chart,
+        width: float,
+        line: Line | None = None,
+        free_scale: float = 0.05,
+        aligned: tuple[bool, ...] | None = None,
     ) -> None:
         """width: of a cell in the domain; it may change by the share ``free_scale``. line: None leaves
-        straight loops where they come."""
+        straight loops where they come. aligned: per loop, whether it is to be a line; None: straight ones."""
         self.chart, self.width, self.free_scale = chart, width, free_scale
-        self.line = line if chart.straight else None
+        straight = [end == "straight" for end in chart.ends]
+        on_line = straight if aligned is None else [a and b for a, b in zip(aligned, straight, strict=True)]
+        self.line = line if any(on_line) else None
+        self.lines = np.flatnonzero(np.array(on_line, dtype=bool)[np.array(straight, dtype=bool)])
         self.order = round(2 * np.pi / chart.quantum)
         self.zeta = complex(np.exp(1j * chart.quantum))
         self.base = chart.at(np.zeros(chart.unknowns))
         s = len(chart.cones) - 1
-        loops = [-1] * s + [-2 if end == "free" or self.line is None else -3 for end in chart.ends]
+        loops = [-1] * s + [-2 if self.line is None or not on else -3 for on in on_line]
         kind = np.array(loops, dtype=np.int64)
         # Of the motions around all leaves and the root one follows from the others.
         spare = np.flatnonzero(kind == -2)
@@ -275,8 +299,9 @@ class Closing:
         """Of straight loops that are to be aligned, inwards."""
         if self.line is None:
             return np.zeros(0)
-        inward = 1j * seen.heading / np.abs(seen.heading)
-        return np.asarray(abs(factor) * (inward.conj() * seen.foot).real)
+        heading, foot = seen.heading[self.lines], seen.foot[self.lines]
+        inward = 1j * heading / np.abs(heading)
+        return np.asarray(abs(factor) * (inward.conj() * foot).real)
 
     def _values(self, seen: Seen, factor: complex) -> Floats:
         """All equations, real."""
@@ -356,7 +381,7 @@ class Closing:
     def _lattice(self, factor: complex) -> tuple[Floats, Floats]:
         """(equations, integers) and (equations,): the admissible values are steps @ z + rest."""
         e, columns = len(self.kept), []
-        depths = len(self.chart.straight) if self.line is not None else 0
+        depths = len(self.lines) if self.line is not None else 0
         for i in range(e):
             units = [self.divisor[i], self.divisor[i] * self.zeta]
             if self.aligned[i] and self.line is not None:
