@@ -22,6 +22,7 @@ from hexwrap_solver.errors import (
     NotAdaptedError,
     PanelsError,
     PatternError,
+    SingularitiesError,
     SurfaceError,
 )
 from hexwrap_solver.surface.errors import (
@@ -57,6 +58,7 @@ PLACES: dict[type[HexwrapError], str] = {
     GaussBonnetError: "/boundary",
     BoundaryError: "/boundary",
     NotAdaptedError: "/boundary",
+    SingularitiesError: "/singularities",
     PatternError: "/pattern",
     PanelsError: "/panels",
 }

@@ -7,6 +7,7 @@
     │   ├── SettingError        settings that contradict each other
     │   ├── GaussBonnetError    boundary angles that no surface can have, equation (1)
     │   ├── BoundaryError       a boundary vertex or angle that cannot be used
+    │   ├── SingularitiesError   singularities that are missing, or that no such surface can have
     │   ├── NotAdaptedError     cone angle no multiple of the pattern's quantum, definition 2
     │   ├── SingularityError    singularities that cannot be where or what they are asked for
     │   ├── PatternError        no pattern of that size, kind or place fits
@@ -86,6 +87,11 @@ class GaussBonnetError(RequestError):
 class BoundaryError(RequestError):
     slug = "boundary"
     title = "A boundary condition cannot be used"
+
+
+class SingularitiesError(RequestError):
+    slug = "singularities"
+    title = "The singularities do not suit the surface"
 
 
 class NotAdaptedError(RequestError):

@@ -1,4 +1,4 @@
-"""Every way in which a sent surface can fail to be an annulus that can be mapped.
+"""Every way in which a sent surface can fail to be one that can be mapped.
 
 SurfaceError
 ├── of the data
@@ -14,7 +14,7 @@ SurfaceError
 │   ├── NonManifoldVertexError   faces that meet in a vertex only
 │   ├── SeveralComponentsError   more than one piece
 │   ├── NotOrientableError       a Möbius band
-│   └── NotAnnulusError          closed, wrong number of boundary loops, or handles
+│   └── HandlesError             a torus, or a surface with handles
 └── of a NURBS surface
     ├── NurbsDataError           degree, knots, weights or control points that define no surface
     ├── NotClosedError           closed in no direction, or not where it claims to be
@@ -83,11 +83,11 @@ class NotOrientableError(SurfaceError):
     title = "The surface has only one side"
 
 
-class NotAnnulusError(SurfaceError):
-    """data["reason"] is ``closed``, ``loops`` or ``handle``; the figures stand beside it."""
+class HandlesError(SurfaceError):
+    """edges: a loop to cut along; data: loops, Euler characteristic, genus and the loop's length."""
 
-    slug = "not-an-annulus"
-    title = "The surface is not tube-like"
+    slug = "handles"
+    title = "The surface has handles"
 
 
 class NurbsDataError(SurfaceError):

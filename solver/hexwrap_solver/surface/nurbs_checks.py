@@ -8,7 +8,7 @@ import numpy as np
 
 from hexwrap_solver.arrays import Floats
 from hexwrap_solver.surface.checks import check_extent, check_finite
-from hexwrap_solver.surface.errors import NotAnnulusError, NotClosedError, NurbsDataError, PoleError
+from hexwrap_solver.surface.errors import HandlesError, NotClosedError, NurbsDataError, PoleError
 from hexwrap_solver.surface.nurbs import domain, evaluate_points
 from hexwrap_solver.surface.types import NurbsSurface
 
@@ -23,7 +23,7 @@ PER_SPAN = 5
 def checked(nurbs: NurbsSurface) -> tuple[NurbsSurface, list[str]]:
     """The surface with its closed direction verified, or found where none was named; and what was repaired.
 
-    Raises NurbsDataError, NonFiniteError, FlatSurfaceError, NotClosedError, NotAnnulusError, PoleError.
+    Raises NurbsDataError, NonFiniteError, FlatSurfaceError, NotClosedError, HandlesError, PoleError.
     """
     check_data(nurbs)
     size = float(np.linalg.norm([np.ptp(x) for x in nurbs.control_points[..., :3].reshape(-1, 3).T]))
@@ -45,10 +45,10 @@ def checked(nurbs: NurbsSurface) -> tuple[NurbsSurface, list[str]]:
             "off along a parameter line."
         )
     if all(closed):
-        raise NotAnnulusError(
-            "The NURBS surface is closed in u and in v, like a torus: a tube is open in one of them, so "
-            "split it along a parameter line.",
-            data={"reason": "closed", "loops": 0, "euler_characteristic": 0, "genus": 1},
+        raise HandlesError(
+            "The NURBS surface is closed in u and in v, like a torus: split it along a parameter line, so "
+            "that it is open in one of them.",
+            data={"loops": 0, "euler_characteristic": 0, "genus": 1},
         )
     if not any(closed):
         raise NotClosedError(

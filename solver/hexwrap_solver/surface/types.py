@@ -104,11 +104,11 @@ class Triangles:
 
 @dataclass(frozen=True)
 class Surface(Triangles):
-    """A triangle mesh that is an annulus: connected, oriented, manifold, two boundary loops, χ = 0.
+    """A triangle mesh of genus 0: connected, oriented, manifold, without handles.
 
     vertices: (n, 3). faces: (m, 3), counter-clockwise seen from outside.
-    loops: the two boundary loops as vertex indices, surface on the left; loop 0 holds the lowest sent
-    vertex index of the boundary.
+    loops: the boundary loops as vertex indices, surface on the left. Of two, loop 0 holds the lowest sent
+    vertex index of the boundary; of any other number, loops are sorted by length, the longest first.
     input_vertex: (n,) a sent vertex that stands at vertex i, or −1.
     vertex_of_input: (n_sent,) the vertex at which each sent vertex stands, or −1 where it was dropped.
     normals: (n, 3) unit vertex normals (sent ones, the NURBS surface's, or area-weighted face normals).
@@ -117,7 +117,7 @@ class Surface(Triangles):
     vertices (in the closed direction, parameters are in the base period); None for sent meshes.
     """
 
-    loops: tuple[Ints, Ints]
+    loops: tuple[Ints, ...]
     input_vertex: Ints
     vertex_of_input: Ints
     normals: Floats

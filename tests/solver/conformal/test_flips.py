@@ -9,7 +9,6 @@ import pytest
 
 from hexwrap_solver.arrays import Floats, no_progress
 from hexwrap_solver.conformal import boundary, conformal_map
-from hexwrap_solver.conformal.cut import cut_open
 from hexwrap_solver.conformal.energy import Energy, opposite_lengths
 from hexwrap_solver.conformal.robust import descent, solve_with_flips
 from hexwrap_solver.conformal.robust import solve as robust
@@ -28,7 +27,7 @@ from tests.solver.conformal.torture import TORTURE, crooked_prism, random_flips
 
 
 def _mirrored(surface: Surface) -> MirrorMesh:
-    sheet = cut_open(surface).sheet
+    sheet = robust._sheets(surface)
     turn = (np.roll(sheet, -1, axis=1) - sheet).ravel()
     lengths = opposite_lengths(surface.vertices, surface.faces)
     return mirror_mesh(surface, np.log(lengths)[[2, 0, 1]].T.ravel(), turn)
