@@ -9,7 +9,6 @@
     │   ├── BoundaryError       a boundary vertex or angle that cannot be used
     │   ├── SingularitiesError   singularities that are missing, or that no such surface can have
     │   ├── NotAdaptedError     cone angle no multiple of the pattern's quantum, definition 2
-    │   ├── SingularityError    singularities that cannot be where or what they are asked for
     │   ├── PatternError        no pattern of that size, kind or place fits
     │   └── PanelsError         no panels under those conditions
     └── ConvergenceError        a computation did not reach its tolerance (figures in the sentence)
@@ -97,12 +96,6 @@ class SingularitiesError(RequestError):
 class NotAdaptedError(RequestError):
     slug = "not-adapted"
     title = "The cone angle does not fit the pattern"
-
-
-class SingularityError(RequestError):
-    slug = "singularities"
-    title = "The singularities cannot be used"
-    default_field = ("singularities",)
 
 
 class PatternError(RequestError):

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from hexwrap_solver.arrays import Floats, Ints
-from hexwrap_solver.errors import SingularityError
+from hexwrap_solver.errors import SingularitiesError
 from hexwrap_solver.singularities.linear import linear_model
 from hexwrap_solver.singularities.search import Search, State, curve
 from hexwrap_solver.singularities.types import Proposal, Rules, SingularitySettings
@@ -41,11 +41,11 @@ def place(
     """The whole curve over the number of singularities, up to ``rules.most``, and the number to take: with
     "auto" as many as pay, else at most ``count``, whatever leaves least uncovered.
 
-    turn: see ``linear.Model``. Raises SingularityError where no number is possible.
+    turn: see ``linear.Model``. Raises SingularitiesError where no number is possible.
     """
     proposals = curve(Search(linear_model(surface, rules, turn), rules))
     if not proposals:
-        raise SingularityError(
+        raise SingularitiesError(
             f"No {rules.most} singularities or fewer can make the angles of this surface add up, "
             f"{_told(rules)}, and keep the distances asked for: allow more."
         )
@@ -58,7 +58,7 @@ def _choice(proposals: list[Proposal], count: int | Literal["auto"]) -> int:
     if count != "auto":
         possible = np.flatnonzero(number <= count)
         if not len(possible):
-            raise SingularityError(
+            raise SingularitiesError(
                 f"At most {count} singularities are asked for, but this surface takes at least {number[0]} "
                 "(Gauss–Bonnet): ask for so many, or give an end of the surface the freedom to turn.",
                 field=("singularities", "count"),
@@ -71,14 +71,14 @@ def _choice(proposals: list[Proposal], count: int | Literal["auto"]) -> int:
 def given(surface: Surface, rules: Rules, settings: SingularitySettings) -> Proposal:
     """The singularities that are listed, with the loop curvatures that suit them best.
 
-    Raises SingularityError: places that cannot be used, indices that do not add up.
+    Raises SingularitiesError: places that cannot be used, indices that do not add up.
     """
     index = np.zeros(0, dtype=np.int64) if settings.indices is None else np.asarray(settings.indices)
     vertex = _vertices(surface, settings, index)
     search = Search(linear_model(surface, rules, seats=vertex), rules)
     state = State.of([(i, int(k)) for i, k in enumerate(index)], (0,) * max(len(search.model.free) - 1, 0))
     if not search.complete(state):
-        raise SingularityError(
+        raise SingularitiesError(
             f"The indices add up to {int(index.sum())}, but {_told(rules)}, they must add up to "
             f"{search.model.total} (Gauss–Bonnet): add singularities of the other sign, or give an end the "
             "freedom to turn (boundary.mode isometric).",
@@ -151,5 +151,5 @@ def _vertices(surface: Surface, settings: SingularitySettings, index: Ints) -> I
     return found
 
 
-def _refused(i: int, name: str, sentence: str, vertices: tuple[int, ...] = ()) -> SingularityError:
-    return SingularityError(sentence, vertices=vertices, field=("singularities", "at", int(i), name))
+def _refused(i: int, name: str, sentence: str, vertices: tuple[int, ...] = ()) -> SingularitiesError:
+    return SingularitiesError(sentence, vertices=vertices, field=("singularities", "at", int(i), name))

@@ -7,7 +7,7 @@ import pytest
 
 from hexwrap_solver.conformal.energy import Energy
 from hexwrap_solver.conformal.newton import minimise
-from hexwrap_solver.errors import SingularityError
+from hexwrap_solver.errors import SingularitiesError
 from hexwrap_solver.singularities.linear import linear_model, targets, vertex_areas
 from hexwrap_solver.singularities.place import given, place
 from hexwrap_solver.singularities.search import Search, State
@@ -145,9 +145,9 @@ def test_away_from_a_curve_and_only_where_given(waist):
 
 def test_too_few_for_the_topology():
     surface = shapes.ellipsoid(800)
-    with pytest.raises(SingularityError, match="takes at least 12"):
+    with pytest.raises(SingularitiesError, match="takes at least 12"):
         place(surface, rules_for(surface, (), 200, most=12), 5)
-    with pytest.raises(SingularityError, match="add up"):
+    with pytest.raises(SingularitiesError, match="add up"):
         place(surface, rules_for(surface, (), 200, most=5))
 
 
@@ -183,17 +183,17 @@ class TestGiven:
         ],
     )
     def test_refusals(self, waist, vertices, indices, fault, field):
-        with pytest.raises(SingularityError, match=fault) as caught:
+        with pytest.raises(SingularitiesError, match=fault) as caught:
             self.listed(waist, vertices, indices)
         assert caught.value.field == field
 
     def test_indices_must_add_up_between_straight_ends(self, waist):
-        with pytest.raises(SingularityError, match="add up to -1") as caught:
+        with pytest.raises(SingularitiesError, match="add up to -1") as caught:
             self.listed(waist, [620], [-1], ("straight", "straight"))
         assert caught.value.data == {"sum": -1, "wanted": 0}
 
     def test_no_endless_list(self, waist):
-        with pytest.raises(SingularityError, match="one too many"):
+        with pytest.raises(SingularitiesError, match="one too many"):
             self.listed(waist, list(range(100, 400)), [1] * 300)
 
 
