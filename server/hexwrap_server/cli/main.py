@@ -21,7 +21,7 @@ from hexwrap_server.cli.demo import ALL, DemoError, run_demo
 from hexwrap_server.cli.local import Task, UsageError, only_map, solve_here, task
 from hexwrap_server.cli.options import add_request_options, as_options, is_option_at_fault
 from hexwrap_server.cli.summary import print_summary
-from hexwrap_server.input.curves import READERS, read_curves, write_curves
+from hexwrap_server.input.curves import READERS, read_drawing, write_curves
 from hexwrap_server.input.curves import WRITERS as CURVE_WRITERS
 from hexwrap_server.input.finished_map import map_in_result
 from hexwrap_server.jobs.lift_curves import flatten_curves, lift_curves
@@ -181,16 +181,18 @@ def _lift(asked: argparse.Namespace) -> int:
     _check_folders([asked.output])
     if not Path(asked.points).is_file():
         raise UsageError(f"{asked.points}: there is no such file.")
-    curves = read_curves(Path(asked.points))
+    drawing = read_drawing(Path(asked.points))
     cmap = map_in_result(Path(asked.input))
     if cmap is None:
         cmap = solve_with_progress(only_map(task(asked.input, asked)), asked.quiet)[0].map
     carry = flatten_curves if asked.flatten else lift_curves
-    carried = carry(cmap, curves, asked.step)
+    carried = carry(cmap, drawing.curves, asked.step)
     if not carried.curves:
         return _refuse(1, "no point of the drawing lies in the domain; see domain.dxf for where that is.")
     save(asked.output, write_curves(ending, carried.curves))
     console = Console(quiet=asked.quiet, soft_wrap=True, highlight=False)
+    for note in drawing.notes():
+        console.print(note)
     if carried.outside:
         console.print(f"{carried.outside} points of the drawing lie outside the domain and were left out")
     if carried.farthest:

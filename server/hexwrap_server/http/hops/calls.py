@@ -13,9 +13,10 @@ import numpy as np
 
 from hexwrap_server.http.hops.components import COMPONENTS, LIFT, PANELS, HopsError
 from hexwrap_server.http.hops.values import output, read_inputs
-from hexwrap_server.input.curves import Curve, rhino_curve
 from hexwrap_server.input.json_text import loads, packed
+from hexwrap_server.input.readers.drawing import Curve
 from hexwrap_server.input.readers.rhino import convert
+from hexwrap_server.input.readers.rhino_curves import rhino_curve
 from hexwrap_server.input.requests import ParsedRequest, SentSurface
 from hexwrap_server.input.schemas import Request, parse_request
 from hexwrap_server.jobs.lift_curves import lift_curves
