@@ -1,0 +1,298 @@
+"""Placement on nets in general: scale, rotation and offset are free as far as the motions leave them so.
+
+A similarity W = A·z + B turns a motion z ↦ ρz + t into W ↦ ρW + (A t + (1 − ρ) B). On the lattice ρ must be a
+power of ζ and the translation one of the tiling, so that each is rounded to the nearest one. Two kinds of
+equations tie the motions together: around a vertex inside, their product is the identity; around a
+singularity of index k it is the rotation by −k quanta about its place, which must be a centre of that
+symmetry. What rounding leaves over is made up for by the least deformation (``deform``), which is told as
+distortion; nothing is left over where the singularities were moved beforehand until all motions are exact.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hexwrap_solver.arrays import Complexes, Floats, Ints
+from hexwrap_solver.conformal.net import Net
+from hexwrap_solver.conformal.types import ConformalMap, Deck, Unrolled
+from hexwrap_solver.errors import NotAdaptedError, PatternError
+from hexwrap_solver.pattern.lattice import Lattice
+from hexwrap_solver.pattern.place.cone import boundary_direction
+from hexwrap_solver.pattern.place.deform import System, deform, distortion_of
+from hexwrap_solver.pattern.place.glued import Glued, around_vertices
+from hexwrap_solver.pattern.place.placement import NEARLY, Placement, anchor_vertex, edge_angle
+from hexwrap_solver.pattern.place.size import girth, size_spread, wanted_edge, width_per_cell
+from hexwrap_solver.pattern.types import PatternSettings
+
+#: Sizes and directions tried, from one end of what is admissible to the other.
+SCALES, DIRECTIONS = 21, 12
+#: Misfit of all motions together, in lattice units, below which nothing needs to be deformed.
+EXACT = 1e-7
+#: Places of the lattice, the best first, whose deformation is computed, until one distorts by less than FINE.
+DEFORMED, FINE = 4, 0.05
+
+
+@dataclass(frozen=True)
+class Motions:
+    """What the motions of a net must fulfil.
+
+    turn: (t,) rotations in quanta. mate: (t,) the inverse of each. words: per singularity, then per vertex
+    at which three or more pieces of the cut meet, the motions met on the way around it. centre: (c,) place of
+    each singularity in the coordinates where its word starts; index: (c,).
+    """
+
+    turn: Ints
+    mate: Ints
+    translation: Complexes
+    words: list[Ints]
+    centre: Complexes
+    index: Ints
+
+
+def place_on_net(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings) -> Placement:
+    """Raises NotAdaptedError where a motion turns by no multiple of the quantum, PatternError where no place
+    of the lattice suits all singularities."""
+    net, faces = cmap.net, cmap.surface.faces
+    motions = _motions(cmap, lattice)
+    angle = edge_angle(lattice, settings)
+    scale = lattice.edge / wanted_edge(cmap, lattice, settings, angle)
+    along = boundary_direction(cmap, lattice, anchor_vertex(cmap))
+    factor = complex(scale * np.exp(-1j * angle) * complex(lattice.position(lattice.steps[0])) / along)
+    factor *= scale / abs(factor)
+    phase = _phase(lattice, settings, angle)
+    rows = np.zeros((len(net.angle), 4), dtype=np.int64)
+    if not len(motions.words) and not np.any(net.crossing):
+        own = _home(cmap)
+        place = factor * (own - own[anchor_vertex(cmap)]) + phase
+        return _placement(cmap, lattice, settings, rows, place, (factor, 0j), angle, 0.0)
+    tried = []
+    for misfit, A, B, rows in _choices(cmap, lattice, settings, motions, factor, phase):
+        glued_rows, corner = around_vertices(lattice, net, cmap.surface.twin, rows, faces)
+        place = A * net.corners.ravel()[corner] + B
+        glued = Glued(lattice, glued_rows)
+        normal = np.zeros((len(place), 2), dtype=complex)
+        depth = np.zeros((len(place), 2))
+        _pin(cmap, lattice, rows, corner, normal, depth)
+        if misfit > EXACT:
+            place = deform(System(cmap, glued, normal), glued, A, place, depth)
+            distortion = distortion_of(cmap, glued, place)
+        else:
+            pinned = normal.any(axis=1)
+            place[pinned] = depth[pinned, 0] + 1j * depth[pinned, 1]
+            distortion = 0.0
+        tried.append((distortion, glued, rows, place, (A, B)))
+        if distortion < FINE:
+            break
+    distortion, glued, rows, place, similarity = min(tried, key=lambda one: one[0])
+    found = _placement(cmap, lattice, settings, rows, place, similarity, angle, distortion)
+    return replace(found, glued=glued)
+
+
+def as_sheet(cmap: ConformalMap) -> ConformalMap:
+    """A net that is glued nowhere (a disk) as the sheet that it is: g is the identity. Others as they are."""
+    if np.any(cmap.net.crossing):
+        return cmap
+    sheet = np.zeros(cmap.surface.faces.shape, dtype=np.int64)
+    return replace(cmap, domain=Unrolled(_home(cmap), sheet, Deck(0.0, 0j), girth(cmap)))
+
+
+def _home(cmap: ConformalMap) -> Complexes:
+    """(n,) places of the vertices, where nothing is glued by more than the identity."""
+    place = np.zeros(len(cmap.surface.vertices), dtype=complex)
+    place[cmap.surface.faces.ravel()] = cmap.corners().ravel()
+    return place
+
+
+def _placement(
+    cmap: ConformalMap,
+    lattice: Lattice,
+    settings: PatternSettings,
+    rows: Ints,
+    place: Complexes,
+    similarity: tuple[complex, complex],
+    angle: float,
+    distortion: float,
+) -> Placement:
+    around = round(girth(cmap) * abs(similarity[0]) / (width_per_cell(lattice, angle) * lattice.edge))
+    none = np.zeros((*cmap.surface.faces.shape, 4), dtype=np.int64)
+    return Placement(
+        place=place,
+        glued=Glued(lattice, none),
+        isometries=rows,
+        rotation=angle,
+        around=max(around, 1),
+        distortion=distortion,
+        notes=(),
+        similarity=similarity,
+    )
+
+
+def _phase(lattice: Lattice, settings: PatternSettings, angle: float) -> complex:
+    width = width_per_cell(lattice, angle) * lattice.edge
+    return lattice.without_translations(complex(width * settings.phase[0], lattice.edge * settings.phase[1]))
+
+
+def _motions(cmap: ConformalMap, lattice: Lattice) -> Motions:
+    net, faces, twin = cmap.net, cmap.surface.faces, cmap.surface.twin
+    steps = net.angle / lattice.quantum
+    used = np.unique(net.crossing)
+    off = abs(steps - np.rint(steps))
+    if (off[used] * lattice.quantum > NEARLY).any():
+        worst = int(used[np.argmax(off[used])])
+        part = "π/3" if lattice.order == 6 else "π/2"
+        raise NotAdaptedError(
+            f"A loop or singularity turns the domain by {net.angle[worst]:.8f} rad, but a {lattice.kind} "
+            f"pattern closes up only where that is a multiple of {part}: choose boundary angles or "
+            f"singularities that add up to one, or boundary.quantum {lattice.kind}.",
+            data={"cone_angle": float(net.angle[worst]), "quantum": lattice.quantum},
+        )
+    turn = np.rint(steps).astype(np.int64) % lattice.order
+    starts = np.full(len(cmap.surface.vertices), len(twin), dtype=np.int64)
+    corners = faces.ravel()
+    np.minimum.at(starts, corners, np.arange(len(corners)))
+    glued = (net.crossing.ravel() > 0) & (twin >= 0)
+    meeting = np.bincount(corners[glued], minlength=len(starts))
+    on_boundary = np.zeros(len(starts), dtype=bool)
+    on_boundary[corners[twin < 0]] = True
+    branching = np.flatnonzero((meeting > 2) & ~on_boundary)
+    branching = branching[~np.isin(branching, cmap.cones.vertex)]
+    words = [_word(net, twin, int(starts[v])) for v in [*cmap.cones.vertex.tolist(), *branching.tolist()]]
+    centre = net.corners.ravel()[starts[cmap.cones.vertex]]
+    return Motions(turn, net.inverse, net.translation, words, centre, cmap.cones.index)
+
+
+def _word(net: Net, twin: Ints, corner: int) -> Ints:
+    """The motions met around a vertex inside, counter-clockwise from one of its corners."""
+    found, at = [], corner
+    while True:
+        at = at - at % 3 + (at + 2) % 3  # the half-edge that comes to the vertex
+        if net.crossing.ravel()[at]:
+            found.append(int(net.crossing.ravel()[at]))
+        at = int(twin[at])
+        if at == corner:
+            return np.array(found, dtype=np.int64)
+
+
+def _choices(
+    cmap: ConformalMap,
+    lattice: Lattice,
+    settings: PatternSettings,
+    motions: Motions,
+    factor: complex,
+    phase: complex,
+) -> list[tuple[float, complex, complex, Ints]]:
+    """(misfit, A, B, rows) of the places of the lattice that fit best, the best first."""
+    fitted = cmap.fitted
+    if fitted is not None and fitted.order == lattice.order:
+        e1 = complex(lattice.position(lattice.basis[0]))
+        A, B = e1 * fitted.factor, e1 * fitted.shift
+        rows, misfit = _rounded(lattice, motions, A, B)
+        if misfit < NEARLY:
+            return [(0.0, A, B, rows)]
+    spread = size_spread(settings)
+    free = not len(cmap.surface.loops)
+    turns = lattice.quantum * np.arange(DIRECTIONS) / DIRECTIONS if free else [0.0]
+    found = []
+    for x in np.linspace(-1, 1, SCALES):
+        for turn in turns:
+            A = factor * (1 + spread * x) * complex(np.exp(1j * turn))
+            at = motions.centre[0] if len(motions.centre) else cmap.corners().ravel()[0]
+            B = -A * complex(at) + (0j if len(motions.centre) else phase)
+            try:
+                rows, misfit = _rounded(lattice, motions, A, B)
+            except ValueError:  # a singularity would stand at no centre of its symmetry
+                continue
+            found.append((misfit + 0.01 * abs(x), A, B, rows))
+    if not found:
+        raise PatternError(
+            "No place of the lattice suits all singularities: one of them would not stand at the centre of a "
+            "cell; move it, or take indices of 1 and -1."
+        )
+    return sorted(found, key=lambda one: one[0])[:DEFORMED]
+
+
+def _rounded(lattice: Lattice, motions: Motions, A: complex, B: complex) -> tuple[Ints, float]:
+    """Rows of isometries for all motions, and how far the worst is from its own translation, lattice units.
+
+    Raises ValueError where a singularity whose motions follow from others stands at no centre.
+    """
+    zeta = np.exp(1j * lattice.quantum * motions.turn)
+    wanted = A * motions.translation + (1 - zeta) * B
+    rows = np.zeros((len(wanted), 4), dtype=np.int64)
+    rows[:, 0] = motions.turn
+    known = np.zeros(len(wanted), dtype=bool)
+    known[0] = True
+    goal = [_centre(lattice, int(k), A * z + B) for z, k in zip(motions.centre, motions.index, strict=True)]
+    identity = np.zeros(4, dtype=np.int64)
+    goal += [identity] * (len(motions.words) - len(goal))
+
+    def enter(i: int, row: Ints) -> None:
+        rows[i] = row
+        rows[motions.mate[i]] = lattice.invert(row)
+        known[[i, motions.mate[i]]] = True
+
+    def follow() -> None:
+        """Enter what is the last unknown of its word."""
+        going = True
+        while going:
+            going = False
+            for word, product in zip(motions.words, goal, strict=True):
+                missing = np.flatnonzero(~known[word])
+                if len(missing) == 1:
+                    at = int(missing[0])
+                    before = lattice.partial_products(rows[word[:at]])[-1]
+                    after = lattice.partial_products(rows[word[at + 1 :]])[-1]
+                    inner = lattice.compose(
+                        lattice.compose(lattice.invert(before), product), lattice.invert(after)
+                    )
+                    enter(int(word[at]), inner)
+                    going = True
+
+    follow()
+    while not known.all():
+        i = int(np.flatnonzero(~known)[0])
+        translation = lattice.translation_near(complex(wanted[i]))
+        enter(i, np.array([motions.turn[i], *translation, 0]))
+        follow()
+    for word, product, k in zip(motions.words, goal, [*motions.index, *[0] * len(goal)], strict=False):
+        row = lattice.partial_products(rows[word])[-1]
+        if k == 0 and (row != product).any():
+            raise ValueError
+        if k and not _is_centre(lattice, row):
+            raise ValueError
+    used = lattice.position(rows[:, 1:3])
+    return rows, float(abs(used - wanted).max())
+
+
+def _centre(lattice: Lattice, k: int, wanted: complex) -> Ints:
+    """The rotation by −k quanta about the nearest centre of a cell: what going around a cone amounts to."""
+    turn = -k % lattice.order  # a full turn but for the cone's curvature
+    offset = 0j if lattice.kind != "quad" else 1.0 + 0j  # the centres of quads are the coset 1
+    centre = lattice.translation_near(wanted - offset) + np.array([int(offset.real), 0])
+    return np.array([turn, *(centre - lattice.rotate(centre, turn)), 0])
+
+
+def _is_centre(lattice: Lattice, row: Ints) -> bool:
+    """Whether a rotation is about the centre of a cell."""
+    centre = _fixed_point(lattice, row)
+    point = np.rint(lattice.coordinates(np.array(centre))).astype(np.int64)
+    on_lattice = abs(complex(lattice.position(point)) - centre) < 1e-6
+    return bool(on_lattice and not lattice.is_node(point))
+
+
+def _fixed_point(lattice: Lattice, row: Ints) -> complex:
+    zeta = np.exp(1j * lattice.quantum * row[0])
+    return complex(lattice.position(row[1:3]) / (1 - zeta))
+
+
+def _pin(
+    cmap: ConformalMap, lattice: Lattice, rows: Ints, corner: Ints, normal: Complexes, depth: Floats
+) -> None:
+    """Singularities stand exactly at the fixed points of the motions around them."""
+    for v in cmap.cones.vertex.tolist():
+        word = _word(cmap.net, cmap.surface.twin, int(corner[v]))
+        centre = _fixed_point(lattice, lattice.partial_products(rows[word])[-1])
+        normal[v] = 1.0, 1j
+        depth[v] = centre.real, centre.imag
