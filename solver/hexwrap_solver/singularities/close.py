@@ -84,12 +84,14 @@ class Chart:
         quantum: float,
         cell: float,
         slope: Floats | None = None,
+        angles: Floats | None = None,
     ) -> None:
-        """The first cone is the root of the cut. slope: (m, 3) squared sine of every half-edge's angle to the
-        horizontal, in which direction a stretch is allowed; None: none is. Raises ConvergenceError."""
+        """The first cone is the root of the cut. angles: see ``targets``. slope: (m, 3) squared sine of
+        every half-edge's angle to the horizontal, in which direction a stretch is allowed; None: none is.
+        Raises ConvergenceError."""
         self.surface, self.cones, self.index, self.cell = surface, cones, index, cell
         self.quantum, self.ends = quantum, ends
-        self.energy = Energy(surface, targets(surface, ends, loops, quantum, cones, index))
+        self.energy = Energy(surface, targets(surface, ends, loops, quantum, cones, index, angles=angles))
         self.factor = Factorisation(self.energy.points, self.energy.rows, self.energy.columns)
         self.cut: Branches = branches(surface, int(cones[0]), cones[1:], tuple(surface.loops))
         self.hold: list[Grip] = grips(surface, cones, cell)

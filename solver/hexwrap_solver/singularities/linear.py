@@ -66,9 +66,10 @@ def targets(
     vertex: Ints,
     index: Ints,
     background: float = 0.0,
+    angles: Floats | None = None,
 ) -> Targets:
     """Cone angles at vertices, curvatures in quanta on loops; background: further curvature, spread evenly
-    over the area."""
+    over the area. angles: (n,) or more, of loops whose ends are "angles"."""
     n = len(surface.vertices)
     angle, tie = np.full(n, 2 * np.pi), np.full(n, -1, dtype=np.int64)
     tie_angle: list[float] = []
@@ -77,24 +78,29 @@ def targets(
         angle -= background * share / share.sum()
     angle[vertex] -= quantum * index
     for loop, end, curvature in zip(surface.loops, ends, loops, strict=True):
-        angle[loop] -= np.pi
+        angle[loop] -= np.pi if end != "angles" or angles is None else 2 * np.pi - angles[loop]
         if end == "free":
             tie[loop] = len(tie_angle)
             tie_angle.append(len(loop) * np.pi - curvature * quantum)
     return Targets(angle, tie, np.array(tie_angle))
 
 
-def reference_loops(surface: Surface, ends: tuple[str, ...], turns: int) -> tuple[int, ...]:
+def reference_loops(surface: Surface, rules: Rules) -> tuple[int, ...]:
     """Curvatures in quanta without singularities: a disk has 2π, an annulus none, and each further opening
-    turns back by 2π. turns: quanta in 2π."""
-    straight = [end == "straight" for end in ends]
+    turns back by 2π; those of loops that are not free are what they are."""
+    ends, turns = rules.ends, round(2 * np.pi / rules.quantum)
+    fixed = [
+        0 if rules.angles is None else round(float((np.pi - rules.angles[loop]).sum()) / rules.quantum)
+        for loop in surface.loops
+    ]
+    free = [end == "free" for end in ends]
     if len(ends) == 1:
-        return (0,) if straight[0] else (turns,)
+        return (turns if free[0] else fixed[0],)
     length = [
         float(np.linalg.norm(np.diff(surface.vertices[loop], axis=0), axis=1).sum()) for loop in surface.loops
     ]
     longest = np.argsort(-np.array(length), kind="stable")[:2]
-    return tuple(0 if i in longest or straight[i] else -turns for i in range(len(ends)))
+    return tuple((0 if i in longest else -turns) if free[i] else fixed[i] for i in range(len(ends)))
 
 
 def linear_model(
@@ -104,12 +110,12 @@ def linear_model(
     nonlinear solution without singularities, one factorisation, and a solve for every seat."""
     turns = round(2 * np.pi / rules.quantum)
     free = tuple(i for i, end in enumerate(rules.ends) if end == "free")
-    loops = reference_loops(surface, rules.ends, turns)
+    loops = reference_loops(surface, rules)
     rest = turns * (2 - len(rules.ends)) - sum(loops)
     none = np.zeros(0, dtype=np.int64)
     area = vertex_areas(surface)
     background = rest * rules.quantum if not free else 0.0
-    wanted = targets(surface, rules.ends, loops, rules.quantum, none, none, background)
+    wanted = targets(surface, rules.ends, loops, rules.quantum, none, none, background, rules.angles)
     energy = Energy(surface, wanted)
     u, factor = _reference(energy)
     patch, seat = _patches(surface, area)

@@ -12,14 +12,12 @@ from hexwrap_solver.arrays import Floats, Ints
 from hexwrap_solver.errors import SingularitiesError
 from hexwrap_solver.singularities.linear import linear_model
 from hexwrap_solver.singularities.search import Search, State, curve
-from hexwrap_solver.singularities.types import Proposal, Rules, SingularitySettings
+from hexwrap_solver.singularities.types import Proposal, Rules, SingularityAt
 from hexwrap_solver.surface.types import Surface
 
 #: Share of the area that one more singularity must be worth, and the part of what is uncovered without any
 #: that all of them together must save.
 WORTH, CLEARLY = 0.002, 0.25
-#: Greatest |k|, and greatest number that may be listed.
-LARGEST, MOST = 2, 200
 
 
 @dataclass(frozen=True)
@@ -68,13 +66,13 @@ def _choice(proposals: list[Proposal], count: int | Literal["auto"]) -> int:
     return best if uncovered[best] <= (1 - CLEARLY) * uncovered[0] else 0
 
 
-def given(surface: Surface, rules: Rules, settings: SingularitySettings) -> Proposal:
+def given(surface: Surface, rules: Rules, listed: tuple[SingularityAt, ...]) -> Proposal:
     """The singularities that are listed, with the loop curvatures that suit them best.
 
     Raises SingularitiesError: places that cannot be used, indices that do not add up.
     """
-    index = np.zeros(0, dtype=np.int64) if settings.indices is None else np.asarray(settings.indices)
-    vertex = _vertices(surface, settings, index)
+    index = np.array([one.index for one in listed], dtype=np.int64)
+    vertex = _vertices(surface, listed)
     search = Search(linear_model(surface, rules, seats=vertex), rules)
     state = State.of([(i, int(k)) for i, k in enumerate(index)], (0,) * max(len(search.model.free) - 1, 0))
     if not search.complete(state):
@@ -97,58 +95,45 @@ def _told(rules: Rules) -> str:
     )
 
 
-def _vertices(surface: Surface, settings: SingularitySettings, index: Ints) -> Ints:
+def _vertices(surface: Surface, listed: tuple[SingularityAt, ...]) -> Ints:
     """(k,) mesh vertices of the list, all checked."""
-    count = len(index)
-    if count > MOST:
-        raise _refused(MOST, "index", f"Singularity {MOST} is one too many: at most {MOST} can be listed.")
-    for i in np.flatnonzero((index == 0) | (np.abs(index) > LARGEST))[:1]:
-        raise _refused(
-            i,
-            "index",
-            f"Singularity {i} has index {index[i]}; it must be 1, −1, 2 or −2 (sides fewer or more).",
-        )
-    sent = np.full(count, -1, dtype=np.int64) if settings.vertices is None else np.asarray(settings.vertices)
-    points = (
-        np.full((count, 3), np.nan) if settings.points is None else np.asarray(settings.points, dtype=float)
-    )
-    loops = [*surface.loops, np.zeros(0, dtype=np.int64)]
-    inner = np.setdiff1d(np.arange(len(surface.vertices)), np.concatenate(loops))
+    nothing = np.zeros(0, dtype=np.int64)
+    inner = np.setdiff1d(np.arange(len(surface.vertices)), np.concatenate([nothing, *surface.loops]))
     tree = cKDTree(surface.vertices[inner])
-    found = np.zeros(count, dtype=np.int64)
-    for i in range(count):
-        if sent[i] < 0:
-            if not np.isfinite(points[i]).all():
-                raise _refused(i, "point", f"Singularity {i} names neither a vertex nor a point.")
-            found[i] = inner[tree.query(points[i])[1]]
-            continue
-        if sent[i] >= len(surface.vertex_of_input):
-            last = len(surface.vertex_of_input) - 1
+    found: list[int] = []
+    for i, one in enumerate(listed):
+        if one.vertex is not None:
+            vertex = _inside(surface, inner, i, one.vertex)
+        else:
+            vertex = int(inner[tree.query(np.array(one.point, dtype=float))[1]])
+        if vertex in found:
             raise _refused(
                 i,
-                "vertex",
-                f"Singularity {i} names vertex {sent[i]}, but only vertices 0 to {last} were sent.",
+                "vertex" if one.point is None else "point",
+                f"Singularity {i} stands where singularity {found.index(vertex)} does: list each place once.",
+                (int(surface.input_vertex[vertex]),),
             )
-        found[i] = surface.vertex_of_input[sent[i]]
-        if found[i] < 0 or found[i] not in inner:
-            raise _refused(
-                i,
-                "vertex",
-                f"Singularity {i} stands at vertex {sent[i]}, which is not inside the surface: choose one at "
-                "least two cells away from its boundary.",
-                (int(sent[i]),),
-            )
-    again = [i for i in range(count) if found[i] in found[:i]]
-    if again:
-        i = again[0]
+        found.append(vertex)
+    return np.array(found, dtype=np.int64)
+
+
+def _inside(surface: Surface, inner: Ints, i: int, sent: int) -> int:
+    """The mesh vertex of a sent one."""
+    if sent >= len(surface.vertex_of_input):
+        last = len(surface.vertex_of_input) - 1
+        raise _refused(
+            i, "vertex", f"Singularity {i} names vertex {sent}, but only vertices 0 to {last} were sent."
+        )
+    vertex = int(surface.vertex_of_input[sent])
+    if vertex not in inner:
         raise _refused(
             i,
-            "vertex" if sent[i] >= 0 else "point",
-            f"Singularity {i} stands where singularity {list(found).index(found[i])} does: list each place "
-            "once.",
-            (int(surface.input_vertex[found[i]]),),
+            "vertex",
+            f"Singularity {i} stands at vertex {sent}, which is not inside the surface: choose one at least "
+            "two cells away from its boundary.",
+            (sent,),
         )
-    return found
+    return vertex
 
 
 def _refused(i: int, name: str, sentence: str, vertices: tuple[int, ...] = ()) -> SingularitiesError:

@@ -3,38 +3,62 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 from hexwrap_solver.arrays import Floats, Ints
+from hexwrap_solver.errors import SettingError
+from hexwrap_solver.setting import Setting
 
-#: Per loop: u is constant along it and its curvature a whole number of quanta, or it is straight.
-End = Literal["free", "straight"]
+#: Per loop: u is constant along it and its curvature a whole number of quanta, it is straight, or its
+#: angles are given.
+End = Literal["free", "straight", "angles"]
+
+
+@dataclass(frozen=True)
+class SingularityAt:
+    """One that is asked for, at a vertex of the sent mesh or near a point. Raises SettingError unless
+    exactly one of the two is given, and for an index of 0."""
+
+    index: Annotated[int, Setting("sides fewer than the other cells, −1: one more", ge=-2, le=2)]
+    vertex: Annotated[
+        int | None, Setting("vertex inside, an index of the sent mesh", ge=0, lt=2**53, unit="vertex")
+    ] = None
+    point: Annotated[
+        tuple[float, float, float] | None, Setting("instead: the vertex nearest to this point")
+    ] = None
+
+    def __post_init__(self) -> None:
+        if (self.vertex is None) == (self.point is None):
+            raise SettingError("give either 'vertex' or 'point'")
+        if self.index == 0:
+            raise SettingError("'index' must be 1, −1, 2 or −2 (sides fewer or more)")
 
 
 @dataclass(frozen=True)
 class SingularitySettings:
-    """What is asked for.
+    """Cells with more or fewer sides, which make the sizes of all others more equal. With ``at``, exactly
+    those."""
 
-    count: at most so many are placed, "auto": as many as pay, None: those listed only. vertices: (k,)
-    *sent* vertex indices, −1 where points gives a place instead. points: (k, 3). indices: (k,) sides fewer
-    of each. With a list, exactly those are taken.
-    """
-
-    count: int | Literal["auto"] | None = None
-    vertices: Ints | None = None
-    points: Floats | None = None
-    indices: Ints | None = None
+    count: Annotated[
+        int | Literal["auto"] | None, Setting("so many at most, or auto: as many as pay", ge=0, le=30)
+    ] = None
+    at: Annotated[tuple[SingularityAt, ...], Setting("where they are to stand, each", most=100)] = ()
+    from_boundary: Annotated[
+        float, Setting("least distance from the boundary", ge=0.5, le=1e6, unit="cells", rare=True)
+    ] = 2.0
 
 
 @dataclass(frozen=True)
 class Rules:
     """What the search must keep to.
 
-    quantum: of the cone angles, π/3 or π/2. cell: width of a cell on the surface, model units. sizes: number
-    of size classes. ends: per loop of the surface. most: number of singularities, at most. from_loops: cells
-    between a singularity and a loop; apart, opposite: between two of the same and of opposite signs. away:
-    (k, 3) points, such as those of a curve, that they must keep ``from_away`` cells from. only: (k, 3) points
-    within ``cell`` of which they must stand, None: anywhere. largest: greatest |k| of one.
+    quantum: of the cone angles, π/3 or π/2. cell: width of a cell on the surface, model units. sizes:
+    number of size classes. ends: per loop of the surface. most: number of singularities, at most.
+    from_loops: cells between a singularity and a loop; apart, opposite: between two of the same and of
+    opposite signs. away: (k, 3) points, such as those of a curve, that they must keep ``from_away`` cells
+    from. only: (k, 3) points within ``cell`` of which they must stand, None: anywhere. largest: greatest
+    |k| of one. angles: (n,) target angles at boundary vertices of loops whose ends are "angles"; None:
+    there are none.
     """
 
     quantum: float
@@ -49,6 +73,7 @@ class Rules:
     from_away: float = 2.0
     only: Floats | None = None
     largest: int = 1
+    angles: Floats | None = None
 
 
 @dataclass(frozen=True)

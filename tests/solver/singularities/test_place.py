@@ -7,12 +7,12 @@ import pytest
 
 from hexwrap_solver.conformal.energy import Energy
 from hexwrap_solver.conformal.newton import minimise
-from hexwrap_solver.errors import SingularitiesError
+from hexwrap_solver.errors import SettingError, SingularitiesError
 from hexwrap_solver.singularities.linear import linear_model, targets, vertex_areas
 from hexwrap_solver.singularities.place import given, place
 from hexwrap_solver.singularities.search import Search, State
 from hexwrap_solver.singularities.sizes import uncovered, uncovered_of_many
-from hexwrap_solver.singularities.types import Rules, SingularitySettings
+from hexwrap_solver.singularities.types import Rules, SingularityAt
 from tests.solver.singularities import shapes
 
 SIXTH = np.pi / 3
@@ -153,8 +153,8 @@ def test_too_few_for_the_topology():
 
 class TestGiven:
     def listed(self, surface, vertices, indices, ends=("free", "free")):
-        settings = SingularitySettings(vertices=np.array(vertices), indices=np.array(indices))
-        return given(surface, rules_for(surface, ends), settings)
+        at = tuple(SingularityAt(k, vertex=v) for v, k in zip(vertices, indices, strict=True))
+        return given(surface, rules_for(surface, ends), at)
 
     def test_stand_where_they_are_listed(self, waist):
         found = self.listed(waist, [620, 340, 500], [-1, 1, -1])
@@ -163,38 +163,35 @@ class TestGiven:
         assert sum(found.loops) == 1
 
     def test_at_points(self, waist):
-        points = waist.vertices[[620, 700]] + 0.01
-        found = given(
-            waist,
-            rules_for(waist, ("free", "free")),
-            SingularitySettings(points=points, indices=np.array([-1, -1])),
-        )
+        at = tuple(SingularityAt(-1, point=tuple(waist.vertices[v] + 0.01)) for v in (620, 700))
+        found = given(waist, rules_for(waist, ("free", "free")), at)
         assert found.vertex.tolist() == [620, 700]
 
     @pytest.mark.parametrize(
-        ("vertices", "indices", "fault", "field"),
+        ("vertices", "fault", "number"),
         [
-            ([620, 700], [-1, 0], "index 0", ("singularities", "at", 1, "index")),
-            ([620, 700], [-1, 4], "index 4", ("singularities", "at", 1, "index")),
-            ([620, 99999], [-1, 1], "only vertices", ("singularities", "at", 1, "vertex")),
-            ([620, 0], [-1, 1], "not inside", ("singularities", "at", 1, "vertex")),
-            ([620, 620], [-1, 1], "list each place once", ("singularities", "at", 1, "vertex")),
-            ([620, -1], [-1, 1], "neither", ("singularities", "at", 1, "point")),
+            ([620, 99999], "only vertices", 1),
+            ([0, 620], "not inside", 0),
+            ([620, 620], "list each place once", 1),
         ],
     )
-    def test_refusals(self, waist, vertices, indices, fault, field):
+    def test_refusals(self, waist, vertices, fault, number):
         with pytest.raises(SingularitiesError, match=fault) as caught:
-            self.listed(waist, vertices, indices)
-        assert caught.value.field == field
+            self.listed(waist, vertices, [-1, 1])
+        assert caught.value.field == ("singularities", "at", number, "vertex")
 
     def test_indices_must_add_up_between_straight_ends(self, waist):
         with pytest.raises(SingularitiesError, match="add up to -1") as caught:
             self.listed(waist, [620], [-1], ("straight", "straight"))
         assert caught.value.data == {"sum": -1, "wanted": 0}
 
-    def test_no_endless_list(self, waist):
-        with pytest.raises(SingularitiesError, match="one too many"):
-            self.listed(waist, list(range(100, 400)), [1] * 300)
+    @pytest.mark.parametrize(
+        "asked",
+        [{"index": 0, "vertex": 3}, {"index": 1}, {"index": 1, "vertex": 2, "point": (0.0, 0.0, 0.0)}],
+    )
+    def test_entries_that_say_nothing(self, asked):
+        with pytest.raises(SettingError):
+            SingularityAt(**asked)
 
 
 class TestUncovered:
