@@ -75,7 +75,7 @@ def rows() -> Iterator[str]:
     for name in SAMPLES:
         wanted = parse_request(samples.load(name), 10**7, 10**6)
         assert isinstance(wanted.surface, SentSurface)
-        surface = take_in(wanted.surface)
+        surface = take_in(wanted.surface, wanted.wanted.surface)
         own = wanted.wanted.boundary.adapted("hex")
         conditions = {
             own.mode: own,

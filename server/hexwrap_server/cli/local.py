@@ -8,16 +8,17 @@ from pathlib import Path
 from typing import Any
 
 from hexwrap_server import samples
-from hexwrap_server.cli.options import asked_body, asked_surface
+from hexwrap_server.cli.options import asked_body
 from hexwrap_server.input.json_text import loads
-from hexwrap_server.input.requests import SentSurface
-from hexwrap_server.input.schemas import parse_request, surface_settings
+from hexwrap_server.input.requests import SentSurface, Wanted
+from hexwrap_server.input.schemas import parse_request
 from hexwrap_server.input.surface_files import read_surface
 from hexwrap_server.jobs.cache import CachingRunner, StageCache
 from hexwrap_server.jobs.work import run_stages
 from hexwrap_server.jobs.worker import Report
-from hexwrap_solver.pipeline import Solution, SolveSettings
-from hexwrap_solver.surface import NurbsSurface, SentMesh
+from hexwrap_solver.pipeline import Solution
+from hexwrap_solver.surface import MeshSettings, NurbsSurface, SentMesh
+from hexwrap_solver.surface.types import SurfaceSettings
 
 #: Nobody but the user waits here, so only what no memory would hold is refused.
 MAX_VERTICES, MAX_PANELS = 20_000_000, 5_000_000
@@ -34,7 +35,7 @@ class Task:
 
     name: str
     surface: SentSurface
-    wanted: SolveSettings
+    wanted: Wanted
 
 
 def read_body(given: str) -> tuple[dict[str, Any], SentMesh | NurbsSurface | None]:
@@ -70,25 +71,19 @@ def task(given: str, arguments: argparse.Namespace) -> Task:
     body, surface = read_body(given)
     if surface is not None:
         body["surface"] = {"id": ""}  # stands for the file's surface while the rest is checked
-    elif isinstance(body["surface"], dict):
-        body["surface"] = asked_surface(arguments, body["surface"])
     request = parse_request(asked_body(arguments, body), MAX_VERTICES, MAX_PANELS)
     sent = request.surface
     if surface is not None:
-        sent = _sent(surface, arguments)
+        sent = _sent(surface)
     if not isinstance(sent, SentSurface):
         raise UsageError(f"{given} names a surface that only a server knows; give the surface itself.")
     return Task(request.name, sent, request.wanted)
 
 
-def _sent(surface: SentMesh | NurbsSurface, arguments: argparse.Namespace) -> SentSurface:
-    """The surface of a file with the settings asked for."""
-    arrays = () if isinstance(surface, SentMesh) else ("nurbs",)
-    given = asked_surface(arguments, dict.fromkeys(arrays))
-    settings = surface_settings(given, arrays, MAX_VERTICES, "/surface")
+def _sent(surface: SentMesh | NurbsSurface) -> SentSurface:
     if isinstance(surface, SentMesh):
-        return SentSurface(mesh=surface, settings=settings)
-    return SentSurface(nurbs=surface, settings=settings)
+        return SentSurface(mesh=surface)
+    return SentSurface(nurbs=surface, settings=SurfaceSettings(MeshSettings(max_vertices=MAX_VERTICES)))
 
 
 def solve_here(asked: Task, report: Report) -> tuple[Solution, dict[str, float]]:
@@ -99,4 +94,4 @@ def solve_here(asked: Task, report: Report) -> tuple[Solution, dict[str, float]]
 
 def only_map(asked: Task) -> Task:
     """The same surface and boundary, without a pattern."""
-    return replace(asked, wanted=SolveSettings(asked.wanted.boundary, None, None))
+    return replace(asked, wanted=replace(asked.wanted, pattern=None, panels=None))

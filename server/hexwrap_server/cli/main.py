@@ -6,11 +6,13 @@ Exit status 0; 1 where the surface or the request cannot be solved (the problem'
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from math import inf
 from pathlib import Path
+from typing import Any
 
 import httpx
 from rich.console import Console
@@ -69,8 +71,16 @@ def _refuse(status: int, *sentences: str) -> int:
     return status
 
 
+class Parser(argparse.ArgumentParser):
+    """Words that begin like a negative number are values, as in ``--angle -13,-4,0=120``."""
+
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(**settings)
+        self._negative_number_matcher = re.compile(r"-\.?\d")
+
+
 def make_parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="hexwrap", description="Seamless hexagonal, quad and triangle panels on tube-like surfaces."
     )
     parser.add_argument("--version", action="version", version=f"hexwrap {__version__}")

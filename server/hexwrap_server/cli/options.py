@@ -10,7 +10,6 @@ from typing import Any
 from hexwrap_server.input.faults import Path, pointer
 from hexwrap_server.input.form import Body, Leaf, is_nullable, leaves
 from hexwrap_server.problems import FormError
-from hexwrap_solver.surface.types import SurfaceSettings
 
 #: Flags that are neither the setting's name nor, for the first setting of a section, the section's.
 FLAGS: dict[Path, str] = {
@@ -66,7 +65,7 @@ class Option:
 
 def _options() -> Iterator[Option]:
     seen = set()
-    for leaf in (*leaves(Body), *leaves(SurfaceSettings, ("surface",))):
+    for leaf in leaves(Body):
         section, name = leaf.path[0], leaf.path[-1]
         is_first = len(leaf.path) == 2 and section != "surface" and section not in seen
         seen.add(section)
@@ -108,7 +107,7 @@ def add_request_options(parser: argparse.ArgumentParser) -> None:
 def asked_body(arguments: argparse.Namespace, body: dict[str, Any]) -> dict[str, Any]:
     """The request body with what was asked on the command line. Raises FormError for a malformed --angle."""
     asked = dict(body)
-    given = {o.path: (o, getattr(arguments, o.name)) for o in _given(arguments) if o.path[0] != "surface"}
+    given = {o.path: (o, getattr(arguments, o.name)) for o in _given(arguments) if _fits(o, body)}
     for size, other in (SIZES, SIZES[::-1]):
         if (
             size in given and given[size][1] is not None
@@ -126,14 +125,12 @@ def asked_body(arguments: argparse.Namespace, body: dict[str, Any]) -> dict[str,
     return asked
 
 
-def asked_surface(arguments: argparse.Namespace, surface: dict[str, Any]) -> dict[str, Any]:
-    """A surface with the settings asked for beside it; sizes of meshes only where it is a NURBS surface."""
-    asked = dict(surface)
-    for option in _given(arguments):
-        section, *path = option.path
-        if section == "surface" and (path[0] != "mesh" or "nurbs" in surface):
-            _put(asked, tuple(path), getattr(arguments, option.name))
-    return asked
+def _fits(option: Option, body: dict[str, Any]) -> bool:
+    """Sizes of meshes are for surfaces that are not meshes already."""
+    surface = body.get("surface")
+    return (
+        option.path[:2] != ("surface", "mesh") or not isinstance(surface, dict) or "vertices" not in surface
+    )
 
 
 def is_option_at_fault(arguments: argparse.Namespace, pointers: Iterable[str]) -> bool:

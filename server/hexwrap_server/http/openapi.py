@@ -7,11 +7,14 @@ from typing import Any
 from hexwrap_server.http.openapi_result import RESULT as _RESULT
 from hexwrap_server.http.schema_words import NUMBER, PLANE, POINT, listed, nullable, record
 from hexwrap_server.input.form import Body, schema
-from hexwrap_solver.surface.types import MeshSettings
+from hexwrap_solver.surface.types import SurfaceSettings
 
+_SETTINGS = schema(SurfaceSettings)["properties"]
+_BESIDE_A_MESH = {name: part for name, part in _SETTINGS.items() if name != "mesh"}
 _MESH = record(
     ("vertices", "faces"),
     more=False,
+    **_BESIDE_A_MESH,
     vertices=listed(POINT),
     faces=listed(listed({"type": "integer", "minimum": 0}) | {"minItems": 3, "maxItems": 4}),
     normals=nullable(listed(POINT)),
@@ -27,9 +30,9 @@ _NURBS = record(
         control_points=listed(listed(listed(NUMBER) | {"minItems": 3, "maxItems": 4})),
         closed=listed({"type": "boolean"}, 2),
     ),
-    mesh=nullable(schema(MeshSettings)),
+    **_SETTINGS,
 )
-_SURFACE = {"anyOf": [_MESH, _NURBS, record(("id",), more=False, id={"type": "string"})]}
+_SURFACE = {"anyOf": [_MESH, _NURBS, record(("id",), more=False, id={"type": "string"}, **_SETTINGS)]}
 
 _JOB = record(
     ("id", "name", "status", "stage", "progress", "created", "started", "finished", "timings", "problem"),

@@ -73,7 +73,9 @@ _QUALITY = _all(
     angle_deviation=_all(max=_MEASURE),
     surface_distance=_all(max=_MEASURE, mean=_MEASURE),
     gap=_all(
-        tangential=_all(min=_MEASURE, mean=_MEASURE, max=_MEASURE), normal=_all(mean=_MEASURE, max=_MEASURE)
+        tangential=_all(min=_MEASURE, mean=_MEASURE, max=_MEASURE),
+        normal=_all(mean=_MEASURE, max=_MEASURE),
+        over=nullable(_COUNT),
     ),
     overlaps=nullable(_COUNT),
     coverage=_MEASURE,

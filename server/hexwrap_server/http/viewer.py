@@ -73,7 +73,9 @@ async def job_request(request: Request, id: JobId) -> Response:
     work = service.store.work(job.identity)
     if work is None:
         raise not_found("request", "The request of this job is no longer kept.")
-    return json_response({"name": job.name, "surface": {"id": work.surface}} | document(work.wanted))
+    asked = document(work.wanted)
+    surface = {"id": work.surface} | (asked.pop("surface") or {})
+    return json_response({"name": job.name, "surface": surface} | asked)
 
 
 @router.post("/v1/surfaces/preview", openapi_extra=openapi.PREVIEW)

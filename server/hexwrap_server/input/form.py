@@ -18,17 +18,17 @@ import pydantic
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, FiniteFloat, ValidationError
 
 from hexwrap_server.input.faults import Path, faults, pointer
+from hexwrap_server.input.requests import Wanted
 from hexwrap_server.problems import FormError
 from hexwrap_solver.conformal.types import ANGLE_UNITS
-from hexwrap_solver.pipeline import SolveSettings
 from hexwrap_solver.setting import Setting
 
 T = TypeVar("T")
 
 
 @dataclass(frozen=True)
-class Body(SolveSettings):
-    """Everything of a request but its surface."""
+class Body(Wanted):
+    """Everything of a request but the arrays of its surface."""
 
     name: Annotated[str, Setting("name of the job, the title of pictures and drawings", most=200)] = ""
 
@@ -261,9 +261,16 @@ def _document(settings: Any, factor: float, is_entry: bool) -> Any:
         elif is_dataclass(value):
             value = _document(value, factor, False)
         elif isinstance(value, tuple):
-            value = [_document(row, factor, True) if is_dataclass(row) else row for row in value]
+            value = _rows(value, factor)
         written[f.name] = value
     return written
+
+
+def _rows(value: Any, factor: float) -> Any:
+    """A tuple as a list, all the way down."""
+    if isinstance(value, tuple):
+        return [_rows(row, factor) for row in value]
+    return _document(value, factor, True) if is_dataclass(value) else value
 
 
 def _in_unit(angle: float, unit: float) -> float:

@@ -3,19 +3,32 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated, Any
 
 from hexwrap_solver.pipeline import SolveSettings
+from hexwrap_solver.setting import Setting
 from hexwrap_solver.surface.types import NurbsSurface, SentMesh, SurfaceSettings
 
 
 @dataclass(frozen=True)
 class SentSurface:
-    """A surface as it was sent: a mesh or a NURBS surface, and how to take it in."""
+    """A surface as it was sent: a mesh or a NURBS surface.
+
+    settings: how to take it in, for requests that say nothing of that beside its id.
+    """
 
     mesh: SentMesh | None = None
     nurbs: NurbsSurface | None = None
-    settings: SurfaceSettings = field(default_factory=SurfaceSettings)
+    settings: SurfaceSettings | None = None
+
+
+@dataclass(frozen=True)
+class Wanted(SolveSettings):
+    """What is to be done with a surface; identical for identical work."""
+
+    surface: Annotated[
+        SurfaceSettings | None, Setting("how the surface is taken in; null: as it was sent", rare=True)
+    ] = None
 
 
 @dataclass(frozen=True)
@@ -25,7 +38,7 @@ class ParsedRequest:
     name: str
     surface_id: str
     surface: bytes | None
-    wanted: SolveSettings
+    wanted: Wanted
 
 
 @dataclass(frozen=True)
@@ -46,7 +59,7 @@ class Order:
 
     surface_id: str
     surface: bytes | str
-    wanted: SolveSettings
+    wanted: Wanted
     files: tuple[str, str] | None
     job: str = ""
 

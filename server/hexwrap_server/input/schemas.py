@@ -14,10 +14,9 @@ import numpy as np
 from hexwrap_server.input.arrays import Fault, faces, numbers, table
 from hexwrap_server.input.faults import escaped
 from hexwrap_server.input.form import Body, read, values
-from hexwrap_server.input.requests import SentSurface
+from hexwrap_server.input.requests import SentSurface, Wanted
 from hexwrap_server.problems import FormError
 from hexwrap_solver.conformal.types import BoundaryCondition
-from hexwrap_solver.pipeline import SolveSettings
 from hexwrap_solver.setting import Setting
 from hexwrap_solver.surface.types import MeshSettings, NurbsSurface, SentMesh, SurfaceSettings
 
@@ -36,7 +35,7 @@ class Request:
 
     name: str
     surface: SentSurface | str
-    wanted: SolveSettings
+    wanted: Wanted
 
 
 def parse_request(body: object, max_vertices: int, max_panels: int) -> Request:
@@ -45,38 +44,27 @@ def parse_request(body: object, max_vertices: int, max_panels: int) -> Request:
         raise FormError.at("", 'the body must be a JSON object such as {"surface": …}')
     if "surface" not in body:
         raise FormError.at("/surface", "'surface' is missing; it is the one field without a default")
-    asked = read(Body, {k: v for k, v in body.items() if k != "surface"})
-    surface = parse_surface(body["surface"], max_vertices, allow_id=True)
+    arrays, beside = _divided(body["surface"], "/surface", allow_id=True)
+    asked = read(Body, body | {"surface": beside or None})
+    surface = _id(arrays["id"]) if "id" in arrays else _sent(arrays, max_vertices, "/surface")
     if isinstance(surface, SentSurface) and surface.mesh is not None:
         _vertices_exist(asked.boundary.adapted(None), len(surface.mesh.vertices))
-    wanted = SolveSettings(**{f.name: getattr(asked, f.name) for f in fields(SolveSettings)})
+    wanted = Wanted(**{f.name: getattr(asked, f.name) for f in fields(Wanted)})
+    if wanted.surface is not None or "nurbs" in arrays:
+        wanted = replace(wanted, surface=_limited(wanted.surface or SurfaceSettings(), max_vertices))
     if wanted.pattern is not None:
         wanted = replace(wanted, pattern=replace(wanted.pattern, max_cells=max_panels))
     return Request(asked.name, surface, wanted)
 
 
-def parse_surface(
-    surface: object, max_vertices: int, *, allow_id: bool = False, root: str = "/surface"
-) -> SentSurface | str:
-    """A mesh, a NURBS surface or an id. Raises FormError."""
-    if not isinstance(surface, dict):
-        raise FormError.at(root, "must be an object with 'vertices' and 'faces', or 'nurbs', or 'id'")
-    if allow_id and "id" in surface:
-        _known(surface, ("id",), root)
-        if not isinstance(surface["id"], str):
-            raise FormError.at(f"{root}/id", "must be the id that POST /v1/surfaces answered")
-        return surface["id"]
-    arrays = ("nurbs",) if "nurbs" in surface else ("vertices", "faces", "normals")
-    settings = surface_settings(surface, arrays, max_vertices, root)
-    if "nurbs" in surface:
-        return SentSurface(nurbs=_nurbs(surface["nurbs"], f"{root}/nurbs"), settings=settings)
-    for name in ("vertices", "faces"):
-        if name not in surface:
-            raise FormError.at(f"{root}/{name}", f"'{name}' is missing")
-    try:
-        return SentSurface(mesh=_mesh(surface, max_vertices, root), settings=settings)
-    except Fault as fault:
-        raise FormError.at(root + fault.pointer, fault.detail, fault.kind) from None
+def parse_surface(surface: object, max_vertices: int) -> SentSurface:
+    """A body that is a surface: a mesh or a NURBS surface, and how to take it in. Raises FormError."""
+    arrays, beside = _divided(surface, "")
+    settings = read(SurfaceSettings, beside)
+    sent = _sent(arrays, max_vertices, "")
+    if sent.nurbs is not None or beside:
+        sent = replace(sent, settings=_limited(settings, max_vertices))
+    return sent
 
 
 def parse_points(body: object, dimension: int, most: int) -> np.ndarray[Any, np.dtype[np.float64]]:
@@ -92,19 +80,43 @@ def parse_points(body: object, dimension: int, most: int) -> np.ndarray[Any, np.
         raise FormError.at(fault.pointer, fault.detail, fault.kind) from None
 
 
-def surface_settings(
-    surface: dict[str, object], arrays: Sequence[str], max_vertices: int, root: str
-) -> SurfaceSettings:
-    """What is said beside the arrays. Raises FormError."""
-    own = [f.name for f in fields(SurfaceSettings) if f.name != "mesh" or "nurbs" in arrays]
-    _known(surface, (*arrays, *own), root)
-    settings = read(SurfaceSettings, {k: v for k, v in surface.items() if k in own}, root)
-    if "nurbs" not in arrays:
-        return settings
+def _divided(
+    surface: object, root: str, *, allow_id: bool = False
+) -> tuple[dict[str, Any], dict[str, object]]:
+    """The arrays of a surface, or its id, and what is said beside them. Raises FormError."""
+    if not isinstance(surface, dict):
+        raise FormError.at(root, "must be an object with 'vertices' and 'faces', or 'nurbs', or 'id'")
+    arrays: tuple[str, ...] = ("vertices", "faces", "normals")
+    settings = [f.name for f in fields(SurfaceSettings) if f.name != "mesh"]
+    if "nurbs" in surface or (allow_id and "id" in surface):
+        arrays, settings = ("nurbs",) if "nurbs" in surface else ("id",), [*settings, "mesh"]
+    _known(surface, (*arrays, *settings), root)
+    return tuple({k: v for k, v in surface.items() if k in names} for names in (arrays, settings))  # type: ignore[return-value]
+
+
+def _limited(settings: SurfaceSettings, max_vertices: int) -> SurfaceSettings:
     return replace(settings, mesh=replace(settings.mesh or MeshSettings(), max_vertices=max_vertices))
 
 
-def _mesh(surface: dict[str, object], max_vertices: int, root: str) -> SentMesh:
+def _id(given: object) -> str:
+    if not isinstance(given, str):
+        raise FormError.at("/surface/id", "must be the id that POST /v1/surfaces answered")
+    return given
+
+
+def _sent(arrays: dict[str, Any], max_vertices: int, root: str) -> SentSurface:
+    if "nurbs" in arrays:
+        return SentSurface(nurbs=_nurbs(arrays["nurbs"], f"{root}/nurbs"))
+    for name in ("vertices", "faces"):
+        if name not in arrays:
+            raise FormError.at(f"{root}/{name}", f"'{name}' is missing")
+    try:
+        return SentSurface(mesh=_mesh(arrays, max_vertices))
+    except Fault as fault:
+        raise FormError.at(root + fault.pointer, fault.detail, fault.kind) from None
+
+
+def _mesh(surface: dict[str, Any], max_vertices: int) -> SentMesh:
     vertices = table(surface["vertices"], "/vertices", 3, max_vertices)
     corners = faces(surface["faces"], "/faces", len(vertices), 4 * max_vertices)
     normals = surface.get("normals")

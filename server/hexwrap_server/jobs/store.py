@@ -23,10 +23,9 @@ from typing import Any, Literal
 from isal import isal_zlib
 
 from hexwrap_server.http.answers import GZIP_WINDOW
-from hexwrap_server.input.requests import Outcome
+from hexwrap_server.input.requests import Outcome, Wanted
 from hexwrap_server.jobs import codec
 from hexwrap_server.jobs.disk import StorageError, make_private, prune, read_whole, write_whole
-from hexwrap_solver.pipeline import SolveSettings
 
 Status = Literal["queued", "running", "done", "failed", "cancelled"]
 log = logging.getLogger("hexwrap.store")
@@ -93,7 +92,7 @@ class Work:
 
     identity: str
     surface: str
-    wanted: SolveSettings
+    wanted: Wanted
     attempts: int = 0
     parts: dict[str, tuple[int, int]] | None = None
     timings: dict[str, float] = field(default_factory=dict)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from hexwrap_server import logs
 from hexwrap_server.input.json_text import loads
-from hexwrap_server.input.requests import CacheSettings, Intake, Order, Outcome, SentSurface
+from hexwrap_server.input.requests import CacheSettings, Intake, Order, Outcome, SentSurface, Wanted
 from hexwrap_server.input.schemas import parse_surface
 from hexwrap_server.jobs import codec, later
 from hexwrap_server.jobs.cache import CachingRunner, StageCache
@@ -22,9 +22,8 @@ from hexwrap_server.output.writers import WRITERS, Meta
 from hexwrap_server.problems import FormError, body_is_the_surface
 from hexwrap_solver import pipeline
 from hexwrap_solver.errors import HexwrapError
-from hexwrap_solver.pipeline import SolveSettings
 from hexwrap_solver.surface import surface_from_mesh, surface_from_nurbs
-from hexwrap_solver.surface.types import Surface
+from hexwrap_solver.surface.types import Surface, SurfaceSettings
 
 #: Of this worker process.
 _SCRIBE = Scribe()
@@ -77,43 +76,39 @@ def _sent(order: Order) -> SentSurface:
     return sent
 
 
-def run_stages(sent: SentSurface, wanted: SolveSettings, runner: CachingRunner) -> pipeline.Solution:
+def run_stages(sent: SentSurface, wanted: Wanted, runner: CachingRunner) -> pipeline.Solution:
     """A sent surface and what is wanted of it → the solution. Raises HexwrapError."""
     return _staged(codec.digest(sent), lambda: sent, wanted, runner)
 
 
 def _staged(
-    surface_id: str, sent: Callable[[], SentSurface], wanted: SolveSettings, runner: CachingRunner
+    surface_id: str, sent: Callable[[], SentSurface], wanted: Wanted, runner: CachingRunner
 ) -> pipeline.Solution:
     """sent: asked only where the checked surface is not remembered."""
     return pipeline.solve(
-        lambda: take_in(sent()),
-        wanted,
-        runner,
-        source=surface_id,
+        lambda: take_in(sent(), wanted.surface), wanted, runner, source=(surface_id, wanted.surface)
     )
 
 
-def take_in(sent: SentSurface) -> Surface:
-    """Raises SurfaceError."""
+def take_in(sent: SentSurface, asked: SurfaceSettings | None = None) -> Surface:
+    """asked: instead of the settings that were sent along. Raises SurfaceError."""
+    settings = asked or sent.settings or SurfaceSettings()
     if sent.mesh is not None:
         return surface_from_mesh(sent.mesh)
     assert sent.nurbs is not None
-    return surface_from_nurbs(sent.nurbs, sent.settings.mesh)
+    return surface_from_nurbs(sent.nurbs, settings.mesh)
 
 
 @body_is_the_surface()
 def read_surface(report: Report, text: bytes, max_vertices: int, caching: CacheSettings) -> Intake:
     """JSON → checked surface. Raises FormError, SurfaceError."""
-    sent = parse_surface(loads(text), max_vertices, root="")
-    assert isinstance(sent, SentSurface)
-    return checked(report, sent, caching)
+    return checked(report, parse_surface(loads(text), max_vertices), caching)
 
 
 def checked(report: Report, sent: SentSurface, caching: CacheSettings) -> Intake:
     runner = CachingRunner(_stages(caching), report)
     id = codec.digest(sent)
-    surface = runner("surface", id, lambda progress: take_in(sent))
+    surface = runner("surface", (id, None), lambda progress: take_in(sent))
     loops = [surface.input_vertex[loop].tolist() for loop in surface.loops]
     answer = {
         "vertices": len(surface.vertices),

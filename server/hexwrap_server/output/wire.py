@@ -198,6 +198,7 @@ def quality(solution: Solution) -> dict[str, Any]:
         "gap": {
             "tangential": summary(measured.gap_tangential, "min", "mean", "max"),
             "normal": summary(measured.gap_normal, "mean", "max"),
+            "over": measured.gaps_over,
         },
         "kink": summary(measured.kink, "mean", "max"),
         "overlaps": None if made is None else int(measured.overlaps),
@@ -215,6 +216,8 @@ def trade_off(curve: TradeOff) -> dict[str, Any]:
         "sizes": flat(curve.sizes),
         "uncovered": flat(curve.uncovered),
         "worst_gap": flat(curve.worst_gap),
+        "joint_mean": flat(curve.joint_mean),
+        "joint_max": flat(curve.joint_max),
     }
 
 

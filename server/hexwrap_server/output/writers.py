@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from hexwrap_server.input.requests import Wanted
 from hexwrap_server.output.arrays_npz import result_npz
 from hexwrap_server.output.domain_dxf import domain_dxf
 from hexwrap_server.output.domain_svg import domain_svg
@@ -15,7 +16,7 @@ from hexwrap_server.output.picture import panels_png
 from hexwrap_server.output.result import result_json
 from hexwrap_server.output.rhino import panels_3dm
 from hexwrap_server.output.table import panels_csv
-from hexwrap_solver.pipeline import Solution, SolveSettings
+from hexwrap_solver.pipeline import Solution
 
 #: File name → writer; the names of the contract's ``/files/{name}``.
 WRITERS: dict[str, Callable[[Solution, Meta], bytes]] = {
@@ -40,7 +41,7 @@ def write(name: str, solution: Solution, meta: Meta) -> bytes:
     return WRITERS[name](solution, meta)
 
 
-def check_wanted(name: str, wanted: SolveSettings) -> None:
+def check_wanted(name: str, wanted: Wanted) -> None:
     """Before the work, whether it will lead to that file. Raises NotMadeError."""
     if name not in WITHOUT_PANELS:
         check_stages(name, pattern=wanted.pattern is not None, panels=wanted.panels is not None)

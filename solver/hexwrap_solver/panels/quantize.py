@@ -97,6 +97,7 @@ def quantize(fitted: FittedPanels, settings: PanelSettings) -> Panels:
             *said,
         ),
         outside=outside,
+        max_gap=settings.max_gap,
     )
 
 

@@ -144,7 +144,7 @@ class Panels:
     length allowed before quantization. center, normal: (q, 3). whole: (q,).
     class_length, class_count: (s,) the size classes, ascending. trade_off: None where sizes make no sense.
     energy: (steps,) value of the weighted energy, None for method ``exact``.
-    outside: panels whose limit lies below the allowed ``edge_range``.
+    outside: panels whose limit lies below the allowed ``edge_range``. max_gap: widest joint wanted.
     """
 
     mode: Literal["split", "watertight"]
@@ -162,6 +162,7 @@ class Panels:
     energy: Floats | None = None
     notes: tuple[str, ...] = ()
     outside: Ints | None = None
+    max_gap: float | None = None
 
     @property
     def n_panels(self) -> int:
@@ -176,6 +177,7 @@ class Quality:
     gap_tangential, gap_normal, kink (rad): aligned with the pattern's neighbours, NaN where there is none.
     surface_distance: (q,) greatest distance of a panel's corners and its centre to the input surface.
     convex: (q,). congruence: (q,) class of congruent shapes (mirror images told apart).
+    gaps_over: panels with a joint wider than was wanted, None where nothing was said of that.
     movement: greatest distance a shared vertex was moved (watertight), 0 otherwise.
     """
 
@@ -189,6 +191,7 @@ class Quality:
     gap_tangential: Floats | None = None
     gap_normal: Floats | None = None
     kink: Floats | None = None
+    gaps_over: int | None = None
     convex: Bools | None = None
     congruence: Ints | None = None
     overlaps: int = 0

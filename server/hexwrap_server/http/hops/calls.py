@@ -17,13 +17,13 @@ from hexwrap_server.input.json_text import loads, packed
 from hexwrap_server.input.readers.drawing import Curve
 from hexwrap_server.input.readers.rhino import convert
 from hexwrap_server.input.readers.rhino_curves import rhino_curve
-from hexwrap_server.input.requests import ParsedRequest, SentSurface
+from hexwrap_server.input.requests import ParsedRequest, SentSurface, Wanted
 from hexwrap_server.input.schemas import Request, parse_request
 from hexwrap_server.jobs.lift_curves import lift_curves
 from hexwrap_server.jobs.work import solution_at
 from hexwrap_server.jobs.worker import Report
 from hexwrap_server.output import wire
-from hexwrap_solver.pipeline import Solution, SolveSettings
+from hexwrap_solver.pipeline import Solution
 from hexwrap_solver.surface.types import MeshSettings, SentMesh, SurfaceSettings
 
 
@@ -59,7 +59,7 @@ def read_call(report: Report, text: bytes, max_vertices: int, max_panels: int) -
     return Call(pointer, tuple(branch), packed(Request("hops", surface, wanted)))
 
 
-def _wanted(values: dict[str, Any], max_vertices: int, max_panels: int) -> SolveSettings:
+def _wanted(values: dict[str, Any], max_vertices: int, max_panels: int) -> Wanted:
     points, angles = values["Points"], values["Angles"]
     boundary: dict[str, Any] = {"mode": values["Mode"] or ("angles" if points else "straight")}
     if boundary["mode"] == "angles":
