@@ -311,8 +311,8 @@ def mean_edge(vertices: Floats, faces: Ragged) -> float:
 def _too_coarse(cmap: ConformalMap, settings: PatternSettings, placement: Placement) -> PatternError:
     if cmap.kind == "net":
         return PatternError(
-            f"No cell of this size fits on the surface: its longest loop would take {placement.around} of them. "
-            "Ask for more cells around, or a shorter edge."
+            f"No cell of this size fits on the surface: its longest loop would take {placement.around} of "
+            "them. Ask for more cells around, or a shorter edge."
         )
     around, step, asked = placement.around, placement.step, ""
     if settings.around not in (None, around):

@@ -77,7 +77,7 @@ def _touching(neighbours: Ragged, members: Ints) -> csr_array:
 
 
 def azimuth(cmap: ConformalMap, centers: Floats) -> Floats:
-    """(c,) turns of cells about the axis of loop 0, or about the vertical one of a closed surface, in [0, 1)."""
+    """(c,) turns of cells about the axis of loop 0, of a closed surface about the vertical, in [0, 1)."""
     points = cmap.surface.vertices
     axis, middle = np.array([0.0, 0.0, 1.0]), points.mean(axis=0)
     if cmap.surface.loops:

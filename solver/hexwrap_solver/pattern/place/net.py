@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hexwrap_solver.arrays import Complexes, Floats, Ints
+from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints
 from hexwrap_solver.conformal.net import Net
 from hexwrap_solver.conformal.types import ConformalMap, Deck, Unrolled
 from hexwrap_solver.errors import NotAdaptedError, PatternError
@@ -27,7 +27,9 @@ from hexwrap_solver.pattern.place.size import girth, size_spread, wanted_edge, w
 from hexwrap_solver.pattern.types import PatternSettings
 
 #: Sizes and directions tried, from one end of what is admissible to the other.
-SCALES, DIRECTIONS = 21, 12
+SCALES, DIRECTIONS = 41, 24
+#: Cost of a size off the wanted one by its whole spread, beside the misfit in lattice units.
+COST_OF_SIZE = 0.01
 #: Misfit of all motions together, in lattice units, below which nothing needs to be deformed.
 EXACT = 1e-7
 #: Places of the lattice, the best first, whose deformation is computed, until one distorts by less than FINE.
@@ -67,7 +69,7 @@ def place_on_net(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings
         own = _home(cmap)
         place = factor * (own - own[anchor_vertex(cmap)]) + phase
         return _placement(cmap, lattice, settings, rows, place, (factor, 0j), angle, 0.0)
-    tried = []
+    tried, system = [], None
     for misfit, A, B, rows in _choices(cmap, lattice, settings, motions, factor, phase):
         glued_rows, corner = around_vertices(lattice, net, cmap.surface.twin, rows, faces)
         place = A * net.corners.ravel()[corner] + B
@@ -76,7 +78,8 @@ def place_on_net(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings
         depth = np.zeros((len(place), 2))
         _pin(cmap, lattice, rows, corner, normal, depth)
         if misfit > EXACT:
-            place = deform(System(cmap, glued, normal), glued, A, place, depth)
+            system = system or System(cmap, glued, normal)  # rotations and lines are the same for all
+            place = deform(system, glued, A, place, depth)
             distortion = distortion_of(cmap, glued, place)
         else:
             pinned = normal.any(axis=1)
@@ -187,104 +190,98 @@ def _choices(
     fitted = cmap.fitted
     if fitted is not None and fitted.order == lattice.order:
         e1 = complex(lattice.position(lattice.basis[0]))
-        A, B = e1 * fitted.factor, e1 * fitted.shift
+        A, B = np.array([e1 * fitted.factor]), np.array([e1 * fitted.shift])
         rows, misfit = _rounded(lattice, motions, A, B)
-        if misfit < NEARLY:
-            return [(0.0, A, B, rows)]
-    spread = size_spread(settings)
+        if misfit[0] < NEARLY:
+            return [(0.0, complex(A[0]), complex(B[0]), rows[0])]
     free = not len(cmap.surface.loops)
-    turns = lattice.quantum * np.arange(DIRECTIONS) / DIRECTIONS if free else [0.0]
-    found = []
-    for x in np.linspace(-1, 1, SCALES):
-        for turn in turns:
-            A = factor * (1 + spread * x) * complex(np.exp(1j * turn))
-            at = motions.centre[0] if len(motions.centre) else cmap.corners().ravel()[0]
-            B = -A * complex(at) + (0j if len(motions.centre) else phase)
-            try:
-                rows, misfit = _rounded(lattice, motions, A, B)
-            except ValueError:  # a singularity would stand at no centre of its symmetry
-                continue
-            found.append((misfit + 0.01 * abs(x), A, B, rows))
-    if not found:
+    size = np.linspace(-1, 1, SCALES)
+    turn = lattice.quantum * np.arange(DIRECTIONS) / DIRECTIONS if free else np.zeros(1)
+    A = (factor * (1 + size_spread(settings) * size)[:, None] * np.exp(1j * turn)).ravel()
+    at = motions.centre[0] if len(motions.centre) else cmap.corners().ravel()[0]
+    B = -A * at + (0j if len(motions.centre) else phase)
+    rows, misfit = _rounded(lattice, motions, A, B)
+    cost = misfit + COST_OF_SIZE * np.repeat(abs(size), len(turn))
+    best = np.argsort(cost, kind="stable")[:DEFORMED]
+    best = best[np.isfinite(cost[best])]
+    if not len(best):
         raise PatternError(
             "No place of the lattice suits all singularities: one of them would not stand at the centre of a "
             "cell; move it, or take indices of 1 and -1."
         )
-    return sorted(found, key=lambda one: one[0])[:DEFORMED]
+    return [(float(misfit[i]), complex(A[i]), complex(B[i]), rows[i]) for i in best]
 
 
-def _rounded(lattice: Lattice, motions: Motions, A: complex, B: complex) -> tuple[Ints, float]:
-    """Rows of isometries for all motions, and how far the worst is from its own translation, lattice units.
-
-    Raises ValueError where a singularity whose motions follow from others stands at no centre.
+def _rounded(lattice: Lattice, motions: Motions, A: Complexes, B: Complexes) -> tuple[Ints, Floats]:
+    """For k places of the lattice at once: rows (k, t, 4) of isometries for all motions, and (k,) how far the
+    worst is from its own translation, lattice units; infinite where a singularity would stand at no centre.
     """
     zeta = np.exp(1j * lattice.quantum * motions.turn)
-    wanted = A * motions.translation + (1 - zeta) * B
-    rows = np.zeros((len(wanted), 4), dtype=np.int64)
-    rows[:, 0] = motions.turn
-    known = np.zeros(len(wanted), dtype=bool)
+    wanted = A[:, None] * motions.translation + B[:, None] * (1 - zeta)
+    rows = np.zeros((*wanted.shape, 4), dtype=np.int64)
+    rows[..., 0] = motions.turn
+    known = np.zeros(len(zeta), dtype=bool)
     known[0] = True
-    goal = [_centre(lattice, int(k), A * z + B) for z, k in zip(motions.centre, motions.index, strict=True)]
-    identity = np.zeros(4, dtype=np.int64)
-    goal += [identity] * (len(motions.words) - len(goal))
+    cones = len(motions.centre)
+    goal = np.zeros((len(A), len(motions.words), 4), dtype=np.int64)
+    for c, (z, k) in enumerate(zip(motions.centre, motions.index.tolist(), strict=True)):
+        goal[:, c] = _about_centre(lattice, k, A * z + B)
+
+    def product(word: Ints) -> Ints:
+        total = np.zeros((len(A), 4), dtype=np.int64)
+        for i in word.tolist():
+            total = lattice.compose(total, rows[:, i])
+        return total
 
     def enter(i: int, row: Ints) -> None:
-        rows[i] = row
-        rows[motions.mate[i]] = lattice.invert(row)
+        rows[:, i], rows[:, motions.mate[i]] = row, lattice.invert(row)
         known[[i, motions.mate[i]]] = True
 
-    def follow() -> None:
-        """Enter what is the last unknown of its word."""
-        going = True
-        while going:
-            going = False
-            for word, product in zip(motions.words, goal, strict=True):
-                missing = np.flatnonzero(~known[word])
-                if len(missing) == 1:
-                    at = int(missing[0])
-                    before = lattice.partial_products(rows[word[:at]])[-1]
-                    after = lattice.partial_products(rows[word[at + 1 :]])[-1]
-                    inner = lattice.compose(
-                        lattice.compose(lattice.invert(before), product), lattice.invert(after)
-                    )
-                    enter(int(word[at]), inner)
-                    going = True
-
-    follow()
     while not known.all():
-        i = int(np.flatnonzero(~known)[0])
-        translation = lattice.translation_near(complex(wanted[i]))
-        enter(i, np.array([motions.turn[i], *translation, 0]))
-        follow()
-    for word, product, k in zip(motions.words, goal, [*motions.index, *[0] * len(goal)], strict=False):
-        row = lattice.partial_products(rows[word])[-1]
-        if k == 0 and (row != product).any():
-            raise ValueError
-        if k and not _is_centre(lattice, row):
-            raise ValueError
-    used = lattice.position(rows[:, 1:3])
-    return rows, float(abs(used - wanted).max())
+        # What is the last unknown of a word follows from the others; else the next one is rounded.
+        last = [(w, word) for w, word in enumerate(motions.words) if np.count_nonzero(~known[word]) == 1]
+        if last:
+            w, word = last[0]
+            at = int(np.flatnonzero(~known[word])[0])
+            before, after = product(word[:at]), product(word[at + 1 :])
+            inner = lattice.compose(lattice.invert(before), goal[:, w])
+            enter(int(word[at]), lattice.compose(inner, lattice.invert(after)))
+        else:
+            i = int(np.flatnonzero(~known)[0])
+            turn = np.full((len(A), 1), motions.turn[i])
+            nearest = lattice.translations_near(wanted[:, i])
+            enter(i, np.concatenate([turn, nearest, 0 * turn], axis=1))
+    misfit = abs(lattice.position(rows[..., 1:3]) - wanted).max(axis=1)
+    for w, word in enumerate(motions.words):
+        found = product(word)
+        right = is_centre(lattice, found) if w < cones else (found == goal[:, w]).all(axis=1)
+        misfit[~right] = np.inf
+    return rows, np.asarray(misfit)
 
 
-def _centre(lattice: Lattice, k: int, wanted: complex) -> Ints:
-    """The rotation by −k quanta about the nearest centre of a cell: what going around a cone amounts to."""
-    turn = -k % lattice.order  # a full turn but for the cone's curvature
-    offset = 0j if lattice.kind != "quad" else 1.0 + 0j  # the centres of quads are the coset 1
-    centre = lattice.translation_near(wanted - offset) + np.array([int(offset.real), 0])
-    return np.array([turn, *(centre - lattice.rotate(centre, turn)), 0])
+def _about_centre(lattice: Lattice, k: int, wanted: Complexes) -> Ints:
+    """(…, 4) rotations by −k quanta, as going around a cone amounts to, about the centres of cells nearest to
+    the wanted places."""
+    offset = 1 if lattice.kind == "quad" else 0  # the centres of quads are the coset 1
+    centre = lattice.translations_near(wanted - offset) + np.array([offset, 0])
+    rows = np.zeros((*centre.shape[:-1], 4), dtype=np.int64)
+    rows[..., 0] = -k % lattice.order
+    rows[..., 1:3] = centre - lattice.rotate(centre, -k)
+    return rows
 
 
-def _is_centre(lattice: Lattice, row: Ints) -> bool:
-    """Whether a rotation is about the centre of a cell."""
-    centre = _fixed_point(lattice, row)
-    point = np.rint(lattice.coordinates(np.array(centre))).astype(np.int64)
-    on_lattice = abs(complex(lattice.position(point)) - centre) < 1e-6
-    return bool(on_lattice and not lattice.is_node(point))
+def is_centre(lattice: Lattice, rotation: Ints) -> Bools:
+    """(…,) whether rotations (…, 4) are about centres of cells."""
+    centre = fixed_point(lattice, rotation)
+    point = np.rint(lattice.coordinates(centre)).astype(np.int64)
+    on_lattice = abs(lattice.position(point) - centre) < 1e-6
+    return np.asarray(on_lattice & ~lattice.is_node(point))
 
 
-def _fixed_point(lattice: Lattice, row: Ints) -> complex:
-    zeta = np.exp(1j * lattice.quantum * row[0])
-    return complex(lattice.position(row[1:3]) / (1 - zeta))
+def fixed_point(lattice: Lattice, rotation: Ints) -> Complexes:
+    """(…,) of rotations (…, 4)."""
+    zeta = np.exp(1j * lattice.quantum * rotation[..., 0])
+    return np.asarray(lattice.position(rotation[..., 1:3]) / (1 - zeta))
 
 
 def _pin(
@@ -293,6 +290,6 @@ def _pin(
     """Singularities stand exactly at the fixed points of the motions around them."""
     for v in cmap.cones.vertex.tolist():
         word = _word(cmap.net, cmap.surface.twin, int(corner[v]))
-        centre = _fixed_point(lattice, lattice.partial_products(rows[word])[-1])
+        centre = complex(fixed_point(lattice, lattice.partial_products(rows[word])[-1]))
         normal[v] = 1.0, 1j
         depth[v] = centre.real, centre.imag
