@@ -117,6 +117,28 @@ def frame_of(
     return Frame(lattice, rules, width, line, aligned, turn, free_scale)
 
 
+@dataclass(frozen=True)
+class Seated:
+    """What was chosen, and what for."""
+
+    frame: Frame
+    placing: Placing
+
+
+def seated(
+    surface: Surface,
+    boundary: BoundaryCondition,
+    settings: SingularitySettings,
+    pattern: PatternSettings | None,
+    sizes: int | None,
+    progress: Progress = no_progress,
+) -> Seated:
+    """Where singularities are to stand. pattern, sizes: None for the default. Raises RequestError."""
+    frame = frame_of(surface, boundary, settings, pattern, sizes)
+    progress(0.3, "placing singularities")
+    return Seated(frame, chosen(surface, frame, settings))
+
+
 def _ends(surface: Surface, boundary: BoundaryCondition, lattice: Lattice) -> tuple[tuple[End, ...], Floats]:
     """What each loop is, and (n,) the angles of those that are not free."""
     target = np.full(len(surface.vertices), np.pi)
@@ -168,11 +190,8 @@ def _line(lattice: Lattice, angle: float, boundary: str) -> Line:
     return Line(step, rows.first / abs(e1), rows.period / abs(e1))
 
 
-def chosen(
-    surface: Surface, frame: Frame, settings: SingularitySettings, progress: Progress = no_progress
-) -> Placing:
+def chosen(surface: Surface, frame: Frame, settings: SingularitySettings) -> Placing:
     """Where singularities are to stand. Raises SingularitiesError."""
-    progress(0.1, "placing singularities")
     if settings.at:
         return Placing((given(surface, frame.rules, settings.at),), 0)
     count: int | Literal["auto"] = "auto" if settings.count is None else settings.count
