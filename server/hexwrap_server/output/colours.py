@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from hexwrap_solver.arrays import Floats, Ints
+from hexwrap_solver.arrays import Floats
+from hexwrap_solver.panels.types import Panels
 
 #: From the shortest edge to the longest: cold and dark to warm, lightest in the middle.
 ANCHORS = ("#34489c", "#3382c0", "#5dbcc0", "#b4dfb0", "#f6e6a2", "#f5b968", "#e6774d", "#b5304a")
 #: Panels without a size class (cut at the boundary).
 UNSIZED = "#b4b7bc"
+#: Panels with another number of sides than all others, a class each.
+SPECIAL = "#3a3550"
 
 # Björn Ottosson's OKLab (2020), in which straight lines look like even steps.
 _TO_CONE = np.array(
@@ -59,14 +62,14 @@ def gradient(t: Floats) -> Floats:
     return encoded(cone @ np.linalg.inv(_TO_CONE).T)
 
 
-def size_colours(n: int) -> list[str]:
-    """One colour per size class, ascending."""
-    if n == 1:
-        return to_hex(gradient(np.array([0.2])))
-    return to_hex(gradient(np.linspace(0.0, 1.0, n)))
+def size_colours(panels: Panels) -> list[str]:
+    """One colour per size class, ascending, and one for all that come after them."""
+    n = panels.n_sizes
+    steps = np.array([0.2]) if n == 1 else np.linspace(0.0, 1.0, n)
+    return to_hex(gradient(steps)) + [SPECIAL] * (len(panels.class_length) - n)
 
 
-def panel_colours(size: Ints, n: int) -> Floats:
-    """(q, 3) sRGB of panels by their class (−1: none) among n."""
-    table = np.vstack([from_hex(size_colours(n)), from_hex([UNSIZED])])
-    return table[size]
+def panel_colours(panels: Panels) -> Floats:
+    """(q, 3) sRGB of panels by their class."""
+    table = np.vstack([from_hex(size_colours(panels)), from_hex([UNSIZED])])
+    return table[panels.size]

@@ -144,7 +144,7 @@ def _cells(solution: Solution, pattern: Pattern, rows: Ragged) -> list[str]:
     colours: list[str] = []
     if solution.panels is not None:
         size[solution.panels.face] = solution.panels.size
-        colours = size_colours(len(solution.panels.class_length))
+        colours = size_colours(solution.panels)
     outlines = _outlines(rows)
     members: dict[int, list[str]] = {}
     for outline, group in zip(outlines, size.tolist(), strict=True):

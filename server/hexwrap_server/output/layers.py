@@ -25,7 +25,7 @@ def size_name(size: int) -> str:
 def size_layers(panels: Panels) -> dict[int, Layer]:
     """The layer of each size that has panels, and of panels without a size (−1)."""
     words = lengths(panels.class_length.tolist())
-    colours = size_colours(len(words))
+    colours = size_colours(panels)
     used = set(panels.size.tolist())
     layers = {
         i: Layer(f"{size_name(i)} ({word})", _bytes(colour))

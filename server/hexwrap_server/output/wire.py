@@ -173,12 +173,13 @@ def sizes(made: Panels | None) -> list[dict[str, Any]]:
     listed = zip(
         made.class_length.tolist(),
         made.class_count.tolist(),
-        size_colours(len(made.class_length)) if len(made.class_length) else [],
+        made.class_sides.tolist(),
+        size_colours(made) if len(made.class_length) else [],
         strict=True,
     )
     return [
-        {"size": i, "edge_length": length, "count": count, "color": colour}
-        for i, (length, count, colour) in enumerate(listed)
+        {"size": i, "edge_length": length, "count": count, "sides": sides, "color": colour}
+        for i, (length, count, sides, colour) in enumerate(listed)
     ]
 
 
