@@ -100,7 +100,7 @@ def _lay(cmap: ConformalMap, placing: Placing, settings: PatternSettings, progre
     met = met_by_pattern(layout, nodes, edges, boundary)
     if cmap.kind != "net":
         met[:2] = True  # a cell that encloses an end goes around the surface
-    if settings.boundary == "trim":
+    if settings.boundary == "trim" and len(boundary.face):
         try:
             cut = trim(layout, boundary, met, nodes, edges, whole)
         except TooCoarse:
@@ -200,7 +200,7 @@ def _finish(
         normals=normals,
         uv=uv,
         faces=faces,
-        corners=_corners(cmap, lattice, placement, cells.isometry, uv[corner]),
+        corners=_corners(cmap, layout, faces, cells.isometry, triangle, place, uv),
         index=np.where(whole, lattice.sides - faces.lengths, 0),
         sheet=None if net else cells.isometry[:, 3],
         neighbours=neighbours,
@@ -229,18 +229,26 @@ def _turn_of_cells(
 
 
 def _corners(
-    cmap: ConformalMap, lattice: Lattice, placement: Placement, isometry: Ints, uv: Complexes
+    cmap: ConformalMap,
+    layout: Layout,
+    faces: Ragged,
+    isometry: Ints,
+    triangle: Ints,
+    place: Complexes,
+    uv: Complexes,
 ) -> Complexes:
-    """(k,) the corners of each cell beside its first one: what the isometries are in the domain."""
+    """(k,) the corners of each cell beside its first one. On nets, those across a cut are found from their
+    places on the lattice, by the affine map of the first corner's triangle."""
+    corner = faces.values.astype(np.int64)
     if cmap.kind != "net":
-        return cmap.deck.apply(uv, isometry[:, 3])
-    moved = isometry.any(axis=1)
-    if placement.similarity is None or not moved.any():
-        return uv
-    A, B = placement.similarity
-    turn = np.exp(1j * lattice.quantum * isometry[:, 0])
-    shift = lattice.position(isometry[:, 1:3])
-    return np.asarray(np.where(moved, turn * uv + (turn * B + shift - B) / A, uv))
+        return cmap.deck.apply(uv[corner], isometry[:, 3])
+    z = uv[corner]
+    moved = np.flatnonzero(isometry.any(axis=1))
+    beside = layout.lattice.carry(isometry[moved], place[corner[moved]])
+    first = triangle[corner[faces.offsets[faces.row[moved]]]]
+    weights = barycentric(layout.corners[first], beside)
+    z[moved] = (weights * cmap.corners()[first]).sum(axis=1)
+    return z
 
 
 def _usable(cells: Cells, narrows: bool) -> tuple[Bools, int]:

@@ -29,7 +29,7 @@ from hexwrap_solver.pattern.types import PatternSettings
 #: Sizes and directions tried, from one end of what is admissible to the other.
 SCALES, DIRECTIONS = 41, 24
 #: Cost of a size off the wanted one by its whole spread, beside the misfit in lattice units.
-COST_OF_SIZE = 0.01
+COST_OF_SIZE = 0.1
 #: Misfit of all motions together, in lattice units, below which nothing needs to be deformed.
 EXACT = 1e-7
 #: Places of the lattice, the best first, whose deformation is computed, until one distorts by less than FINE.
@@ -68,7 +68,7 @@ def place_on_net(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings
     if not len(motions.words) and not np.any(net.crossing):
         own = _home(cmap)
         place = factor * (own - own[anchor_vertex(cmap)]) + phase
-        return _placement(cmap, lattice, settings, rows, place, (factor, 0j), angle, 0.0)
+        return _placement(cmap, lattice, settings, rows, place, factor, angle, 0.0)
     tried, system = [], None
     for misfit, A, B, rows in _choices(cmap, lattice, settings, motions, factor, phase):
         glued_rows, corner = around_vertices(lattice, net, cmap.surface.twin, rows, faces)
@@ -85,11 +85,11 @@ def place_on_net(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings
             pinned = normal.any(axis=1)
             place[pinned] = depth[pinned, 0] + 1j * depth[pinned, 1]
             distortion = 0.0
-        tried.append((distortion, glued, rows, place, (A, B)))
+        tried.append((distortion, glued, rows, place, A))
         if distortion < FINE:
             break
-    distortion, glued, rows, place, similarity = min(tried, key=lambda one: one[0])
-    found = _placement(cmap, lattice, settings, rows, place, similarity, angle, distortion)
+    distortion, glued, rows, place, scale = min(tried, key=lambda one: one[0])
+    found = _placement(cmap, lattice, settings, rows, place, scale, angle, distortion)
     return replace(found, glued=glued)
 
 
@@ -114,11 +114,11 @@ def _placement(
     settings: PatternSettings,
     rows: Ints,
     place: Complexes,
-    similarity: tuple[complex, complex],
+    scale: complex,
     angle: float,
     distortion: float,
 ) -> Placement:
-    around = round(girth(cmap) * abs(similarity[0]) / (width_per_cell(lattice, angle) * lattice.edge))
+    around = round(girth(cmap) * abs(scale) / (width_per_cell(lattice, angle) * lattice.edge))
     none = np.zeros((*cmap.surface.faces.shape, 4), dtype=np.int64)
     return Placement(
         place=place,
@@ -128,7 +128,6 @@ def _placement(
         around=max(around, 1),
         distortion=distortion,
         notes=(),
-        similarity=similarity,
     )
 
 
@@ -198,10 +197,12 @@ def _choices(
     size = np.linspace(-1, 1, SCALES)
     turn = lattice.quantum * np.arange(DIRECTIONS) / DIRECTIONS if free else np.zeros(1)
     A = (factor * (1 + size_spread(settings) * size)[:, None] * np.exp(1j * turn)).ravel()
-    at = motions.centre[0] if len(motions.centre) else cmap.corners().ravel()[0]
-    B = -A * at + (0j if len(motions.centre) else phase)
+    off = np.repeat(abs(size), len(turn))
+    centres, shift = _centres(cmap, motions, phase)
+    A, at, off = np.tile(A, len(centres)), np.repeat(centres, len(A)), np.tile(off, len(centres))
+    B = shift - A * at
     rows, misfit = _rounded(lattice, motions, A, B)
-    cost = misfit + COST_OF_SIZE * np.repeat(abs(size), len(turn))
+    cost = misfit + COST_OF_SIZE * off
     best = np.argsort(cost, kind="stable")[:DEFORMED]
     best = best[np.isfinite(cost[best])]
     if not len(best):
@@ -210,6 +211,19 @@ def _choices(
             "cell; move it, or take indices of 1 and -1."
         )
     return [(float(misfit[i]), complex(A[i]), complex(B[i]), rows[i]) for i in best]
+
+
+def _centres(cmap: ConformalMap, motions: Motions, phase: complex) -> tuple[Complexes, complex]:
+    """Places that may become the origin of the lattice, and where it is shifted to: singularities, else the
+    fixed points of motions that turn, which are exact then, else the anchor."""
+    if len(motions.centre):
+        return motions.centre, 0j
+    zeta = np.exp(1j * cmap.net.angle)
+    turning = np.flatnonzero(motions.turn)
+    if len(turning):
+        return np.asarray(motions.translation[turning] / (1 - zeta[turning])), 0j
+    anchor = np.flatnonzero(cmap.surface.faces.ravel() == anchor_vertex(cmap))[0]
+    return cmap.corners().ravel()[[anchor]], phase
 
 
 def _rounded(lattice: Lattice, motions: Motions, A: Complexes, B: Complexes) -> tuple[Ints, Floats]:

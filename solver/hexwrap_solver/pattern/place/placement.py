@@ -32,8 +32,7 @@ class Placement:
     glued: how the corners of the faces follow. isometries: (t, 4) what the motions of the net are on the
     lattice. rotation: angle from the boundary direction to an edge. around: cells once around (middle ring on
     cones, longest loop on nets). distortion: worst ratio of singular values − 1 of the stretch. step: around
-    is one of its multiples. motion: on annuli, what g is. similarity: on nets (A, B), the lattice being
-    A·z + B but for the stretch.
+    is one of its multiples. motion: on annuli, what g is.
     """
 
     place: Complexes
@@ -45,7 +44,6 @@ class Placement:
     notes: tuple[str, ...]
     step: int = 1
     motion: Isometry | None = None
-    similarity: tuple[complex, complex] | None = None
 
     @classmethod
     def on_annulus(
