@@ -153,8 +153,9 @@ def _ends(surface: Surface, boundary: BoundaryCondition, lattice: Lattice) -> tu
             nearest = round(curvature / lattice.quantum) * lattice.quantum
             if abs(curvature - nearest) > NEARLY:
                 raise NotAdaptedError(
-                    f"The angles listed on loop {i} make it turn by {curvature:.6f} rad; with singularities it "
-                    f"must be a multiple of the quantum, {lattice.quantum:.6f} rad; the nearest is {nearest:.6f}."
+                    f"The angles listed on loop {i} make it turn by {curvature:.6f} rad; with singularities "
+                    f"that must be a multiple of the quantum, {lattice.quantum:.6f} rad; the nearest is "
+                    f"{nearest:.6f}."
                 )
             target[loop] = angles + (curvature - nearest) / len(loop)
             ends.append("angles")
