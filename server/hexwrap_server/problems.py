@@ -58,7 +58,7 @@ PLACES: dict[type[HexwrapError], str] = {
     GaussBonnetError: "/boundary",
     BoundaryError: "/boundary",
     NotAdaptedError: "/boundary",
-    SingularitiesError: "/singularities",
+    SingularitiesError: "/boundary",
     PatternError: "/pattern",
     PanelsError: "/panels",
 }

@@ -22,7 +22,7 @@ from hexwrap_server.output.writers import WRITERS, Meta
 from hexwrap_server.problems import FormError, body_is_the_surface
 from hexwrap_solver import pipeline
 from hexwrap_solver.errors import HexwrapError
-from hexwrap_solver.surface import surface_from_mesh, surface_from_nurbs
+from hexwrap_solver.surface import surface_from_mesh, surface_from_nurbs, with_openings
 from hexwrap_solver.surface.types import Surface, SurfaceSettings
 
 #: Of this worker process.
@@ -94,7 +94,7 @@ def take_in(sent: SentSurface, asked: SurfaceSettings | None = None) -> Surface:
     """asked: instead of the settings that were sent along. Raises SurfaceError."""
     settings = asked or sent.settings or SurfaceSettings()
     if sent.mesh is not None:
-        return surface_from_mesh(sent.mesh)
+        return with_openings(surface_from_mesh(sent.mesh), settings.openings)
     assert sent.nurbs is not None
     return surface_from_nurbs(sent.nurbs, settings.mesh)
 

@@ -13,6 +13,7 @@ from hexwrap_solver.conformal.energy import Energy
 from hexwrap_solver.conformal.layout import lay_out
 from hexwrap_solver.conformal.net import Net
 from hexwrap_solver.conformal.newton import Minimum, minimise
+from hexwrap_solver.conformal.openings import cut_openings
 from hexwrap_solver.conformal.orientation import faithful, positive
 from hexwrap_solver.conformal.robust import FlatMetric, metric_with_flips, solve_with_flips, with_inserted
 from hexwrap_solver.conformal.span import MAX_SPAN, check_reach, check_span, cone_angle_of
@@ -26,6 +27,7 @@ from hexwrap_solver.conformal.types import (
     Unrolled,
 )
 from hexwrap_solver.errors import SingularitiesError
+from hexwrap_solver.surface.holes import fill_openings
 from hexwrap_solver.surface.types import Surface
 
 #: Cone angles this near to a multiple of the quantum are one, radians.
@@ -43,12 +45,15 @@ def conformal_map(
     cones: Cones | None = None,
 ) -> ConformalMap:
     """Maps a surface of genus 0 to a flat domain: an annulus to a cylinder or cone of revolution, unrolled,
-    any other surface, and one with singularities, to a net.
+    any other surface, and one with singularities, to a net. Openings to be cut are filled before and cut out
+    afterwards.
 
     The domain has the surface's scale: the area-weighted mean of u is 0, or, with an isometric boundary,
     the length-weighted mean of u along the isometric loops.
     Raises RequestError (boundary condition, singularities), ConvergenceError.
     """
+    if surface.openings:
+        return cut_openings(conformal_map(fill_openings(surface), condition, progress, cones), surface)
     cones = Cones.none() if cones is None else cones
     check_cones(surface, cones)
     angles = boundary_angles(surface, condition, cones)

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 
-from hexwrap_solver.arrays import Floats, Ints, Ragged
+from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged
 from hexwrap_solver.setting import Setting
 from hexwrap_solver.surface.closest import TriangleTree
 from hexwrap_solver.surface.topology import edge_groups, edge_lengths, half_edges, twins_of
+
+Openings = Literal["cut", "loop"]
 
 
 @dataclass(frozen=True)
@@ -47,9 +49,16 @@ class MeshSettings:
 
 @dataclass(frozen=True)
 class SurfaceSettings:
-    """How a sent surface is taken in."""
+    """How a sent surface is taken in.
+
+    openings ``cut``: loops beyond the two longest are filled smoothly, mapped as wall, and cut out again.
+    ``loop``: each is a boundary of its own.
+    """
 
     mesh: Annotated[MeshSettings | None, Setting("how a NURBS surface is meshed", rare=True)] = None
+    openings: Annotated[
+        Openings, Setting("what loops beyond the two longest are: holes to cut out, or boundaries")
+    ] = "cut"
 
 
 @dataclass(frozen=True)
@@ -113,6 +122,9 @@ class Surface(Triangles):
     vertex_of_input: (n_sent,) the vertex at which each sent vertex stands, or −1 where it was dropped.
     normals: (n, 3) unit vertex normals (sent ones, the NURBS surface's, or area-weighted face normals).
     repairs: one sentence each.
+    openings: so many loops, the last ones, are openings of the wall: the map is found with them filled, and
+    they are cut out of it. patch: (m,) on a filled surface, the faces that fill openings; None if there
+    are none.
     nurbs, parameters: the NURBS surface the mesh was made from, and (n, 2) its parameters at the
     vertices (in the closed direction, parameters are in the base period); None for sent meshes.
     """
@@ -124,6 +136,8 @@ class Surface(Triangles):
     repairs: tuple[str, ...] = ()
     nurbs: NurbsSurface | None = None
     parameters: Floats | None = None
+    openings: int = 0
+    patch: Bools | None = None
 
     def knowing(self, mesh: Triangles) -> Surface:
         """The surface itself, told what is known of the same triangles by other names of their vertices."""
