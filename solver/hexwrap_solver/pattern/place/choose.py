@@ -18,6 +18,7 @@ from hexwrap_solver.pattern.place.placement import (
     Placement,
     check_phase,
     edge_angle,
+    is_disk,
     is_straight,
     quantized,
     quantum_turns,
@@ -68,8 +69,8 @@ class Placing:
 
     @property
     def is_cylinder(self) -> bool:
-        """And no disk, see ``as_sheet``."""
-        return self.turns == 0 and self.cmap.deck.translation != 0
+        """And no disk."""
+        return self.turns == 0 and not is_disk(self.cmap)
 
     @cached_property
     def _straightening(self) -> Straightening:
@@ -85,7 +86,7 @@ class Placing:
         """Aligned nowhere."""
         if self.is_cylinder:
             return place_on_cylinder(self.cmap, self.lattice, settings, [])
-        if not self.cmap.deck.translation and not self.turns:  # a disk
+        if is_disk(self.cmap):
             return place_on_net(self.cmap, self.lattice, settings)
         if self.cmap.deck.is_translation:
             return place_on_flat_ring(self.cmap, self.lattice, settings, self.turns)

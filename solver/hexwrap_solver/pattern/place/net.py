@@ -88,8 +88,8 @@ def place_on_net(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings
         tried.append((distortion, glued, rows, place, A))
         if distortion < FINE:
             break
-    distortion, glued, rows, place, scale = min(tried, key=lambda one: one[0])
-    found = _placement(cmap, lattice, settings, rows, place, scale, angle, distortion)
+    distortion, glued, rows, place, A = min(tried, key=lambda one: one[0])
+    found = _placement(cmap, lattice, settings, rows, place, A, angle, distortion)
     return replace(found, glued=glued)
 
 

@@ -122,6 +122,11 @@ def main_loops(cmap: ConformalMap) -> tuple[Ints, ...]:
     return cmap.surface.loops if cmap.kind == "net" else cmap.surface.loops[:2]
 
 
+def is_disk(cmap: ConformalMap) -> bool:
+    """A disk taken as a sheet, see ``as_sheet``: its deck transformation is the identity."""
+    return cmap.kind != "net" and cmap.deck.angle == 0 and cmap.deck.translation == 0
+
+
 def edge_angle(lattice: Lattice, settings: PatternSettings) -> float:
     """Angle from the boundary direction to an edge that is asked for, radians."""
     if settings.rotation == "edge":

@@ -8,7 +8,7 @@ from hexwrap_solver.arrays import Floats
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.errors import PatternError
 from hexwrap_solver.pattern.lattice import Lattice
-from hexwrap_solver.pattern.place.placement import main_loops
+from hexwrap_solver.pattern.place.placement import is_disk, main_loops
 from hexwrap_solver.pattern.types import PatternSettings
 
 #: Where neither a number nor a length is asked for: so many cells around, but fewer where that would make
@@ -66,7 +66,7 @@ def default_edge(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings
     width = width_per_cell(lattice, angle)
     edge = girth(cmap) / (DEFAULT_AROUND * width)
     of_cells = float(np.sqrt(area / (DEFAULT_CELLS * _unit_area(lattice))))
-    if cmap.kind == "net":
+    if cmap.kind == "net" or is_disk(cmap):
         few = float(np.sqrt(area / (DEFAULT_ON_NETS * _unit_area(lattice))))
         return min(few, _edge_of_rows(cmap, lattice, angle))
     narrow = min(_lengths_of_loops(cmap)) if settings.boundary == "trim" else _narrow_ring(cmap)
