@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hexwrap_solver.arrays import Floats
+from hexwrap_solver.arrays import Floats, Ints
 from hexwrap_solver.panels.types import Panels
 
 #: From the shortest edge to the longest: cold and dark to warm, lightest in the middle.
@@ -62,14 +62,20 @@ def gradient(t: Floats) -> Floats:
     return encoded(cone @ np.linalg.inv(_TO_CONE).T)
 
 
-def size_colours(panels: Panels) -> list[str]:
-    """One colour per size class, ascending, and one for all that come after them."""
+def size_colours(n: int) -> list[str]:
+    """One colour per size class, ascending."""
+    if n == 1:
+        return to_hex(gradient(np.array([0.2])))
+    return to_hex(gradient(np.linspace(0.0, 1.0, n)))
+
+
+def class_colours(panels: Panels) -> list[str]:
+    """One colour per size class, and one for all special panels after them."""
     n = panels.n_sizes
-    steps = np.array([0.2]) if n == 1 else np.linspace(0.0, 1.0, n)
-    return to_hex(gradient(steps)) + [SPECIAL] * (len(panels.class_length) - n)
+    return size_colours(n) + [SPECIAL] * (len(panels.class_length) - n)
 
 
-def panel_colours(panels: Panels) -> Floats:
-    """(q, 3) sRGB of panels by their class."""
-    table = np.vstack([from_hex(size_colours(panels)), from_hex([UNSIZED])])
-    return table[panels.size]
+def panel_colours(size: Ints, classes: list[str]) -> Floats:
+    """(q, 3) sRGB of panels by their class (−1: none), whose colours are given."""
+    table = np.vstack([from_hex(classes), from_hex([UNSIZED])])
+    return table[size]

@@ -73,7 +73,7 @@ def _legend(axes: Axes, height: int, panels: Panels, meta: Meta) -> None:
 def _swatches(axes: Axes, top: float, panels: Panels) -> None:
     """One row per size: colour, edge length, how many."""
     counts, words = panels.class_count.tolist(), text.lengths(panels.class_length.tolist())
-    for i, colour in enumerate(colours.size_colours(panels)):
+    for i, colour in enumerate(colours.class_colours(panels)):
         y = top + ROW * (i + 0.5)
         _swatch(axes, y, panels, colour, int(panels.class_sides[i]))
         axes.text(64, y, words[i], size=17, color=INK, va="center")

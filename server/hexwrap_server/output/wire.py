@@ -11,7 +11,7 @@ import orjson
 from numpy.typing import NDArray
 
 from hexwrap_server.jobs.parts import PARTS, join_parts
-from hexwrap_server.output.colours import size_colours
+from hexwrap_server.output.colours import class_colours
 from hexwrap_solver.arrays import Complexes, Floats, Ints, Ragged
 from hexwrap_solver.conformal.net import Net
 from hexwrap_solver.conformal.types import ConformalMap
@@ -176,7 +176,7 @@ def sizes(made: Panels | None) -> list[dict[str, Any]]:
         made.class_length.tolist(),
         made.class_count.tolist(),
         made.class_sides.tolist(),
-        size_colours(made) if len(made.class_length) else [],
+        class_colours(made) if len(made.class_length) else [],
         strict=True,
     )
     return [
