@@ -24,6 +24,7 @@ _MESH = _all(
     vertices=listed(POINT),
     faces=listed(listed(_INDEX, 3)),
     input_vertex=listed({"type": "integer", "minimum": -1}),
+    vertex_of_input=listed({"type": "integer", "minimum": -1}),
     loops=listed(listed(_INDEX)),
     repairs=listed(_TEXT),
 )

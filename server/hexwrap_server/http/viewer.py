@@ -18,7 +18,7 @@ from hexwrap_server.http import openapi
 from hexwrap_server.http.answers import json_response, packed_response
 from hexwrap_server.http.bodies import read_body
 from hexwrap_server.http.routes import JobId, service_of
-from hexwrap_server.input.form import document
+from hexwrap_server.input.form import Body, document, schema
 from hexwrap_server.input.uploads import sent_file
 from hexwrap_server.jobs.worker import Report
 from hexwrap_server.problems import body_is_the_surface, not_found
@@ -47,6 +47,12 @@ async def page() -> Response:
     return FileResponse(
         STATIC / "index.html", headers={"Content-Security-Policy": POLICY, "Cache-Control": "no-cache"}
     )
+
+
+@router.get("/v1/settings", openapi_extra=openapi.SETTINGS)
+async def settings() -> Response:
+    """JSON Schema of a request but for the arrays of its surface, with help, units and bounds: for forms."""
+    return json_response(schema(Body))
 
 
 @router.get("/v1/samples", openapi_extra=openapi.SAMPLES)

@@ -68,6 +68,7 @@ def mesh(surface: Surface) -> dict[str, Any]:
         "vertices": flat(surface.vertices),
         "faces": flat(surface.faces),
         "input_vertex": flat(surface.input_vertex),
+        "vertex_of_input": flat(surface.vertex_of_input),
         "loops": [flat(loop) for loop in surface.loops],
         "repairs": list(surface.repairs),
     }

@@ -32,7 +32,9 @@ class PatternSettings:
     ] = None
     rotation: Annotated[
         float | Literal["edge", "vertex", "u", "v"],
-        Setting("'edge' or 'vertex' along the boundary, 'u' or 'v' of a NURBS surface, or degrees"),
+        Setting(
+            "'edge' or 'vertex' along the boundary, 'u' or 'v' of a NURBS surface, or degrees", unit="degrees"
+        ),
     ] = "edge"
     align: Annotated[
         Literal["none", "first", "both"], Setting("on which loops a line of the pattern lies exactly")

@@ -143,7 +143,11 @@ def closed_within(nurbs: NurbsSurface, tolerance: float) -> tuple[bool, bool]:
     return found[0], found[1]
 
 
+def collapsed(nurbs: NurbsSurface, direction: int, end: int, tolerance: float) -> bool:
+    """Whether the parameter line at the lower (0) or upper end (1) of direction is a point."""
+    return float(np.ptp(_line(nurbs, direction, domain(nurbs, direction)[end]), axis=0).max()) <= tolerance
+
+
 def _collapsed(nurbs: NurbsSurface, direction: int, tolerance: float) -> bool:
     """Whether a parameter line at an end of direction is a point."""
-    lines = [_line(nurbs, direction, x) for x in domain(nurbs, direction)]
-    return any(float(np.ptp(line, axis=0).max()) <= tolerance for line in lines)
+    return any(collapsed(nurbs, direction, end, tolerance) for end in (0, 1))

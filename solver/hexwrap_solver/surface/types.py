@@ -145,6 +145,11 @@ class Surface(Triangles):
         self.__dict__.update({name: mesh.__dict__[name] for name in known if name in mesh.__dict__})
         return self
 
+    @property
+    def boundary(self) -> Ints:
+        """(b,) the vertices of all loops."""
+        return np.concatenate([np.zeros(0, dtype=np.int64), *self.loops])
+
     @cached_property
     def tree(self) -> TriangleTree:
         """For the nearest points of the mesh."""

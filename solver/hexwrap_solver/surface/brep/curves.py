@@ -10,7 +10,7 @@ from hexwrap_solver.surface.nurbs import basis
 from hexwrap_solver.surface.topology import angles_between
 
 #: An edge is looked at in so many places, at least, and so often between two knots.
-PLACES, PER_SPAN = 12, 4
+PLACES, PER_SPAN = 16, 2
 #: Tangents that turn by more than this at a knot make a corner, radians.
 CORNER = np.deg2rad(0.5)
 

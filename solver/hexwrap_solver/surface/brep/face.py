@@ -16,15 +16,19 @@ from hexwrap_solver.surface.brep.sizes import Field, Sizes, bilinear
 from hexwrap_solver.surface.errors import TrimError
 from hexwrap_solver.surface.flips import flip_to_delaunay, independent
 from hexwrap_solver.surface.mesh_sizes import ROW, cumulated
-from hexwrap_solver.surface.nurbs import evaluate_points
+from hexwrap_solver.surface.nurbs import evaluate, evaluate_points
 from hexwrap_solver.surface.projection import project
-from hexwrap_solver.surface.topology import half_edges, twins
+from hexwrap_solver.surface.topology import edge_lengths, face_normals, half_edges, sum_rows, twins
 
 #: Points inside keep away from the boundary by this part of its edges' lengths, which are looked at in so
 #: many places each.
 AWAY, PLACES = 0.5, 4
 #: Rounds of splits; each halves the edges that are too long.
 ROUNDS = 24
+#: Triangles with an angle below this, radians, are made better by moving their vertices, so often at first.
+SMALL, SMOOTHINGS = np.deg2rad(38), 3
+#: Moves are taken back at most so often before all of them are.
+UNDOINGS = 8
 #: A row may be so much lower than equilateral.
 FLATTEST = 3.0
 
@@ -62,7 +66,7 @@ class Piece:
     """The mesh of one face: first the vertices of its outline, then its own.
 
     faces: (m, 3) counter-clockwise in the parameters' plane. lines: edges inside that stay. loose: (n, 2)
-    whether a parameter means nothing there, at poles.
+    whether a parameter means nothing there, at poles. fixed: (n,) vertices that stay where they are.
     """
 
     uv: Floats
@@ -70,6 +74,7 @@ class Piece:
     faces: Ints
     lines: Ints
     loose: Bools
+    fixed: Bools
 
     def middle(self, start: Ints, end: Ints) -> Floats:
         """(k, 2) parameters halfway along edges."""
@@ -112,7 +117,11 @@ def piece_of(patch: Patch, outline: Outline, field: Field, sizes: Sizes, most: i
     loose = np.zeros(uv.shape, dtype=bool)
     pole = np.unique(merged[merged != np.arange(len(uv))])
     loose[pole] = free(patch, uv[pole])
-    return _split_long(patch, Piece(uv, points, faces, lines, loose), sizes, most)
+    fixed = np.arange(len(uv)) < len(outline.uv)
+    piece = Piece(uv, points, faces, lines, loose, fixed)
+    for _ in range(SMOOTHINGS):
+        piece = _smoothed(patch, piece)
+    return _split_long(patch, piece, sizes, most)
 
 
 def _one_per_pole(outline: Outline, points: Floats, n: int) -> Ints:
@@ -223,7 +232,56 @@ def _split_long(patch: Patch, piece: Piece, sizes: Sizes, most: int) -> Piece:
             break
         piece = _halved(patch, piece, long)
         piece = replace(piece, faces=flip_to_delaunay(piece.points, piece.faces, keep=piece.lines))
+        piece = _smoothed(patch, piece)
     return piece
+
+
+def _smoothed(patch: Patch, piece: Piece) -> Piece:
+    """Vertices around triangles of small angles move to the middle of their neighbours, on the surface, where
+    that turns no triangle over; then edges are flipped to Delaunay."""
+    n = len(piece.points)
+    poor = piece.faces[_least_angles(piece.points, piece.faces) < SMALL].ravel()
+    near = np.zeros(n, dtype=bool)
+    near[poor] = True
+    near[piece.faces[near[piece.faces].any(axis=1)]] = True
+    pole = np.logical_or(*piece.loose.T)
+    near[piece.faces[pole[piece.faces].any(axis=1)]] = False
+    move = np.flatnonzero(near & ~piece.fixed)
+    if len(move) == 0:
+        return piece
+    start, end = half_edges(piece.faces)
+    count = np.maximum(np.bincount(start, minlength=n), 1)
+    middle = sum_rows(piece.points[end], start, n) / count[:, None]
+    jet = evaluate(patch.opened, piece.uv[move])
+    away = middle[move] - jet.point
+    pairs = (jet.du, jet.du), (jet.du, jet.dv), (jet.dv, jet.dv)
+    e, f, g = (np.einsum("ij,ij->i", a, b) for a, b in pairs)
+    p, q = np.einsum("ij,ij->i", away, jet.du), np.einsum("ij,ij->i", away, jet.dv)
+    determinant = np.maximum(e * g - f * f, 1e-12 * np.maximum(e * g, 1e-300))
+    step = np.stack([g * p - f * q, e * q - f * p], axis=1) / determinant[:, None]
+    uv, points = piece.uv.copy(), piece.points.copy()
+    uv[move] += step
+    points[move] = evaluate_points(patch.opened, uv[move])
+    before = _least_angles(piece.points, piece.faces)
+    normal = face_normals(piece.points, piece.faces)
+    for _ in range(UNDOINGS):
+        worse = np.einsum("ij,ij->i", face_normals(points, piece.faces), normal) <= 0
+        worse |= _least_angles(points, piece.faces) < np.minimum(before, SMALL) * 0.7
+        if not worse.any():
+            break
+        back = np.unique(piece.faces[worse])
+        uv[back], points[back] = piece.uv[back], piece.points[back]
+    else:
+        return piece
+    return replace(piece, uv=uv, points=points, faces=flip_to_delaunay(points, piece.faces, keep=piece.lines))
+
+
+def _least_angles(points: Floats, faces: Ints) -> Floats:
+    """(m,) the smallest angle of each triangle, radians, between its longer sides."""
+    length = np.sort(edge_lengths(points, faces), axis=1)
+    area = np.linalg.norm(face_normals(points, faces), axis=1)
+    sine = area / np.maximum(length[:, 1] * length[:, 2], 1e-300)
+    return np.asarray(np.arcsin(np.clip(sine, 0.0, 1.0)))
 
 
 def _too_long(patch: Patch, piece: Piece, sizes: Sizes) -> Ints:
@@ -261,12 +319,14 @@ def _halved(patch: Patch, piece: Piece, h: Ints) -> Piece:
     out[h // 3] = np.stack([start, new, c], axis=1)
     out[t // 3] = np.stack([end, new, d], axis=1)
     more = [np.stack([new, end, c], axis=1), np.stack([new, start, d], axis=1)]
+    lines, on_lines = _halved_lines(piece.lines, start, end, new)
     return Piece(
         np.concatenate([piece.uv, uv]),
         np.concatenate([piece.points, evaluate_points(patch.opened, uv)]),
         np.concatenate([out, *more]),
-        _halved_lines(piece.lines, start, end, new),
+        lines,
         np.concatenate([piece.loose, np.zeros((len(new), 2), dtype=bool)]),
+        np.concatenate([piece.fixed, np.isin(new, on_lines)]),
     )
 
 
@@ -274,8 +334,8 @@ def _third(h: Ints) -> Ints:
     return 3 * (h // 3) + (h + 2) % 3
 
 
-def _halved_lines(lines: Ints, start: Ints, end: Ints, new: Ints) -> Ints:
-    """Lines that were split are replaced by their halves."""
+def _halved_lines(lines: Ints, start: Ints, end: Ints, new: Ints) -> tuple[Ints, Ints]:
+    """Lines that were split are replaced by their halves; and the new vertices on them."""
     n = int(new.max(initial=0)) + 1
     key = np.minimum(start, end) * n + np.maximum(start, end)
     own = lines.min(axis=1) * n + lines.max(axis=1)
@@ -284,4 +344,4 @@ def _halved_lines(lines: Ints, start: Ints, end: Ints, new: Ints) -> Ints:
     hit = key[order][place] == own
     middle = new[order[place[hit]]]
     halves = [np.stack([lines[hit, 0], middle], axis=1), np.stack([middle, lines[hit, 1]], axis=1)]
-    return np.concatenate([lines[~hit], *halves])
+    return np.concatenate([lines[~hit], *halves]), middle

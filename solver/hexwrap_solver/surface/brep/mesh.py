@@ -15,7 +15,7 @@ import shapely
 
 from hexwrap_solver.arrays import Floats, Ints
 from hexwrap_solver.surface.brep.curves import corners, curvature, evaluate_curve, places
-from hexwrap_solver.surface.brep.face import Outline, piece_of, polygon_of
+from hexwrap_solver.surface.brep.face import Outline, Piece, piece_of, polygon_of
 from hexwrap_solver.surface.brep.kinks import crossings, kink_lines, kinks_of
 from hexwrap_solver.surface.brep.pull import Patch, free, lifted, patch_of, pull
 from hexwrap_solver.surface.brep.sizes import Field, Sizes, field_of, meeting, sized
@@ -261,7 +261,7 @@ def _sewn(
         around.append((label[live], _outward(side, piece.uv[live])))
         turn = [0, 2, 1] if side.face.reversed else [0, 1, 2]
         faces.append(label[piece.faces][:, turn])
-        uvs.append(piece.uv[piece.faces][:, turn])
+        uvs.append(_corners_at(piece)[:, turn])
         names.append(np.full(len(piece.faces), name))
         for trim, corner in trims:
             own = _beside(side, outline.uv[corner[:-1]], outline.uv[corner[1:]])
@@ -333,6 +333,13 @@ def _outline(
         np.zeros((0, 2), dtype=np.int64),
     )
     return outline, trims
+
+
+def _corners_at(piece: Piece) -> Floats:
+    """(m, 3, 2) parameters of the corners of triangles; at poles, what is free lies between the other two."""
+    uv = piece.uv[piece.faces]
+    others = (uv.sum(axis=1, keepdims=True) - uv) / 2
+    return np.where(piece.loose[piece.faces], others, uv)
 
 
 def _pulled(side: _Side, trim: Trim, line: Floats, edge: _Divided, t: Floats) -> tuple[Floats, Floats, Ints]:

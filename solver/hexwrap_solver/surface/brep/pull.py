@@ -17,7 +17,7 @@ from hexwrap_solver.surface.brep.types import Face
 from hexwrap_solver.surface.errors import TrimError
 from hexwrap_solver.surface.nurbs import domain, evaluate, evaluate_points
 from hexwrap_solver.surface.nurbs_checks import closed_within, spans
-from hexwrap_solver.surface.projection import project
+from hexwrap_solver.surface.projection import project, settle
 from hexwrap_solver.surface.types import NurbsSurface
 
 #: Closest points are looked for from a grid of so many lines in each direction, at least and at most.
@@ -61,24 +61,26 @@ def patch_of(surface: NurbsSurface, tolerance: float) -> Patch:
     return Patch(surface, low, high - low, size, grid, cKDTree(points))
 
 
-def pull(patch: Patch, points: Floats, near: Floats | None = None) -> tuple[Floats, Floats]:
+def pull(
+    patch: Patch, points: Floats, near: Floats | None = None, tolerance: float = 0.0
+) -> tuple[Floats, Floats]:
     """(k, 2) parameters of the nearest points on the surface, and (k,) the distances.
 
-    near: (k, 2) where to begin, when known; parameters then come out in the same period.
+    near: (k, 2) where to begin, when known; parameters then come out in the same period. Without, more starts
+    are tried for points that seem further off than the tolerance.
     """
     if near is not None:
-        foot, uv, _ = project(patch.surface, points, near)
+        uv = settle(patch.surface, points, near)
         period = np.where(patch.surface.closed, patch.width, np.inf)
-        with np.errstate(invalid="ignore"):
-            turns = np.where(np.isfinite(period), np.round((near - uv) / period), 0.0)
-        return uv + turns * patch.width, np.linalg.norm(points - foot, axis=1)
+        uv = uv + _rounded(near - uv, period) * patch.width
+        return uv, np.linalg.norm(points - evaluate_points(patch.surface, uv), axis=1)
     attempts = min(ATTEMPTS, len(patch.grid))
-    distance, nearest = patch.tree.query(points, k=attempts)
+    _, nearest = patch.tree.query(points, k=attempts)
     nearest = nearest.reshape(len(points), attempts)
-    foot, uv, _ = project(patch.surface, points, patch.grid[nearest[:, 0]])
-    distance = np.linalg.norm(points - foot, axis=1)
-    for k in range(1, attempts):
-        again = np.flatnonzero(distance > 1e-6 * patch.size)
+    uv = settle(patch.surface, points, patch.grid[nearest[:, 0]])
+    distance = np.linalg.norm(points - evaluate_points(patch.surface, uv), axis=1)
+    for k in range(attempts):
+        again = np.flatnonzero(distance > tolerance)
         if len(again) == 0:
             break
         foot, other, _ = project(patch.surface, points[again], patch.grid[nearest[again, k]])
@@ -105,7 +107,7 @@ def lifted(
             raise TrimError(
                 f"Face {name} of the polysurface has a boundary without edges.", data={"face": name}
             )
-        uv, distance = pull(patch, np.concatenate(solid))
+        uv, distance = pull(patch, np.concatenate(solid), None, 2 * tolerance)
         worst = float(distance.max())
         if worst > FAR * tolerance + 1e-6 * patch.size:
             raise TrimError(

@@ -28,7 +28,7 @@ NUDGE = 1e-4
 #: Neighbouring normals differ by no more than this, radians, so that no rounding looks like a crease …
 TURN = 0.35
 #: … but for that alone edges become no shorter than this part of the longest.
-LEAST = 1 / 6
+LEAST = 1 / 4
 #: Sizes are planned a little below what was asked, where something was, and exceeded a little elsewhere.
 MARGIN, LOOSE = 0.88, 1.7
 #: So many vertices are enough for a shape where only a tolerance is asked for.
