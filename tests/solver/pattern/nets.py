@@ -9,7 +9,8 @@ import numpy as np
 from hexwrap_solver.arrays import Ragged
 from hexwrap_solver.conformal import conformal_map
 from hexwrap_solver.conformal.types import BoundaryAngle, BoundaryCondition, Cones, ConformalMap
-from hexwrap_solver.surface import surface_from_mesh
+from hexwrap_solver.surface import surface_from_mesh, with_openings
+from hexwrap_solver.surface.holes import fill_openings
 from hexwrap_solver.surface.types import SentMesh, Surface
 
 QUANTUM = {"hex": np.pi / 3, "triangle": np.pi / 3, "quad": np.pi / 2}
@@ -122,3 +123,17 @@ def ellipsoid(kind: str) -> ConformalMap:
     places = corners / np.linalg.norm(corners, axis=1, keepdims=True) * [10, 10, 8]
     cones = Cones.at(nearest(found, places), np.ones(len(places), dtype=np.int64), QUANTUM[kind])
     return conformal_map(found, BoundaryCondition("isometric", quantum=kind), cones=cones)
+
+
+@cache
+def cut_tower(holes: int = 3, wide: int = 4) -> ConformalMap:
+    """A tower whose windows are filled, mapped as wall and cut out again; a straight cylinder."""
+    found = with_openings(tower(holes, wide=wide).surface, "cut")
+    return conformal_map(found, BoundaryCondition("straight"))
+
+
+@cache
+def filled_tower(holes: int = 3) -> ConformalMap:
+    """The same without windows, on the same filling."""
+    found = fill_openings(with_openings(tower(holes).surface, "cut"))
+    return conformal_map(found, BoundaryCondition("straight"))

@@ -159,11 +159,7 @@ def test_nothing_depends_on_the_numbering_of_faces(case):
     one, two = (lay_pattern(c, PatternSettings()) for c in (cmap, shuffled(cmap, 1)))
     assert one.n_cells == two.n_cells
 
-    def centres(pattern: Pattern) -> np.ndarray:
-        total = np.add.reduceat(pattern.vertices[pattern.faces.values], pattern.faces.offsets[:-1], axis=0)
-        return total / pattern.faces.lengths[:, None]
-
-    away = np.linalg.norm(centres(one)[:, None] - centres(two)[None], axis=2)
+    away = np.linalg.norm(places_of_cells(one)[:, None] - places_of_cells(two)[None], axis=2)
     assert away.min(axis=1).max() < 1e-5 * one.edge_length
 
 
@@ -189,6 +185,33 @@ def test_lifted_and_laid_down_again(case):
     assert down.distance.max() < 1e-9
     again = lift(cmap, down.uv)
     np.testing.assert_allclose(again.points, up.points, atol=1e-7)
+
+
+def places_of_cells(pattern: Pattern) -> np.ndarray:
+    """(c, 3) means of the corners."""
+    total = np.add.reduceat(pattern.vertices[pattern.faces.values], pattern.faces.offsets[:-1], axis=0)
+    return total / pattern.faces.lengths[:, None]
+
+
+@pytest.mark.parametrize("boundary", ["whole", "trim"])
+def test_beside_windows_the_pattern_is_what_it_would_be_without_them(boundary):
+    """Cells over openings are left out or cut; all whole cells are cells of the full pattern."""
+    settings = PatternSettings(around=30, boundary=boundary)
+    wall, full = lay_pattern(nets.cut_tower(), settings), lay_pattern(nets.filled_tower(), settings)
+    assert nets.cut_tower().kind == "cylinder"
+    away = np.linalg.norm(
+        places_of_cells(wall)[wall.whole][:, None] - places_of_cells(full)[full.whole][None], axis=2
+    )
+    assert away.min(axis=1).max() < 1e-9 * 30
+    assert wall.whole.sum() < full.whole.sum()
+    assert wall.around == full.around
+    assert wall.distortion == full.distortion
+    if boundary == "trim":
+        assert euler(wall) == -3
+        z, following = wall.corners, wall.faces.next()
+        area = float((z.conj() * z[following]).imag.sum() / 2)
+        p, q, r = nets.cut_tower().corners().T
+        assert area == pytest.approx(float((((q - p).conj() * (r - p)).imag / 2).sum()), rel=2e-3)
 
 
 @pytest.mark.parametrize("boundary", ["whole", "trim"])
