@@ -94,7 +94,7 @@ def take_in(sent: SentSurface, asked: SurfaceSettings | None = None) -> Surface:
     """asked: instead of the settings that were sent along. Raises SurfaceError."""
     settings = asked or sent.settings or SurfaceSettings()
     if sent.mesh is not None:
-        return with_openings(surface_from_mesh(sent.mesh), settings.openings)
+        return with_openings(surface_from_mesh(sent.mesh, settings), settings.openings)
     assert sent.nurbs is not None
     return surface_from_nurbs(sent.nurbs, settings.mesh)
 
