@@ -110,6 +110,7 @@ FLATTEN = _route(
 FILES = _route(
     _answers({"application/octet-stream": {"schema": {"type": "string"}}}, 200, 404, 409, 410, 500, 503)
 )
+SETTINGS = _route(_answers(_json(record(("type", "properties")))))
 SAMPLES = _route(_answers(_json(record(("samples",), samples=listed(record(("name",)))))))
 SAMPLE = _route(_answers(_json(record(("surface",))), 200, 404))
 REQUEST = _route(_answers(_json(record(("surface", "boundary", "pattern", "panels"))), 200, 404))

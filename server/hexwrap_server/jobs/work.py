@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections import OrderedDict
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -22,8 +23,9 @@ from hexwrap_server.output.writers import WRITERS, Meta
 from hexwrap_server.problems import FormError, body_is_the_surface
 from hexwrap_solver import pipeline
 from hexwrap_solver.errors import HexwrapError
-from hexwrap_solver.surface import surface_from_mesh, surface_from_nurbs, with_openings
-from hexwrap_solver.surface.types import Surface, SurfaceSettings
+from hexwrap_solver.surface import surface_from_mesh, with_openings
+from hexwrap_solver.surface.brep import surface_from_brep, surface_from_patch
+from hexwrap_solver.surface.types import Origin, Surface, SurfaceSettings
 
 #: Of this worker process.
 _SCRIBE = Scribe()
@@ -94,9 +96,18 @@ def take_in(sent: SentSurface, asked: SurfaceSettings | None = None) -> Surface:
     """asked: instead of the settings that were sent along. Raises SurfaceError."""
     settings = asked or sent.settings or SurfaceSettings()
     if sent.mesh is not None:
-        return with_openings(surface_from_mesh(sent.mesh, settings), settings.openings)
-    assert sent.nurbs is not None
-    return surface_from_nurbs(sent.nurbs, settings.mesh)
+        surface = surface_from_mesh(sent.mesh, settings)
+    elif sent.brep is not None:
+        surface = surface_from_brep(sent.brep, settings)
+    else:
+        assert sent.nurbs is not None
+        surface = surface_from_patch(sent.nurbs, settings, sent.tolerance)
+    surface = with_openings(surface, settings.openings)
+    unit = settings.unit or sent.unit
+    if (unit, sent.origin, sent.told) == (None, Origin(), ()):
+        return surface
+    repairs = (*sent.told, *surface.repairs)
+    return replace(surface, unit=unit, origin=sent.origin, repairs=repairs).knowing(surface)
 
 
 @body_is_the_surface()
@@ -115,6 +126,8 @@ def checked(report: Report, sent: SentSurface, caching: CacheSettings) -> Intake
         "faces": len(surface.faces),
         "loops": loops,
         "repairs": list(surface.repairs),
+        "unit": surface.unit,
+        "objects": [],
     }
     return Intake(id, codec.encode(sent), answer)
 
