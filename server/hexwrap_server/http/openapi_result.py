@@ -66,7 +66,13 @@ _PANELS = _all(
     normal=listed(POINT),
     whole=listed(_TRUTH),
 )
-_SIZE = _all(size=_INDEX, edge_length=NUMBER, count=_COUNT, color=_TEXT | {"pattern": "^#[0-9a-fA-F]{6}$"})
+_SIZE = _all(
+    size=_INDEX,
+    edge_length=NUMBER,
+    count=_COUNT,
+    sides=_COUNT,
+    color=_TEXT | {"pattern": "^#[0-9a-fA-F]{6}$"},
+)
 _QUALITY = _all(
     scale_ratio=NUMBER,
     quasi_conformal=_all(mean=NUMBER, max=NUMBER),
