@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 #: Names that ``?include=`` takes, in the order of the Result.
-PARTS = ("mesh", "map", "pattern", "panels", "sizes", "quality", "components", "support", "timings")
+PARTS = ("unit", "mesh", "map", "pattern", "panels", "sizes", "quality", "components", "support", "timings")
 
 #: Where each part stands in the text of a Result.
 Places = dict[str, tuple[int, int]]

@@ -40,6 +40,8 @@ def part(solution: Solution, name: str, timings: dict[str, float]) -> Any:
     match name:
         case "mesh":
             return mesh(solution.map.surface)
+        case "unit":
+            return solution.map.surface.unit
         case "map":
             return conformal(solution.map)
         case "pattern":
