@@ -145,7 +145,7 @@ def _flat_cells(solution: Solution) -> list[list[list[float]]]:
     """Closed outlines of the cells in the unrolled domain, each in one piece, at z = 0."""
     laid = solution.pattern
     assert laid is not None
-    z = solution.map.deck.apply(laid.uv[laid.faces.values], laid.sheet)
+    z = laid.corners
     points = np.stack([z.real, z.imag, np.zeros(len(z))], axis=1).tolist()
     ends = laid.faces.offsets.tolist()
     return [_closed(points[a:b]) for a, b in pairwise(ends)]

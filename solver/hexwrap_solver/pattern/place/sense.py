@@ -16,6 +16,8 @@ RATIOS = (10.0, 100.0, 1000.0, 12.0, 25.4, 39.37, 304.8)
 USUAL = 1 / 50
 #: The map shrinks a pinch by more than this, relative to the typical place.
 PINCHED = 8.0
+#: Larger ratios are not told.
+MANY = 1_000_000
 
 
 def check_edge(cmap: ConformalMap, settings: PatternSettings) -> None:
@@ -36,20 +38,21 @@ def too_many(cmap: ConformalMap, settings: PatternSettings, cells: float) -> Pat
     if edge is not None and edge * _nearest(cmap, edge) != edge:
         return PatternError(
             f"The model is {model(cmap)}, so that about {cells:,.0f} cells with edges of "
-            f"{edge:g}{unit(cmap)} would be needed, over the limit of {limit:,}: did you mean {_meant(cmap, edge):g}?",
+            f"{edge:g}{unit(cmap)} would be needed, over the limit of {limit:,}: did you mean "
+            f"{_meant(cmap, edge):g}?",
             data=data,
             field=("pattern", "edge_length"),
         )
     narrow = int(np.argmax(cmap.log_scale))
     shrunk = float(np.exp(cmap.log_scale[narrow] - np.median(cmap.log_scale)))
     if shrunk > PINCHED:
-        place = ", ".join(f"{x:.4g}" for x in cmap.surface.vertices[narrow])
+        place = ", ".join(f"{x:.4g}" for x in _rounded(cmap, narrow))
         vertex = int(cmap.surface.input_vertex[narrow])
+        times = f"{shrunk:,.0f} times" if shrunk < MANY else f"more than {MANY:,} times"
         return PatternError(
-            f"The surface is pinched at ({place}): a map without distortion of angles makes cells there "
-            f"{shrunk:,.0f} times smaller than at a typical place, so that about {cells:,.0f} would be "
-            f"needed, over the limit of {limit:,}. Widen the surface there, or split it there and panelize "
-            "both parts.",
+            f"The surface is pinched at ({place}): a map that keeps angles makes cells there {times} smaller "
+            f"than at a typical place, so that about {cells:,.0f} would be needed, over the limit of "
+            f"{limit:,}. Widen the surface there, or split it there and panelize both parts.",
             vertices=[vertex] if vertex >= 0 else [],
             data=data,
         )
@@ -58,6 +61,13 @@ def too_many(cmap: ConformalMap, settings: PatternSettings, cells: float) -> Pat
         "length or fewer cells around.",
         data=data,
     )
+
+
+def _rounded(cmap: ConformalMap, vertex: int) -> list[float]:
+    """Where a vertex is, without digits that do not matter."""
+    grain = 1e-6 * _diagonal(cmap)
+    place: list[float] = (np.round(cmap.surface.vertices[vertex] / grain) * grain + 0.0).tolist()
+    return place
 
 
 def unit(cmap: ConformalMap) -> str:
