@@ -214,8 +214,8 @@ def _nearest(surface: Surface, points: Floats, entries: Ints, field: list[Field]
         entry = entries[far[0]]
         place, foot = (", ".join(f"{x:.6g}" for x in p) for p in (points[entry], at[nearest[far[0]]]))
         raise BoundaryError(
-            f"The point ({place}) is {distance[far[0]]:.4g} away from the boundary, whose nearest vertex stands "
-            f"at ({foot}): angles are for points on the boundary.",
+            f"The point ({place}) is {distance[far[0]]:.4g} away from the boundary, whose nearest vertex "
+            f"stands at ({foot}): angles are for points on the boundary.",
             field=(*field[entry], "point"),
         )
     return np.asarray(boundary[nearest])
