@@ -1,4 +1,4 @@
-"""Every answer that is no success is a problem (RFC 9457).
+"""Every refusal is a problem document (RFC 9457).
 
 HexwrapError            (hexwrap_solver.errors) refused by the solver: 422
 ├── FormError           the body does not have the form it should: 400, 413 or 422

@@ -54,7 +54,7 @@ async def plain_body(body: Body, max_mib: float) -> bytes:
             415,
             "content-encoding",
             "This encoding is not read",
-            f"Content-Encoding '{body.encoding[:40]}' is not read here; send the body plain or as gzip.",
+            f"Content-Encoding '{body.encoding[:40]}' is not supported; send the body plain or as gzip.",
             {"Accept-Encoding": "gzip"},
         )
     return await asyncio.to_thread(_unpacked, body.data, int(max_mib * MIB), max_mib)
@@ -65,7 +65,7 @@ def _encoding(request: Request) -> str:
 
 
 async def _streamed(request: Request, max_mib: float, hashes: list[Any]) -> bytes:
-    """hashes: told of every piece; pieces are small, so that the event loop gets its turn."""
+    """hashes: updated with every piece; pieces are small, so that the event loop gets its turn."""
     limit = int(max_mib * MIB)
     declared = request.headers.get("content-length", "0")
     if declared.isdecimal() and int(declared) > limit:
@@ -138,6 +138,6 @@ def _too_large(max_mib: float) -> HttpError:
 
 
 def _not_gzip(
-    detail: str = "Content-Encoding says gzip, but the body is broken or cut short.",
+    detail: str = "Content-Encoding says gzip, but the body is damaged or truncated.",
 ) -> HttpError:
     return HttpError(400, "not-gzip", "The body is not gzip", detail)

@@ -28,8 +28,8 @@ from hexwrap_server.jobs.store import Job
 from hexwrap_server.problems import HttpError, dumped, not_found
 from hexwrap_server.settings import MIB
 
-#: Bodies of up to so many bytes and quotation marks are read in a thread, others in a process: reading holds
-#: the interpreter, and a name that is out of place takes as long as many numbers.
+#: Bodies of up to this many bytes and quotation marks are read in a thread, others in a process: reading
+#: holds the interpreter, and a name that is out of place takes as long as many numbers.
 SMALL_BODY, FEW_QUOTES = 4_000_000, 50_000
 #: Longest time that ``?wait=`` holds an answer.
 MAX_WAIT = 60.0
@@ -212,7 +212,7 @@ async def get_file(
 ) -> Response:
     """The finished work as a file."""
     if name not in FILES:
-        raise not_found("file", f"There is no file '{name[:64]}'; there are {', '.join(FILES)}.")
+        raise not_found("file", f"Unknown file '{name[:64]}'; choose one of {', '.join(FILES)}.")
     service = service_of(request)
     size = None if sheet is None else _sheet(sheet)
     job = service.manager.get(id)

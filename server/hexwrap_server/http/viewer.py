@@ -65,7 +65,7 @@ async def sample(request: Request, name: str) -> Response:
     """A bundled surface as a complete request body."""
     if name not in samples.names():
         raise not_found(
-            "sample", f"There is no sample '{name[:64]}'; there are {', '.join(samples.names())}."
+            "sample", f"Unknown sample '{name[:64]}'; choose one of {', '.join(samples.names())}."
         )
     return await packed_response(request, orjson.dumps(samples.load(name)))
 

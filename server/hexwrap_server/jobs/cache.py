@@ -121,7 +121,7 @@ class CachingRunner:
     """A StageRunner that looks every stage up first.
 
     timings: seconds per stage, hits included. found: per stage ``memory``, ``disk`` or ``computed``.
-    made: told of each stage that is done, and of what it made.
+    made: called with each stage that is done, and its result.
     """
 
     def __init__(

@@ -11,7 +11,7 @@ from hexwrap_solver import domain
 
 
 def lift(report: Report, path: str, text: bytes, most: int) -> bytes:
-    """JSON answer of the lift route. path: of the solution; text: the body, at most so many points.
+    """JSON answer of the lift route. path: of the solution; text: the body, of at most this many points.
 
     Raises FormError, GoneError.
     """

@@ -155,7 +155,7 @@ class WorkerProcess:
             watch.join()
 
     def stop(self) -> None:
-        """Kill the worker, whatever it does. Safe from any thread."""
+        """Kill the worker at once. Safe from any thread."""
         self._stopped = True
         process = self._process
         if process is not None:
@@ -269,7 +269,7 @@ def _listen(inlet: IO[bytes], calls: queue.SimpleQueue[Call]) -> None:
         while (call := read_frame(inlet)) is not None:
             calls.put((call[0], call[1]))
     except Exception:  # such as MemoryError: nothing that comes later can be understood
-        log.exception("what the server says cannot be read")
+        log.exception("cannot decode a message from the server")
     finally:
         os._exit(0)
 
