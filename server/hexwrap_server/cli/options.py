@@ -7,9 +7,9 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from hexwrap_server.errors import FormError
 from hexwrap_server.input.faults import Path, pointer
 from hexwrap_server.input.form import Body, Leaf, is_nullable, leaves
-from hexwrap_server.problems import FormError
 
 #: Flags that are neither the setting's name nor, for the first setting of a section, the section's.
 FLAGS: dict[Path, str] = {

@@ -92,6 +92,7 @@ _QUALITY = _all(
 )
 #: The parts that ``?include=`` picks, by default all.
 RESULT = record(
+    unit=nullable({"enum": ["m", "cm", "mm", "ft", "in"]}),
     mesh=_MESH,
     map=_MAP,
     pattern=nullable(_PATTERN),
