@@ -105,4 +105,5 @@ def _panels(pattern: Pattern, edge: float, sizes: int) -> Panels:
     return Panels(
         "split", Ragged.from_table(polygons), np.arange(n), size, lengths[size], np.full(n, 0.95 * edge),
         centre, normal, np.ones(n, dtype=bool), lengths, np.bincount(size, minlength=sizes),
+        np.full(sizes, 6),
     )  # fmt: skip

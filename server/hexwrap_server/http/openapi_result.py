@@ -66,7 +66,13 @@ _PANELS = _all(
     normal=listed(POINT),
     whole=listed(_TRUTH),
 )
-_SIZE = _all(size=_INDEX, edge_length=NUMBER, count=_COUNT, color=_TEXT | {"pattern": "^#[0-9a-fA-F]{6}$"})
+_SIZE = _all(
+    size=_INDEX,
+    edge_length=NUMBER,
+    count=_COUNT,
+    sides=_COUNT,
+    color=_TEXT | {"pattern": "^#[0-9a-fA-F]{6}$"},
+)
 _QUALITY = _all(
     scale_ratio=NUMBER,
     quasi_conformal=_all(mean=NUMBER, max=NUMBER),
@@ -84,8 +90,9 @@ _QUALITY = _all(
     distinct_panels=_COUNT,
     notes=listed(_TEXT),
 )
-#: Whatever ``?include=`` picks of it, and without that all of it.
+#: The parts that ``?include=`` picks, by default all.
 RESULT = record(
+    unit=nullable({"enum": ["m", "cm", "mm", "ft", "in"]}),
     mesh=_MESH,
     map=_MAP,
     pattern=nullable(_PATTERN),

@@ -8,7 +8,7 @@ from xml.sax.saxutils import escape
 
 import numpy as np
 
-from hexwrap_server.output.colours import size_colours
+from hexwrap_server.output.colours import class_colours
 from hexwrap_server.output.layers import size_name
 from hexwrap_server.output.meta import Meta
 from hexwrap_server.output.text import angle, length, one_line
@@ -144,7 +144,7 @@ def _cells(solution: Solution, pattern: Pattern, rows: Ragged) -> list[str]:
     colours: list[str] = []
     if solution.panels is not None:
         size[solution.panels.face] = solution.panels.size
-        colours = size_colours(len(solution.panels.class_length))
+        colours = class_colours(solution.panels)
     outlines = _outlines(rows)
     members: dict[int, list[str]] = {}
     for outline, group in zip(outlines, size.tolist(), strict=True):

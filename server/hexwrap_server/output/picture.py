@@ -19,7 +19,7 @@ SINK = 0.2
 def panels_png(solution: Solution, meta: Meta) -> bytes:
     """A picture of 1600 pixels in height on white."""
     _, panels = panels_of(solution, "panels.png")
-    return compose(render(panels_scene(solution)), panels, meta)
+    return compose(render(panels_scene(solution)), panels, meta, solution.map.surface.unit)
 
 
 def panels_scene(solution: Solution) -> Scene:
@@ -33,7 +33,7 @@ def panels_scene(solution: Solution) -> Scene:
     faces = surface.faces if panels.mode == "split" else surface.faces[:0]
     return Scene(
         Polygons.of(outline),
-        colours.panel_colours(panels.size, len(panels.class_length)),
+        colours.panel_colours(panels.size, colours.class_colours(panels)),
         Polygons.of(Ragged.from_table(sunk[faces])),
         viewpoint(solution.map),
     )

@@ -22,6 +22,8 @@ from hexwrap_solver.conformal.types import (
 from hexwrap_solver.errors import BoundaryError, GaussBonnetError, SingularitiesError
 from hexwrap_solver.surface.types import Surface
 
+#: A point belongs to the boundary up to this part of its size away, or up to its longest edge.
+FAR = 0.02
 #: Equation (1) may miss by this much in total, radians: angles are often typed with four digits.
 GAUSS_BONNET_TOLERANCE = 1e-3
 
@@ -50,22 +52,33 @@ def boundary_angles(
     any loop is isometric, its angles make up for the rest.
     Raises BoundaryError (vertices or angles that cannot be used), GaussBonnetError (the sums fail).
     """
+    listed, target, given, asked = _asked(surface, condition)
+    if any(angles is None for angles in asked):
+        return asked
+    sums = [float((np.pi - target[loop]).sum()) for loop in surface.loops]
+    total = gauss_bonnet(surface) - (0.0 if cones is None else float(cones.curvature.sum()))
+    if abs(sum(sums) - total) > GAUSS_BONNET_TOLERANCE:
+        raise _gauss_bonnet_error(surface, listed, sums, total, cones, condition)
+    return _close(surface, target, given, sums, total, QUANTA.get(condition.quantum))
+
+
+def asked_angles(surface: Surface, condition: BoundaryCondition) -> tuple[Floats | None, ...]:
+    """The same whether they add up or not: singularities may make up for it. Raises BoundaryError."""
+    return _asked(surface, condition)[-1]
+
+
+def _asked(
+    surface: Surface, condition: BoundaryCondition
+) -> tuple[_Listed, Floats, Bools, tuple[Floats | None, ...]]:
+    """The list; (n,) target angles and where they are listed; and per loop its angles, None if isometric."""
     listed = _listed(surface, condition)
     target = np.full(len(surface.vertices), np.pi)
     target[listed.vertex] = listed.angle
     given = np.zeros(len(surface.vertices), dtype=bool)
     given[listed.vertex] = True
     modes = _modes(surface, condition, given)
-    sums = [float((np.pi - target[loop]).sum()) for loop in surface.loops]
-    if "isometric" in modes:
-        return tuple(
-            None if mode == "isometric" else target[loop]
-            for mode, loop in zip(modes, surface.loops, strict=True)
-        )
-    total = gauss_bonnet(surface) - (0.0 if cones is None else float(cones.curvature.sum()))
-    if abs(sum(sums) - total) > GAUSS_BONNET_TOLERANCE:
-        raise _gauss_bonnet_error(surface, listed, sums, total, cones, condition)
-    return _close(surface, target, given, sums, total, QUANTA.get(condition.quantum))
+    pairs = zip(modes, surface.loops, strict=True)
+    return listed, target, given, tuple(None if mode == "isometric" else target[loop] for mode, loop in pairs)
 
 
 def _listed(surface: Surface, condition: BoundaryCondition) -> _Listed:
@@ -192,7 +205,20 @@ def _nearest(surface: Surface, points: Floats, entries: Ints, field: list[Field]
             field=(*field[bad[0]], "point"),
         )
     boundary = np.concatenate(surface.loops)
-    return np.asarray(boundary[cKDTree(surface.vertices[boundary]).query(points[entries])[1]])
+    at = surface.vertices[boundary]
+    distance, nearest = (np.asarray(x) for x in cKDTree(at).query(points[entries]))
+    steps = [np.linalg.norm(np.diff(surface.vertices[loop], axis=0), axis=1).max() for loop in surface.loops]
+    allowed = max(*steps, FAR * float(np.linalg.norm(np.ptp(at, axis=0))))
+    far = np.flatnonzero(distance > allowed)
+    if len(far):
+        entry = entries[far[0]]
+        place, foot = (", ".join(f"{x:.6g}" for x in p) for p in (points[entry], at[nearest[far[0]]]))
+        raise BoundaryError(
+            f"The point ({place}) is {distance[far[0]]:.4g} away from the boundary, whose nearest vertex "
+            f"stands at ({foot}): angles are for points on the boundary.",
+            field=(*field[entry], "point"),
+        )
+    return np.asarray(boundary[nearest])
 
 
 def _check_distinct(surface: Surface, placed: Ints, field: list[Field]) -> None:
