@@ -7,6 +7,7 @@ from collections import OrderedDict
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from hexwrap_server import logs
 from hexwrap_server.input.json_text import loads
@@ -127,15 +128,10 @@ def checked(report: Report, sent: SentSurface, caching: CacheSettings) -> Intake
 
 
 def write_file(
-    report: Report,
-    path: str,
-    name: str,
-    title: str,
-    timings: dict[str, float],
-    sheet: tuple[float, float] | None,
+    report: Report, path: str, name: str, title: str, timings: dict[str, float], options: dict[str, Any]
 ) -> bytes:
-    """The finished work as a file. Raises HexwrapError where it cannot be made."""
-    return WRITERS[name](solution_at(path), Meta(name=title or "hexwrap", timings=timings, sheet=sheet))
+    """The finished work as a file. options: further fields of ``Meta``. Raises HexwrapError."""
+    return WRITERS[name](solution_at(path), Meta(title or "hexwrap", timings, **options))
 
 
 @cache

@@ -14,7 +14,7 @@ from hexwrap_solver.pipeline import Solution
 def domain_dxf(solution: Solution, meta: Meta) -> bytes:
     """Boundary loops, the cut, corners (points) and the pattern's cells, each on a layer of its own."""
     cmap, pattern = solution.map, solution.pattern
-    document = grey_drawing(meta.name, "loop-0", "loop-1", "cut", "corners", "pattern")
+    document = grey_drawing(meta, "loop-0", "loop-1", "cut", "corners", "pattern")
     space = document.modelspace()
     unrolled = Unrolled.of(cmap)
     for layer, sides in (*zip(("loop-0", "loop-1"), unrolled.loops, strict=True), ("cut", unrolled.cut)):

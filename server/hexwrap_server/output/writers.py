@@ -6,10 +6,13 @@ from collections.abc import Callable
 
 from hexwrap_server.input.requests import Wanted
 from hexwrap_server.output.arrays_npz import result_npz
+from hexwrap_server.output.cutting import cutting_list
 from hexwrap_server.output.domain_dxf import domain_dxf
 from hexwrap_server.output.domain_svg import domain_svg
 from hexwrap_server.output.dxf import panels_dxf
 from hexwrap_server.output.flat import flat_dxf
+from hexwrap_server.output.glb import panels_glb
+from hexwrap_server.output.ifc import panels_ifc
 from hexwrap_server.output.meta import Meta, NotMadeError, SheetError, check_stages
 from hexwrap_server.output.obj import panels_obj
 from hexwrap_server.output.picture import panels_png
@@ -24,6 +27,9 @@ WRITERS: dict[str, Callable[[Solution, Meta], bytes]] = {
     "panels.3dm": panels_3dm,
     "panels.dxf": panels_dxf,
     "panels.csv": panels_csv,
+    "panels.ifc": panels_ifc,
+    "panels.glb": panels_glb,
+    "cutting-list.csv": cutting_list,
     "flat.dxf": flat_dxf,
     "domain.svg": domain_svg,
     "domain.dxf": domain_dxf,
