@@ -142,7 +142,7 @@ def make_parser() -> argparse.ArgumentParser:
 
 
 def _kinds() -> list[str]:
-    return [*ENDINGS, "flat.dxf", "domain.dxf"]
+    return [*ENDINGS, "flat.dxf", "domain.dxf", "cutting-list.csv"]
 
 
 def _serve(asked: argparse.Namespace) -> int:
