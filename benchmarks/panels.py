@@ -49,9 +49,9 @@ def main() -> None:
     parser.add_argument("--panels", type=int, nargs="+", default=[1000, 10_000, 100_000])
     parser.add_argument("--target", default="inscribed", choices=["shortest", "inscribed", "best", "mean"])
     asked = parser.parse_args()
-    surface = parse_request(samples.load("tower"), 10**7, 10**6).surface
-    assert isinstance(surface, SentSurface)
-    cmap = conformal_map(take_in(surface), BoundaryCondition())
+    request = parse_request(samples.load("tower"), 10**7, 10**6)
+    assert isinstance(request.surface, SentSurface)
+    cmap = conformal_map(take_in(request.surface, request.wanted.surface), BoundaryCondition())
     first = lay_pattern(cmap, PatternSettings(around=24))
     print(f"{len(cmap.surface.vertices)} vertices; processor seconds")
     heads = ("fit", "11 sizes", "12 sizes", "measure", "total", "support")

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from hexwrap_solver.arrays import Complexes, Floats, Ints
-from hexwrap_solver.conformal.types import ConformalMap, Deck
+from hexwrap_solver.conformal.types import ConformalMap, Deck, Unrolled
 from hexwrap_solver.domain import flatten, lift
 from hexwrap_solver.pattern import lay_pattern
 from hexwrap_solver.pattern.types import PatternSettings
@@ -32,7 +32,12 @@ def catenoid(around: int, along: int) -> ConformalMap:
     surface = Surface(points, faces, loops, ids, ids, points / np.linalg.norm(points, axis=1, keepdims=True))
     straight = np.full(around, np.pi)
     return ConformalMap(
-        surface, -np.log(r), uv, sheet, Deck(0.0, 2 * np.pi + 0j), (straight, straight), 2 * np.pi, 0, 0.0
+        surface,
+        -np.log(r),
+        Unrolled(uv, sheet, Deck(0.0, 2 * np.pi + 0j), 2 * np.pi),
+        (straight, straight),
+        0,
+        0.0,
     )
 
 

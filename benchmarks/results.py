@@ -75,14 +75,13 @@ def rows() -> Iterator[str]:
     for name in SAMPLES:
         wanted = parse_request(samples.load(name), 10**7, 10**6)
         assert isinstance(wanted.surface, SentSurface)
-        surface = take_in(wanted.surface)
-        own = wanted.wanted.boundary
-        quantum = np.pi / 3
+        surface = take_in(wanted.surface, wanted.wanted.surface)
+        own = wanted.wanted.boundary.adapted("hex")
         conditions = {
             own.mode: own,
             "straight": BoundaryCondition("straight"),
-            "isometric": BoundaryCondition("isometric", quantum=quantum),
-            "isometric, optimal": BoundaryCondition("isometric", quantum=quantum, spread="optimal"),
+            "isometric": BoundaryCondition("isometric", quantum="hex"),
+            "isometric, optimal": BoundaryCondition("isometric", quantum="hex", spread="optimal"),
         }
         pattern = wanted.wanted.pattern or PatternSettings()
         for label, condition in conditions.items():

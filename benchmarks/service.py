@@ -103,7 +103,7 @@ def alone(body: bytes) -> float:
     request = parse_request(orjson.loads(body), 10**7, 10**6)
     wanted = request.wanted
     start = time.perf_counter()
-    pipeline.solve(lambda: take_in(request.surface), wanted.boundary, wanted.pattern, wanted.panels)  # type: ignore[arg-type]
+    pipeline.solve(lambda: take_in(request.surface, wanted.surface), wanted)  # type: ignore[arg-type]
     return time.perf_counter() - start
 
 

@@ -26,8 +26,6 @@ import psutil
 from hexwrap_server.output.writers import WRITERS, Meta, write
 from hexwrap_solver import pipeline
 from hexwrap_solver.arrays import Progress, Ragged, no_progress
-from hexwrap_solver.conformal.types import BoundaryCondition
-from hexwrap_solver.panels.types import PanelSettings
 from hexwrap_solver.pattern.types import PatternSettings
 from hexwrap_solver.surface import SentMesh, surface_from_mesh
 
@@ -71,7 +69,7 @@ def measure(n: int, files: bool) -> None:
     settings = PatternSettings(around=max(12, round(np.sqrt(n) / 2)))
     for _ in range(RUNS):
         solution = pipeline.solve(
-            lambda: surface_from_mesh(sent), BoundaryCondition(), settings, PanelSettings(), meter
+            lambda: surface_from_mesh(sent), pipeline.SolveSettings(pattern=settings), meter
         )
     stages = sum(meter.seconds.values())
     if files:

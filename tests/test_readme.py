@@ -11,7 +11,7 @@ import pytest
 
 from hexwrap_server import samples
 from hexwrap_server.cli.main import make_parser
-from hexwrap_server.cli.options import readme_rows
+from hexwrap_server.cli.options import table
 from hexwrap_server.input.schemas import parse_request
 from hexwrap_server.jobs.work import run_stages
 from hexwrap_server.output.writers import WRITERS
@@ -30,7 +30,7 @@ def test_the_test_command_is_the_one_that_ci_runs() -> None:
 
 
 def test_every_option_is_in_the_table() -> None:
-    assert readme_rows() in README
+    assert table() in README
 
 
 def test_every_file_and_sample_is_named() -> None:

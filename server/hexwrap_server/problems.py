@@ -11,19 +11,76 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any, ClassVar
+from typing import Any, ClassVar, get_type_hints
 
 import orjson
 
-from hexwrap_solver.errors import HexwrapError
+from hexwrap_solver.errors import (
+    BoundaryError,
+    GaussBonnetError,
+    HexwrapError,
+    NotAdaptedError,
+    PanelsError,
+    PatternError,
+    SingularitiesError,
+    SurfaceError,
+)
+from hexwrap_solver.surface.errors import (
+    DegeneratePolygonError,
+    FlatSurfaceError,
+    IndexRangeError,
+    NonFiniteError,
+    NotClosedError,
+    NurbsDataError,
+    PoleError,
+    PolygonSizeError,
+    TooFineError,
+)
+from hexwrap_solver.surface.types import MeshSettings, NurbsSurface, SentMesh, SurfaceSettings
 
 MEDIA_TYPE = "application/problem+json"
 #: Statuses of the errors that are not 422.
 STATUS = {"not-json": 400, "gone": 410, "worker-died": 503, "storage": 503, "cluster": 503, "internal": 500}
 #: A pointer into the arrays of a sent mesh.
 _ELEMENT = re.compile(r"(?:/surface)?/(vertices|faces)/(\d+)")
+#: Where a request says what an error of the solver is about.
+PLACES: dict[type[HexwrapError], str] = {
+    SurfaceError: "/surface",
+    NonFiniteError: "/surface/vertices",
+    FlatSurfaceError: "/surface/vertices",
+    IndexRangeError: "/surface/faces",
+    PolygonSizeError: "/surface/faces",
+    DegeneratePolygonError: "/surface/faces",
+    NurbsDataError: "/surface/nurbs",
+    NotClosedError: "/surface/nurbs/closed",
+    PoleError: "/surface/nurbs/control_points",
+    TooFineError: "/surface/mesh",
+    GaussBonnetError: "/boundary",
+    BoundaryError: "/boundary",
+    NotAdaptedError: "/boundary",
+    SingularitiesError: "/boundary",
+    PatternError: "/pattern",
+    PanelsError: "/panels",
+}
+#: Whose fields an error about the surface may name.
+_SURFACE: dict[type, str] = {
+    SentMesh: "/surface",
+    SurfaceSettings: "/surface",
+    NurbsSurface: "/surface/nurbs",
+    MeshSettings: "/surface/mesh",
+}
 #: More faults than these are not listed, the first ones tell enough.
 MOST_LISTED = 100
+
+
+def place_of(error: HexwrapError) -> str | None:
+    """JSON pointer to what an error of the solver is about, None where no one place is at fault."""
+    section = next((PLACES[kind] for kind in type(error).__mro__ if kind in PLACES), None)
+    if not error.field or section is None:
+        return section
+    if isinstance(error, SurfaceError):
+        section = next(place for kind, place in _SURFACE.items() if error.field[0] in get_type_hints(kind))
+    return "".join((section, *(f"/{step}" for step in error.field)))
 
 
 class FormError(HexwrapError):
@@ -83,8 +140,9 @@ def problem(error: HexwrapError) -> dict[str, Any]:
         return _document(error.own_slug, error.own_title, error.status, error.detail, error.errors)
     faults = error.faults if isinstance(error, FormError) else []
     errors = [{"pointer": pointer, "detail": detail} for pointer, detail in faults]
-    if not errors and error.field is not None:
-        errors = [{"pointer": "".join(f"/{step}" for step in error.field), "detail": error.detail}]
+    place = vars(error).get("place", place_of(error))
+    if not errors and place is not None:
+        errors = [{"pointer": place, "detail": error.detail}]
     data: dict[str, Any] = dict(error.data)
     for name in ("vertices", "faces", "edges"):
         if getattr(error, name):
@@ -101,8 +159,9 @@ def body_is_the_surface(is_file: bool = False) -> Iterator[None]:
     try:
         yield
     except HexwrapError as error:
-        if error.field is not None and error.field[:1] == ("surface",):
-            error.field = () if is_file else error.field[1:]
+        place = place_of(error)
+        if place is not None and place.startswith("/surface"):
+            vars(error)["place"] = "" if is_file else place.removeprefix("/surface")
         raise
 
 

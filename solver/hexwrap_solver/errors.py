@@ -4,8 +4,10 @@
     ├── SurfaceError            the surface is not one that can be mapped
     │   (its children, one per way to fail, stand in ``surface/errors.py``)
     ├── RequestError            the surface is fine, what is asked of it is not
+    │   ├── SettingError        settings that contradict each other
     │   ├── GaussBonnetError    boundary angles that no surface can have, equation (1)
     │   ├── BoundaryError       a boundary vertex or angle that cannot be used
+    │   ├── SingularitiesError   singularities that are missing, or that no such surface can have
     │   ├── NotAdaptedError     cone angle no multiple of the pattern's quantum, definition 2
     │   ├── PatternError        no pattern of that size, kind or place fits
     │   └── PanelsError         no panels under those conditions
@@ -25,14 +27,13 @@ class HexwrapError(Exception):
     """A refusal that a person can act on.
 
     detail: one sentence. vertices, faces: indices into the sent mesh; edges: pairs of sent vertices.
-    field: path of the request's field at fault, such as ``("boundary", "angles", 2, "angle")``; None: no
-    single one is.
+    field: which field is at fault, in the settings or data that the class of the error is about, such as
+    ``("angles", 2, "angle")`` of a boundary condition; empty: all of them.
     data: further figures for a client, JSON-like.
     """
 
     slug: ClassVar[str] = "error"
     title: ClassVar[str] = "The request cannot be carried out"
-    default_field: ClassVar[tuple[str | int, ...] | None] = None
 
     def __init__(
         self,
@@ -41,7 +42,7 @@ class HexwrapError(Exception):
         vertices: Iterable[int] = (),
         faces: Iterable[int] = (),
         edges: Iterable[Sequence[int]] = (),
-        field: tuple[str | int, ...] | None = None,
+        field: tuple[str | int, ...] = (),
         data: dict[str, object] | None = None,
     ) -> None:
         super().__init__(detail)
@@ -49,7 +50,7 @@ class HexwrapError(Exception):
         self.vertices = [int(v) for v in vertices]
         self.faces = [int(f) for f in faces]
         self.edges = [[int(a), int(b)] for a, b in edges]
-        self.field = self.default_field if field is None else field
+        self.field = field
         self.data = data or {}
 
     def __reduce__(self) -> tuple[object, ...]:  # the default loses keyword arguments between processes
@@ -65,7 +66,6 @@ def _rebuild(kind: type[HexwrapError], detail: str, state: dict[str, object]) ->
 class SurfaceError(HexwrapError):
     slug = "surface"
     title = "The surface cannot be used"
-    default_field: ClassVar[tuple[str | int, ...] | None] = ("surface",)
 
 
 class RequestError(HexwrapError):
@@ -73,34 +73,39 @@ class RequestError(HexwrapError):
     title = "The request cannot be met on this surface"
 
 
+class SettingError(RequestError, ValueError):
+    slug = "setting"
+    title = "Two settings contradict each other"
+
+
 class GaussBonnetError(RequestError):
     slug = "gauss-bonnet"
     title = "The boundary angles do not add up"
-    default_field = ("boundary", "angles")
 
 
 class BoundaryError(RequestError):
     slug = "boundary"
     title = "A boundary condition cannot be used"
-    default_field = ("boundary",)
+
+
+class SingularitiesError(RequestError):
+    slug = "singularities"
+    title = "The singularities do not suit the surface"
 
 
 class NotAdaptedError(RequestError):
     slug = "not-adapted"
     title = "The cone angle does not fit the pattern"
-    default_field = ("boundary",)
 
 
 class PatternError(RequestError):
     slug = "pattern"
     title = "The pattern does not fit"
-    default_field = ("pattern",)
 
 
 class PanelsError(RequestError):
     slug = "panels"
     title = "The panels cannot be made"
-    default_field = ("panels",)
 
 
 class ConvergenceError(HexwrapError):

@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, Protocol, TypeVar
+from typing import Annotated, Any, Protocol, TypeVar
 
 from hexwrap_solver.arrays import Progress, no_progress
 from hexwrap_solver.conformal import conformal_map
@@ -17,9 +17,10 @@ from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap
 from hexwrap_solver.panels import fit_panels, make_components, measure, quantize, support
 from hexwrap_solver.panels.fit import FitKey
 from hexwrap_solver.panels.quantize import SizeKey
-from hexwrap_solver.panels.types import Components, Panels, PanelSettings, Quality, Support
+from hexwrap_solver.panels.types import Components, ComponentSettings, Panels, PanelSettings, Quality, Support
 from hexwrap_solver.pattern import lay_pattern
 from hexwrap_solver.pattern.types import Pattern, PatternSettings
+from hexwrap_solver.setting import Setting
 from hexwrap_solver.surface.types import Surface
 from hexwrap_solver.threads import one_blas_thread
 
@@ -58,51 +59,61 @@ class Solution:
     support: Support | None = None
 
 
+@dataclass(frozen=True)
+class SolveSettings:
+    """All that is asked for besides the surface; None stops before that stage."""
+
+    boundary: Annotated[BoundaryCondition, Setting("what happens at the boundary")] = field(
+        default_factory=BoundaryCondition
+    )
+    pattern: Annotated[PatternSettings | None, Setting("the cells; null stops after the map")] = field(
+        default_factory=PatternSettings
+    )
+    panels: Annotated[PanelSettings | None, Setting("the panels; null stops after the pattern")] = field(
+        default_factory=PanelSettings
+    )
+    support: Annotated[
+        bool, Setting("add the torsion-free support structure, with beams where components have a depth")
+    ] = False
+
+
 def solve(
     take_in: Callable[[], Surface],
-    boundary: BoundaryCondition,
-    pattern: PatternSettings | None,
-    panels: PanelSettings | None,
+    settings: SolveSettings,
     run: StageRunner | None = None,
     *,
     source: Any = None,
-    with_support: bool = False,
 ) -> Solution:
     """Surface → conformal map → pattern → panels → quality, and components and support where asked for.
 
     take_in: makes the annulus from whatever was sent (``surface_from_mesh`` or ``surface_from_nurbs``).
-    source: what the surface depends on, for runners that remember. with_support: also without components,
-    then as axes and beams without depth. Raises HexwrapError.
+    source: what the surface depends on, for runners that remember. Raises HexwrapError.
     """
     with one_blas_thread():
-        return _solve(take_in, boundary, pattern, panels, run or PlainRunner(), source, with_support)
+        return _solve(take_in, settings, run or PlainRunner(), source)
 
 
 def _solve(
-    take_in: Callable[[], Surface],
-    boundary: BoundaryCondition,
-    pattern: PatternSettings | None,
-    panels: PanelSettings | None,
-    run: StageRunner,
-    source: Any,
-    with_support: bool,
+    take_in: Callable[[], Surface], settings: SolveSettings, run: StageRunner, source: Any
 ) -> Solution:
+    pattern, panels = settings.pattern, settings.panels
+    boundary = settings.boundary.adapted(pattern.kind if pattern else None)
     surface = run("surface", source, lambda progress: take_in())
     cmap = run("map", boundary, lambda progress: conformal_map(surface, boundary, progress))
     if pattern is None:
         return Solution(cmap, run("quality", None, lambda progress: measure(cmap, None, None)))
     laid = run("pattern", pattern, lambda progress: lay_pattern(cmap, pattern, progress))
-    made = None
+    made, wanted = None, None
     if panels is not None:
         # Two stages, so that a change of the size classes alone reuses the poses and limits.
         fitted = run("fit", FitKey.of(panels), lambda progress: fit_panels(cmap, laid, panels, progress))
         made = run("panels", SizeKey.of(panels), lambda progress: quantize(fitted, panels))
+        wanted = panels.components or (ComponentSettings() if settings.support else None)
     quality = run("quality", None, lambda progress: measure(cmap, laid, made, progress))
     parts, frame = None, None
-    wanted = panels.components if panels is not None else None
     if made is not None and wanted is not None:
         parts = run("components", wanted, lambda progress: make_components(made, wanted))
-    if with_support or wanted is not None:
+    if settings.support or wanted is not None:
         depth = wanted.depth if wanted is not None else 0.0
         frame = run("support", depth, lambda progress: support(laid, depth, progress))
     return Solution(cmap, quality, laid, made, parts, frame)

@@ -50,6 +50,12 @@ def value(name: str, tree: Tree) -> dict[str, Any]:
     return {"ParamName": name, "InnerTree": tree}
 
 
+LINE = rhino3dm.LineCurve(rhino3dm.Point3d(0, 0, 0), rhino3dm.Point3d(1, 0, 0))
+DOT = rhino3dm.TextDot("a", rhino3dm.Point3d(0, 0, 0))
+#: An item that is null in Grasshopper.
+NULL = {"type": "System.String", "data": "null"}
+
+
 def solve(client: httpx.Client, pointer: str, *values: dict[str, Any]) -> httpx.Response:
     return client.post("/solve", json={"pointer": pointer, "values": list(values)})
 
@@ -185,6 +191,17 @@ def test_drawings_are_lifted(client: Live) -> None:
         (PANELS, [{"InnerTree": {}}], "ParamName"),
         (PANELS, [value("Mesh", {"{0}": "x"})], "list"),  # type: ignore[dict-item]
         (LIFT, [value("Job", {"{0}": [item("unheard", "String")]})], "Curves is empty"),
+        (PANELS, [value("Mesh", {"{0}": [geometry(LINE, "LineCurve")]})], "a LineCurve came, but a mesh or"),
+        (PANELS, [value("Mesh", {"{0}": [geometry(DOT, "TextDot")]})], "a TextDot came, but a mesh or"),
+        (
+            LIFT,
+            [
+                value("Job", {"{0}": [item("unheard", "String")]}),
+                value("Curves", {"{0}": [geometry(tube(), "Mesh")]}),
+            ],
+            "a Mesh came, but a curve",
+        ),
+        (PANELS, [value("Mesh", {"{0}": [NULL]})], "Mesh is empty"),
     ],
 )
 def test_wrong_calls_are_refused(client: Live, pointer: str, values: list[dict[str, Any]], word: str) -> None:
@@ -218,3 +235,9 @@ def test_inputs_that_were_left_out_have_their_defaults() -> None:
     assert branch == [0]
     with pytest.raises(HopsError, match="list of parameters"):
         read_inputs(COMPONENTS[PANELS].inputs, "values")
+
+
+@pytest.mark.parametrize("null", [NULL, None, {"type": "System.String", "data": None}])
+def test_nulls_have_their_defaults(null: Any) -> None:
+    given = [value(name, {"{0}": [null]}) for name in ("Mode", "Kind", "Around", "Points", "Target")]
+    assert read_inputs(COMPONENTS[PANELS].inputs[1:], given) == read_inputs(COMPONENTS[PANELS].inputs[1:], [])

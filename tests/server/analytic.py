@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hexwrap_solver.arrays import Floats, Ints, Ragged
-from hexwrap_solver.conformal.types import ConformalMap, Deck
+from hexwrap_solver.conformal.types import ConformalMap, Deck, Unrolled
 from hexwrap_solver.panels.types import Panels, Quality
 from hexwrap_solver.pattern.types import Pattern
 from hexwrap_solver.pipeline import Solution
@@ -57,7 +57,7 @@ def _map(turn: float, height: float, columns: int, rows: int, origin: Floats) ->
     angles = np.full(columns, np.pi), np.full(columns, np.pi)
     deck = Deck(0.0, complex(turn))
     return ConformalMap(
-        surface, np.zeros(n), uv @ [1, 1j], sheet.reshape(-1, 3), deck, angles, turn, 1, 1e-14
+        surface, np.zeros(n), Unrolled(uv @ [1, 1j], sheet.reshape(-1, 3), deck, turn), angles, 1, 1e-14
     )
 
 

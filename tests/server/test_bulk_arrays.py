@@ -12,6 +12,7 @@ import pytest
 from hexwrap_server.input.json_text import NotJsonError, loads
 from hexwrap_server.input.schemas import parse_points, parse_request
 from hexwrap_server.problems import FormError, problem
+from hexwrap_solver.conformal.types import BoundaryCondition
 from tests.server.bodies import request, tube
 
 VERTICES = [[0.0, 0.0, 0.0], [1, 0, 0], [0, 1, 0], [1, 1, 0]]
@@ -124,7 +125,7 @@ def test_defaults_are_those_of_the_contract() -> None:
     wanted = parse_request({"surface": tube()}, 1000, 500).wanted
     assert wanted.pattern is not None
     assert wanted.panels is not None
-    assert (wanted.boundary.mode, wanted.boundary.quantum) == ("straight", np.pi / 3)
+    assert (wanted.boundary.mode, wanted.boundary.quantum) == ("straight", "auto")
     assert (wanted.pattern.kind, wanted.pattern.around, wanted.pattern.align) == ("hex", None, "both")
     assert (wanted.panels.mode, wanted.panels.sizes, wanted.panels.target) == ("split", 11, "inscribed")
     assert wanted.pattern.max_cells == 500
@@ -134,18 +135,16 @@ def test_defaults_are_those_of_the_contract() -> None:
 def test_angles_are_understood_in_every_unit(unit: str, angle: float) -> None:
     boundary = {"mode": "angles", "angle_unit": unit, "angles": [{"vertex": 5, "angle": angle}]}
     read = parse_request(request(boundary=boundary), 1000, 1000).wanted.boundary
-    assert read.angles is not None
-    assert read.angles == pytest.approx([np.pi / 3])
+    assert [entry.angle for entry in read.angles] == pytest.approx([np.pi / 3])
 
 
 def test_quantum_auto_is_that_of_the_pattern() -> None:
-    def quantum(**changes: Any) -> float | None:
-        return parse_request(request(**changes), 1000, 1000).wanted.boundary.quantum
+    def quantum(kind: str | None, name: str) -> str:
+        return BoundaryCondition(quantum=name).adapted(kind).quantum  # type: ignore[arg-type]
 
-    assert quantum(pattern={"kind": "quad"}) == np.pi / 2
-    assert quantum(pattern=None) is None
-    assert quantum(boundary={"quantum": "none"}) is None
-    assert quantum(pattern={"kind": "hex"}, boundary={"quantum": "quad"}) == np.pi / 2
+    assert quantum("quad", "auto") == quantum("hex", "quad") == "quad"
+    assert quantum("hex", "auto") == quantum("triangle", "auto") == quantum("quad", "triangle") == "hex"
+    assert quantum(None, "auto") == quantum("hex", "none") == "none"
 
 
 def test_whole_floats_are_whole_numbers() -> None:

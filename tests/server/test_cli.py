@@ -12,7 +12,8 @@ import rhino3dm
 from hexwrap_server import __version__, samples
 from hexwrap_server.cli.local import task
 from hexwrap_server.cli.main import ENDINGS, file_kind, main, make_parser
-from hexwrap_server.cli.options import ANGLES, OPTIONS, SUPPORT, field_paths
+from hexwrap_server.cli.options import OPTIONS
+from hexwrap_server.input.form import Body, leaves
 from hexwrap_server.input.schemas import parse_request
 from hexwrap_server.output.writers import WRITERS
 
@@ -43,7 +44,8 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_every_field_of_a_request_has_an_option() -> None:
-    assert sorted([*(option.path for option in OPTIONS), ANGLES, SUPPORT]) == sorted(field_paths())
+    assert [option.path for option in OPTIONS] == [leaf.path for leaf in leaves(Body)]
+    assert len({option.flag for option in OPTIONS}) == len(OPTIONS)
 
 
 def test_every_file_of_the_service_has_an_ending() -> None:
@@ -136,6 +138,60 @@ def test_usage_is_status_2(
     status, told = refusal(["solve", str(tube), "-o", str(tmp_path / "x.obj"), *options], capsys)
     assert status == 2
     assert words in told
+
+
+@pytest.mark.parametrize(
+    ("change", "options", "words"),
+    [
+        ({"pattern": "hex"}, ["--around", "12"], "Input should be an object"),
+        ({"panels": {"weights": 3}}, ["--weight-edge", "2"], "Input should be an object, not 3"),
+        ({"boundary": []}, ["--angle", "3=2"], "Input should be an object"),
+        ({"surface": 5}, ["--max-edge", "1"], "must be an object"),
+    ],
+)
+def test_options_beside_sections_of_the_wrong_form_are_refused(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    change: dict[str, object],
+    options: list[str],
+    words: str,
+) -> None:
+    path = tmp_path / "request.json"
+    path.write_text(json.dumps(samples.load("tower") | change))
+    assert words in refusal(["solve", str(path), "-o", str(tmp_path / "x.obj"), *options], capsys)[1]
+
+
+def test_sizes_of_the_mesh_go_beside_a_nurbs_surface_only(tmp_path: Path) -> None:
+    path = tmp_path / "nurbs.json"
+    net = [[[np.cos(t), np.sin(t), z, 1] for z in (0, 1)] for t in np.linspace(0, 2 * np.pi, 9).tolist()]
+    nurbs = {"degree": [1, 1], "knots": [[0, *range(9), 8], [0, 0, 1, 1]], "control_points": net}
+    path.write_text(json.dumps({"surface": {"nurbs": nurbs, "mesh": None}}))
+    asked = make_parser().parse_args(["solve", "x", "-o", "x.obj", "--max-edge", "0.25"])
+    found = task(str(path), asked).wanted.surface
+    assert found is not None
+    assert found.mesh is not None
+    assert found.mesh.max_edge == 0.25
+    path.write_text(json.dumps({"vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "faces": [[0, 1, 2]]}))
+    assert task(str(path), asked).wanted.surface is None  # a mesh is as fine as it is
+
+
+def test_values_may_begin_with_a_minus() -> None:
+    words = [
+        "--angle",
+        "-13,-4,0=120",
+        "--angle",
+        "-.5,1,2=60",
+        "--angle-unit",
+        "deg",
+        "--phase",
+        "-1e-3",
+        "-2",
+    ]
+    asked = task("sample:tower", make_parser().parse_args(["solve", "sample:tower", "-o", "x.obj", *words]))
+    assert [entry.point for entry in asked.wanted.boundary.angles] == [(-13, -4, 0), (-0.5, 1, 2)]
+    assert asked.wanted.boundary.mode == "angles"
+    assert asked.wanted.pattern is not None
+    assert asked.wanted.pattern.phase == (-1e-3, -2)
 
 
 def test_an_output_that_is_a_folder_is_refused_before_the_work(

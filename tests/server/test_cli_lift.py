@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from hexwrap_server.cli.main import main
-from hexwrap_server.input.curves import READERS, Curve, DrawingError, read_curves, refined, write_curves
+from hexwrap_server.input.curves import READERS, read_drawing, refined, write_curves
 from hexwrap_server.input.finished_map import map_in_result
+from hexwrap_server.input.readers.drawing import Curve, DrawingError
 from hexwrap_server.jobs.lift_curves import flatten_curves, lift_curves, one_piece
 from hexwrap_server.output.writers import Meta, write
 from hexwrap_solver.conformal.types import Deck
@@ -28,7 +29,7 @@ CURVES = [
 def test_what_is_written_is_read(kind: str, tmp_path: Path) -> None:
     path = tmp_path / f"drawing{kind}"
     path.write_bytes(write_curves(kind, CURVES))
-    read = sorted(read_curves(path), key=lambda curve: float(curve.points[0, 0]))
+    read = sorted(read_drawing(path).curves, key=lambda curve: float(curve.points[0, 0]))
     for curve, expected in zip(read, (CURVES[1], CURVES[0], CURVES[2]), strict=True):
         points = expected.points
         if kind in (".csv", ".txt") and expected.closed:
@@ -55,7 +56,7 @@ def test_what_is_written_is_read(kind: str, tmp_path: Path) -> None:
 def test_drawings_that_cannot_be_read_are_told(name: str, text: str, tmp_path: Path) -> None:
     (tmp_path / name).write_text(text)
     with pytest.raises(DrawingError):
-        read_curves(tmp_path / name)
+        read_drawing(tmp_path / name)
 
 
 def test_arcs_and_splines_of_a_drawing_become_polylines(tmp_path: Path) -> None:
@@ -65,7 +66,7 @@ def test_arcs_and_splines_of_a_drawing_become_polylines(tmp_path: Path) -> None:
     space.add_line((0, 0), (1, 1))
     space.add_lwpolyline([(0, 0), (2, 0), (2, 2)], close=True)
     document.saveas(tmp_path / "arcs.dxf")
-    curves = {len(c.points): c for c in read_curves(tmp_path / "arcs.dxf")}
+    curves = {len(c.points): c for c in read_drawing(tmp_path / "arcs.dxf").curves}
     assert not curves[2].closed
     assert curves[3].closed
     circle = curves[max(curves)]
@@ -180,7 +181,7 @@ def test_a_result_without_its_mesh_is_told(tmp_path: Path, capsys: pytest.Captur
         (["far.csv", "-o", "x.png"], 2, "the ending must be one of"),
         (["far.csv", "-o", "x.dxf", "--step", "0"], 2, "must be greater than 0"),
         (["far.csv", "-o", "x.dxf", "--flatten"], 2, "needs points in space"),
-        (["tube.json", "-o", "x.dxf"], 1, "cannot be read"),
+        (["tube.json", "-o", "x.dxf"], 1, "must hold 'points'"),
     ],
 )
 def test_refusals(

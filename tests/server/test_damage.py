@@ -14,7 +14,6 @@ import pytest
 
 from hexwrap_server.input.requests import Wanted
 from hexwrap_server.jobs.store import DamagedError, FolderInUseError, Job, Store, Work
-from hexwrap_solver.conformal.types import BoundaryCondition
 from tests.server.bodies import request
 from tests.server.live import Live, finished, running
 
@@ -169,9 +168,7 @@ def test_the_log_of_writes_goes_into_the_database_beside_the_writing(
     store.check_point()
     before = database.read_bytes()
     for i in range(1500):  # SQLite alone would stop for the disk after about 300
-        store.add(
-            Job(str(i), "identity", ""), Work("identity", "surface", Wanted(BoundaryCondition(), None, None))
-        )
+        store.add(Job(str(i), "identity", ""), Work("identity", "surface", Wanted(pattern=None, panels=None)))
     assert database.read_bytes() == before
     store.check_point()
     assert in_database() == 1500

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import io
-import sys
 import zipfile
 from collections.abc import Callable
 from contextlib import suppress
@@ -101,7 +100,7 @@ def test_quads_are_read_back(suffix: str) -> None:
     assert len(surface_from_mesh(sent).faces) == 2 * len(quads)
 
 
-@pytest.mark.parametrize("suffix", [".obj", ".off", ".npz", ".3dm"])
+@pytest.mark.parametrize("suffix", [".obj", ".off", ".npz", ".ply", ".3dm"])
 def test_mixed_faces_are_read_back(suffix: str) -> None:
     vertices, quads = tube()
     faces = [*quads[:5].tolist(), *triangles(quads[5:]).tolist()]
@@ -112,14 +111,6 @@ def test_mixed_faces_are_read_back(suffix: str) -> None:
 
 def test_every_format_has_a_writer_here() -> None:
     assert WRITERS.keys() == READERS.keys()
-
-
-def test_mixed_faces_of_a_ply_come_as_triangles() -> None:
-    vertices, quads = tube()
-    faces = [*quads[:5].tolist(), *triangles(quads[5:]).tolist()]
-    sent = read_surface(ply(vertices, faces), "tube.ply")
-    assert isinstance(sent, SentMesh)
-    assert len(surface_from_mesh(sent).faces) == 2 * len(quads)
 
 
 def test_stl_is_welded_by_the_intake() -> None:
@@ -294,12 +285,6 @@ def test_npz_with_faces_of_another_shape_is_refused(faces: np.ndarray) -> None:
 def test_npz_without_faces_is_refused() -> None:
     with pytest.raises(UnreadableFileError, match="'faces'"):
         read_surface(archive(vertices=npy(tube()[0])), "a.npz")
-
-
-def test_a_reader_that_is_missing_is_not_the_fault_of_the_file(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "trimesh.exchange.ply", None)
-    with pytest.raises(ImportError):
-        read_surface(b"ply", "tower.ply")
 
 
 def test_decimal_commas_are_told() -> None:

@@ -63,6 +63,8 @@ def test_digest_depends_on_every_value() -> None:
     assert digest(basis) == digest(PatternSettings(around=12))
     others = [PatternSettings(around=13), PatternSettings(around=12, kind="quad"), BoundaryCondition(), None]
     assert len({digest(basis), *map(digest, others)}) == 5
+    assert digest(BoundaryCondition(angle_unit="deg")) == digest(BoundaryCondition())  # presentation
+    assert decode(encode(BoundaryCondition(angle_unit="deg"))).angle_unit == "deg"
     assert digest(np.zeros(2)) != digest(np.zeros(3))
     assert digest(np.arange(6).reshape(2, 3)) != digest(np.arange(6).reshape(3, 2))
     assert digest(np.arange(6).reshape(2, 3).T) == digest(np.arange(6).reshape(2, 3).T.copy())

@@ -14,7 +14,7 @@ import pytest
 from hexwrap_server.jobs.pipes import write_frame
 
 #: Libraries of single file formats and pictures.
-FORMATS = {"matplotlib", "ezdxf", "trimesh"}
+FORMATS = {"matplotlib", "ezdxf"}
 
 
 #: The life of a scribe whose loading takes a minute.

@@ -14,7 +14,6 @@ import pytest
 from hexwrap_server.input.requests import Outcome, Wanted
 from hexwrap_server.jobs.store import Job, Store, Work
 from hexwrap_server.problems import FormError, problem
-from hexwrap_solver.conformal.types import BoundaryCondition
 from hexwrap_solver.errors import RequestError
 from tests.server.bodies import tube
 from tests.server.live import Live, running
@@ -104,7 +103,7 @@ def test_old_and_superfluous_results_are_forgotten(tmp_path: Path) -> None:
         identity = f"{i}" * 64
         store.keep_surface("a" * 64, b"surface")
         job = Job(f"job{i}", identity, "", created=time.time(), finished=time.time(), status="done")
-        store.add(job, Work(identity, "a" * 64, Wanted(BoundaryCondition(), None, None)))
+        store.add(job, Work(identity, "a" * 64, Wanted(pattern=None, panels=None)))
         store.keep_outcome(identity, outcome)
         store.finish_work(identity, outcome)
         time.sleep(0.05)  # more than a step of any system's clock
@@ -123,7 +122,7 @@ def failed_long_ago(store: Store, number: int) -> str:
     moment = time.time() - 1000 + number
     os.utime(store.surface_path(surface), (moment, moment))
     job = Job(f"job{number}", identity, "", created=moment, finished=moment, status="failed")
-    store.add(job, Work(identity, surface, Wanted(BoundaryCondition(), None, None)))
+    store.add(job, Work(identity, surface, Wanted(pattern=None, panels=None)))
     store._write("UPDATE works SET used = ? WHERE identity = ?", moment, identity)
     return surface
 
@@ -148,7 +147,7 @@ def test_surfaces_that_many_works_share_count_once(tmp_path: Path) -> None:
     surface = failed_long_ago(store, 1)
     for i in range(2, 6):
         job = Job(f"job{i}", f"{i:064x}", "", status="failed", finished=time.time())
-        store.add(job, Work(job.identity, surface, Wanted(BoundaryCondition(), None, None)))
+        store.add(job, Work(job.identity, surface, Wanted(pattern=None, panels=None)))
     assert pruned(store, days=1, result_bytes=1500) == {surface}
     assert len(store.jobs(10)) == 5
     store.close()

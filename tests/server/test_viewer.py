@@ -12,10 +12,13 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import httpx
 import numpy as np
 import pytest
+
+from hexwrap_server.input.form import Body, leaves
 
 ROOT = Path(__file__).resolve().parents[2]
 VIEWER = ROOT / "server" / "viewer"
@@ -185,6 +188,15 @@ def tube(n: int = 24, rows: int = 9) -> str:
     return "\n".join(lines) + "\n"
 
 
+def obj_surface(text: str) -> dict[str, Any]:
+    """The same as a surface of a request."""
+    rows = [line.split() for line in text.splitlines()]
+    return {
+        "vertices": [[float(x) for x in row[1:]] for row in rows if row[0] == "v"],
+        "faces": [[int(i) - 1 for i in row[1:]] for row in rows if row[0] == "f"],
+    }
+
+
 def test_sample_solves_and_panels_can_be_picked_and_read(browser, server: Server) -> None:
     with opened(browser, server) as page:
         page.select_option("#sample", "tower")
@@ -270,7 +282,7 @@ def test_angles_are_set_by_clicking_and_the_balance_closes(browser, server: Serv
     with opened(browser, server) as page:
         page.set_input_files("#file", str(path))
         before = shown(page)
-        page.select_option("[name=mode]", "angles")
+        page.select_option("[name='boundary.mode']", "angles")
         before = shown(page, before)  # no corners yet: solved as straight
         loop = page.evaluate("window.hexwrapViewer.state.result.mesh.loops[0]")
         page.select_option("#angle-value", label="240°")
@@ -282,8 +294,92 @@ def test_angles_are_set_by_clicking_and_the_balance_closes(browser, server: Serv
         assert "balanced" in page.locator("#balance").inner_text()
         job = shown(page, before)
         request = fetched(server, f"/v1/jobs/{job}/request")
-        assert request["boundary"]["angle_unit"] == "pi"
-        assert [round(180 * a["angle"]) for a in request["boundary"]["angles"]] == [240, 120]
+        assert request["boundary"]["angle_unit"] == "deg"
+        assert [a["angle"] for a in request["boundary"]["angles"]] == [240, 120]
+
+
+EVERYTHING: dict[str, Any] = {
+    "boundary": {"mode": "isometric", "quantum": "quad", "spread": "optimal"},
+    "pattern": {
+        "kind": "quad",
+        "around": 17,
+        "rotation": 7.5,
+        "align": "none",
+        "boundary": "trim",
+        "phase": [0.25, 0.5],
+    },
+    "panels": {
+        "sizes": None,
+        "size_cost": "worst",
+        "edge_range": [0.01, 9],
+        "target": "shortest",
+        "orientation": "tangent",
+        "joint": 0.01,
+        "increment": 0.001,
+        "max_gap": 1.5,
+        "components": {"inset": 0.01, "thickness": 0.02, "depth": 0.3},
+    },
+    "support": True,
+}
+WATERTIGHT: dict[str, Any] = {
+    "pattern": {"kind": "hex", "edge_length": 0.9, "rotation": "vertex"},
+    "panels": {"mode": "watertight", "method": "energy", "weights": {"planarity": 2, "surface": 1}},
+}
+
+
+@pytest.mark.parametrize("asked", [EVERYTHING, WATERTIGHT], ids=["split", "watertight"])
+def test_no_setting_is_lost_when_one_is_changed(browser, server: Server, asked: dict[str, Any]) -> None:
+    surface = obj_surface(tube())
+    with httpx.Client(base_url=server.url, trust_env=False, timeout=60) as client:
+        id = client.post("/v1/jobs", json={"name": "all", "surface": surface} | asked).json()["id"]
+        assert client.get(f"/v1/jobs/{id}?wait=60").json()["status"] == "done"
+        adopted = client.get(f"/v1/jobs/{id}/request").json()
+    for section, settings in asked.items():  # the recalled request says what was asked for
+        if isinstance(settings, dict):
+            assert adopted[section].items() >= {k: v for k, v in settings.items() if k != "weights"}.items()
+    with opened(browser, server, f"/#job/{id}") as page:
+        shown(page)
+        with page.expect_request("**/v1/jobs") as sent:
+            page.fill("[name='panels.joint']", "0.02")
+        body = sent.value.post_data_json
+        assert body == adopted | {"panels": adopted["panels"] | {"joint": 0.02}}
+        with page.expect_request("**/v1/jobs") as sent:
+            page.locator("#settings > fieldset", has_text="Panels").locator("details > summary").click()
+            page.select_option("[name='panels.orientation']", "tangent" if asked is WATERTIGHT else "fit")
+        changed = "tangent" if asked is WATERTIGHT else "fit"
+        assert sent.value.post_data_json == body | {"panels": body["panels"] | {"orientation": changed}}
+        assert page.complaints == []
+
+
+def test_every_setting_has_a_control(browser, server: Server) -> None:
+    with opened(browser, server) as page:
+        page.wait_for_selector("[name='panels.sizes']", state="attached")
+        names = set(page.eval_on_selector_all("[name]", "all => all.map((one) => one.name)"))
+    for leaf in leaves(Body):
+        path = ".".join(leaf.path)
+        own_way = path in ("name", "boundary.angles")  # the surface's name, and clicks on the boundary
+        assert own_way or {path, f"{path}.0"} & names, path
+
+
+def test_corners_are_found_at_vertices_that_were_welded_away(browser, server: Server) -> None:
+    """The second copy of a seam's vertex is nowhere in the welded mesh; its place is."""
+    surface = obj_surface(tube())
+    seam = len(surface["vertices"])
+    surface["vertices"].append(surface["vertices"][5])
+    surface["faces"] = [
+        [seam if v == 5 and i == 5 else v for v in face] for i, face in enumerate(surface["faces"])
+    ]
+    angles = [{"vertex": seam, "angle": 200}, {"vertex": 12, "angle": 160}]
+    body = {"surface": surface, "boundary": {"mode": "angles", "angle_unit": "deg", "angles": angles}}
+    with httpx.Client(base_url=server.url, trust_env=False, timeout=60) as client:
+        id = client.post("/v1/jobs", json=body | {"pattern": None}).json()["id"]
+        assert client.get(f"/v1/jobs/{id}?wait=60").json()["status"] == "done"
+    with opened(browser, server, f"/#job/{id}") as page:
+        shown(page)
+        found = page.evaluate("window.hexwrapViewer.corners()")
+        assert [corner["loop"] for corner in found] == [0, 0]
+        assert [corner["point"] for corner in found] == [surface["vertices"][v] for v in (5, 12)]
+        assert "loop 0 0°, loop 1 0°; balanced" in page.locator("#balance").inner_text()
 
 
 def test_cancel_stops_the_job(browser, server: Server, tmp_path: Path) -> None:
@@ -311,7 +407,7 @@ def test_the_page_outlives_a_restart_of_the_server(browser, server: Server) -> N
         page.wait_for_selector("#banner:not([hidden])", timeout=15_000)
         server.start()
         page.wait_for_selector("#banner", state="hidden", timeout=15_000)
-        page.fill("[name=sizes]", "4")
+        page.fill("[name='panels.sizes']", "4")
         job = shown(page, before)
         assert len(fetched(server, f"/v1/jobs/{job}/result?include=sizes")["sizes"]) == 4
 
@@ -385,12 +481,13 @@ def test_theme_and_keyboard(browser, server: Server) -> None:
         page.click("#theme")
         assert page.evaluate("document.documentElement.dataset.theme") != first
         reached = set()
-        for _ in range(60):
+        for _ in range(80):
             page.keyboard.press("Tab")
             reached.add(
                 page.evaluate("(({ id, name, tagName }) => id || name || tagName)(document.activeElement)")
             )
-        assert {"sample", "mode", "kind", "sizes", "solve", "CANVAS", "fit", "cut"} <= reached
+        named = {"boundary.mode", "pattern.kind", "panels.sizes"}
+        assert {"sample", "mode", "solve", "CANVAS", "fit", "cut"} | named <= reached
 
 
 @pytest.mark.skipif(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import cos, pi, sin
 
 import pytest
 
@@ -72,6 +73,24 @@ def test_a_recalled_request_leads_to_the_same_work(live: Live, changes: dict[str
     if isinstance(asked, dict) and "angles" in asked:  # in the words it was asked in
         assert recalled["boundary"]["angle_unit"] == asked["angle_unit"]
         assert [a["angle"] for a in recalled["boundary"]["angles"]] == [a["angle"] for a in asked["angles"]]
+
+
+def test_settings_beside_an_id_replace_those_sent_with_the_surface(live: Live) -> None:
+    t = [2 * pi * k / 24 for k in range(25)]
+    net = [[[cos(a), sin(a), z, 1] for z in (0, 1)] for a in t]
+    nurbs = {"degree": [1, 1], "knots": [[0, *range(25), 24], [0, 0, 1, 1]], "control_points": net}
+    sent = live.post("/v1/surfaces", json={"nurbs": nurbs, "mesh": {"max_edge": 0.5}}).json()
+    counts = {}
+    for beside in ({}, {"mesh": {"max_edge": 0.5}}, {"mesh": {"max_edge": 0.25}}):
+        body = {"surface": {"id": sent["id"], **beside}, "pattern": None}
+        job = live.post("/v1/jobs", json=body).json()["id"]
+        finished(live, job)
+        counts[str(beside)] = len(live.get(f"/v1/jobs/{job}/result?include=mesh").json()["mesh"]["vertices"])
+        recalled = live.get(f"/v1/jobs/{job}/request").json()["surface"]
+        assert recalled["id"] == sent["id"]
+        assert recalled.get("mesh", {}).get("max_edge") == beside.get("mesh", {}).get("max_edge")
+    as_sent, same, finer = counts.values()
+    assert sent["vertices"] == as_sent == same < finer
 
 
 def test_a_preview_shows_a_file_as_it_stands_even_one_that_would_be_refused(live: Live) -> None:

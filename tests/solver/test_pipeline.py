@@ -11,7 +11,7 @@ from hexwrap_solver.conformal.types import BoundaryCondition
 from hexwrap_solver.errors import HexwrapError
 from hexwrap_solver.panels.types import ComponentSettings, PanelSettings, Weights
 from hexwrap_solver.pattern.types import PatternSettings
-from hexwrap_solver.pipeline import PlainRunner, solve
+from hexwrap_solver.pipeline import PlainRunner, SolveSettings, solve
 from hexwrap_solver.surface import surface_from_mesh
 from hexwrap_solver.surface.types import SentMesh
 from tests.solver.panels.cells import catenoid, grid_map, inverted
@@ -25,7 +25,7 @@ def take_in():
 def run(pattern=None, panels=None, **options):
     runner = PlainRunner()
     pattern = PatternSettings(around=24) if pattern is None else pattern
-    return solve(take_in, BoundaryCondition(), pattern, panels, runner, **options), runner
+    return solve(take_in, SolveSettings(pattern=pattern, panels=panels, **options), runner), runner
 
 
 def test_hexagons_close_up_and_panels_keep_the_contract():
@@ -60,7 +60,7 @@ def test_components_and_support_come_where_asked_for():
     )
     assert with_parts.components.solid_vertices is not None
     assert np.degrees(with_parts.support.torsion.max()) < 1e-9
-    alone, runner = run(panels=None, with_support=True)
+    alone, runner = run(panels=None, support=True)
     assert alone.components is None
     assert len(alone.support.axes) == len(alone.pattern.vertices)
     assert "fit" not in runner.timings
@@ -80,7 +80,7 @@ def test_stages_run_with_one_blas_thread_and_leave_the_callers_setting_alone():
 
     with threadpool_limits(2, user_api="blas"):
         before = threads()
-        solve(take_in, BoundaryCondition(), None, None, Runner())
+        solve(take_in, SolveSettings(pattern=None, panels=None), Runner())
         assert threads() == before
     assert seen == [{1} if before else set()] * 3  # Accelerate on macOS has no threads to set
 
@@ -111,7 +111,7 @@ def test_whatever_is_asked_of_whatever_surface_is_done_or_refused(seed):
         return options[random.integers(len(options))]
 
     sent = drawn_surface(random)
-    quantum = one_of(None, np.pi / 3, np.pi / 2)
+    quantum = one_of("none", "hex", "quad")
     condition = BoundaryCondition(
         one_of("straight", "isometric"), quantum=quantum, spread=one_of("even", "optimal")
     )
@@ -132,7 +132,7 @@ def test_whatever_is_asked_of_whatever_surface_is_done_or_refused(seed):
         weights=Weights(surface=one_of(0.0, 1.0)),
     )
     try:
-        found = solve(lambda: surface_from_mesh(sent), condition, pattern, panels, PlainRunner())
+        found = solve(lambda: surface_from_mesh(sent), SolveSettings(condition, pattern, panels))
     except HexwrapError:
         return
     if panels.mode == "split":

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from hexwrap_server import samples
-from hexwrap_server.cli.options import asked_body, asked_meshing
+from hexwrap_server.cli.options import asked_body
 from hexwrap_server.input.json_text import loads
 from hexwrap_server.input.requests import SentSurface, Wanted
 from hexwrap_server.input.schemas import parse_request
@@ -18,6 +18,7 @@ from hexwrap_server.jobs.work import run_stages
 from hexwrap_server.jobs.worker import Report
 from hexwrap_solver.pipeline import Solution
 from hexwrap_solver.surface import MeshSettings, NurbsSurface, SentMesh
+from hexwrap_solver.surface.types import SurfaceSettings
 
 #: Nobody but the user waits here, so only what no memory would hold is refused.
 MAX_VERTICES, MAX_PANELS = 20_000_000, 5_000_000
@@ -68,20 +69,21 @@ def sample_body(name: str) -> dict[str, Any]:
 def task(given: str, arguments: argparse.Namespace) -> Task:
     """What an input and the options ask for. Raises UsageError, HexwrapError."""
     body, surface = read_body(given)
-    meshing = asked_meshing(arguments)
     if surface is not None:
         body["surface"] = {"id": ""}  # stands for the file's surface while the rest is checked
-    elif isinstance(body["surface"], dict) and "nurbs" in body["surface"] and meshing:
-        body["surface"] = {**body["surface"], "mesh": {**body["surface"].get("mesh", {}), **meshing}}
     request = parse_request(asked_body(arguments, body), MAX_VERTICES, MAX_PANELS)
     sent = request.surface
-    if isinstance(surface, SentMesh):
-        sent = SentSurface(mesh=surface)
-    elif isinstance(surface, NurbsSurface):
-        sent = SentSurface(nurbs=surface, meshing=MeshSettings(**meshing, max_vertices=MAX_VERTICES))
+    if surface is not None:
+        sent = _sent(surface)
     if not isinstance(sent, SentSurface):
         raise UsageError(f"{given} names a surface that only a server knows; give the surface itself.")
     return Task(request.name, sent, request.wanted)
+
+
+def _sent(surface: SentMesh | NurbsSurface) -> SentSurface:
+    if isinstance(surface, SentMesh):
+        return SentSurface(mesh=surface)
+    return SentSurface(nurbs=surface, settings=SurfaceSettings(MeshSettings(max_vertices=MAX_VERTICES)))
 
 
 def solve_here(asked: Task, report: Report) -> tuple[Solution, dict[str, float]]:
@@ -92,4 +94,4 @@ def solve_here(asked: Task, report: Report) -> tuple[Solution, dict[str, float]]
 
 def only_map(asked: Task) -> Task:
     """The same surface and boundary, without a pattern."""
-    return replace(asked, wanted=Wanted(asked.wanted.boundary, None, None))
+    return replace(asked, wanted=replace(asked.wanted, pattern=None, panels=None))

@@ -6,11 +6,13 @@ Exit status 0; 1 where the surface or the request cannot be solved (the problem'
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from math import inf
 from pathlib import Path
+from typing import Any
 
 import httpx
 from rich.console import Console
@@ -21,7 +23,7 @@ from hexwrap_server.cli.demo import ALL, DemoError, run_demo
 from hexwrap_server.cli.local import Task, UsageError, only_map, solve_here, task
 from hexwrap_server.cli.options import add_request_options, as_options, is_option_at_fault
 from hexwrap_server.cli.summary import print_summary
-from hexwrap_server.input.curves import READERS, read_curves, write_curves
+from hexwrap_server.input.curves import READERS, read_drawing, write_curves
 from hexwrap_server.input.curves import WRITERS as CURVE_WRITERS
 from hexwrap_server.input.finished_map import map_in_result
 from hexwrap_server.jobs.lift_curves import flatten_curves, lift_curves
@@ -71,8 +73,16 @@ def _refuse(status: int, *sentences: str) -> int:
     return status
 
 
+class Parser(argparse.ArgumentParser):
+    """Words that begin like a negative number are values, as in ``--angle -13,-4,0=120``."""
+
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(**settings)
+        self._negative_number_matcher = re.compile(r"-\.?\d")
+
+
 def make_parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="hexwrap", description="Seamless hexagonal, quad and triangle panels on tube-like surfaces."
     )
     parser.add_argument("--version", action="version", version=f"hexwrap {__version__}")
@@ -198,16 +208,18 @@ def _lift(asked: argparse.Namespace) -> int:
     _check_folders([asked.output])
     if not Path(asked.points).is_file():
         raise UsageError(f"{asked.points}: there is no such file.")
-    curves = read_curves(Path(asked.points))
+    drawing = read_drawing(Path(asked.points))
     cmap = map_in_result(Path(asked.input))
     if cmap is None:
         cmap = solve_with_progress(only_map(task(asked.input, asked)), asked.quiet)[0].map
     carry = flatten_curves if asked.flatten else lift_curves
-    carried = carry(cmap, curves, asked.step)
+    carried = carry(cmap, drawing.curves, asked.step)
     if not carried.curves:
         return _refuse(1, "no point of the drawing lies in the domain; see domain.dxf for where that is.")
     save(asked.output, write_curves(ending, carried.curves))
     console = Console(quiet=asked.quiet, soft_wrap=True, highlight=False)
+    for note in drawing.notes():
+        console.print(note)
     if carried.outside:
         console.print(f"{carried.outside} points of the drawing lie outside the domain and were left out")
     if carried.farthest:

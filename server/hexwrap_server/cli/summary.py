@@ -13,6 +13,10 @@ from hexwrap_server.output.text import angle, length, lengths
 
 #: A table of sizes is not longer than this.
 MOST_SIZES = 24
+#: Numbers of sizes whose cost is shown, beside the number that was taken.
+SHOWN = (1, 2, 3, 5, 8, 11, 16, 24, 40)
+#: Width of the longest bar of the chart, characters.
+BAR = 30
 Rows = Iterable[tuple[str, str]]
 
 
@@ -36,6 +40,8 @@ def print_summary(console: Console, name: str, result: dict[str, Any]) -> None:
     console.print(table)
     if result["panels"] is not None:
         console.print(_sizes(result["sizes"]))
+        if result["quality"]["trade_off"]:
+            console.print(_trade_off(result["quality"]["trade_off"], len(result["sizes"])))
     for note in (*result["mesh"]["repairs"], *result["quality"]["notes"]):
         console.print(Text(f"• {note}"))
 
@@ -85,7 +91,26 @@ def _quality(result: dict[str, Any]) -> Rows:
         yield words, _small(found[key]["max"])
     gap = found["gap"]["tangential"]
     yield "gap", f"{_length(gap['mean'])} (at most {_length(gap['max'])})"
+    if found["gap"]["over"] is not None:
+        yield "wider than wanted", f"{found['gap']['over']} panels"
     yield "off the surface", f"at most {_length(found['surface_distance']['max'])}"
+
+
+def _trade_off(curve: dict[str, Any], taken: int) -> Table:
+    """What fewer or more sizes would leave open."""
+    table = Table(box=None, pad_edge=False)
+    for heading in ("sizes", "uncovered", "mean joint", "worst joint"):
+        table.add_column(heading, justify="right")
+    table.add_column("")
+    most = max(max(curve["uncovered"]), 1e-12)
+    for i, sizes in enumerate(curve["sizes"]):
+        if sizes not in SHOWN and sizes != taken:
+            continue
+        uncovered = curve["uncovered"][i]
+        joints = [length(curve[key][i]) for key in ("joint_mean", "joint_max")]
+        bar = Text("▒" * max(1, round(BAR * uncovered / most)), style="bold" if sizes == taken else "dim")
+        table.add_row(str(sizes), f"{uncovered:.2%}", *joints, bar)
+    return table
 
 
 def _small(value: float | None) -> str:
@@ -105,7 +130,7 @@ def _sizes(sizes: list[dict[str, Any]]) -> Table:
     most = max((size["count"] for size in sizes), default=1)
     words = lengths([size["edge_length"] for size in sizes[:MOST_SIZES]])
     for size, word in zip(sizes, words, strict=False):
-        bar = Text("█" * max(1, round(30 * size["count"] / most)), style=size["color"])
+        bar = Text("█" * max(1, round(BAR * size["count"] / most)), style=size["color"])
         table.add_row(str(size["size"]), word, str(size["count"]), bar)
     if len(sizes) > MOST_SIZES:
         table.add_row("…", "", f"{sum(size['count'] for size in sizes[MOST_SIZES:])}", "")

@@ -6,11 +6,15 @@ from typing import Any
 
 from hexwrap_server.http.openapi_result import RESULT as _RESULT
 from hexwrap_server.http.schema_words import NUMBER, PLANE, POINT, listed, nullable, record
-from hexwrap_server.input.schemas import Body, Meshing
+from hexwrap_server.input.form import Body, schema
+from hexwrap_solver.surface.types import SurfaceSettings
 
+_SETTINGS = schema(SurfaceSettings)["properties"]
+_BESIDE_A_MESH = {name: part for name, part in _SETTINGS.items() if name != "mesh"}
 _MESH = record(
     ("vertices", "faces"),
     more=False,
+    **_BESIDE_A_MESH,
     vertices=listed(POINT),
     faces=listed(listed({"type": "integer", "minimum": 0}) | {"minItems": 3, "maxItems": 4}),
     normals=nullable(listed(POINT)),
@@ -26,9 +30,9 @@ _NURBS = record(
         control_points=listed(listed(listed(NUMBER) | {"minItems": 3, "maxItems": 4})),
         closed=listed({"type": "boolean"}, 2),
     ),
-    mesh=nullable(Meshing.model_json_schema()),
+    **_SETTINGS,
 )
-_SURFACE = {"anyOf": [_MESH, _NURBS, record(("id",), more=False, id={"type": "string"})]}
+_SURFACE = {"anyOf": [_MESH, _NURBS, record(("id",), more=False, id={"type": "string"}, **_SETTINGS)]}
 
 _JOB = record(
     ("id", "name", "status", "stage", "progress", "created", "started", "finished", "timings", "problem"),
@@ -73,25 +77,8 @@ def _route(answers: dict[str, Any], body: dict[str, Any] | None = None) -> dict[
 
 def _request_schema() -> dict[str, Any]:
     """The request with its definitions inside, so that it can stand anywhere in the document."""
-    schema = _inlined(Body.model_json_schema())
-    schema["properties"] = {"surface": _SURFACE} | schema["properties"]
-    schema["required"] = ["surface"]
-    return schema
-
-
-def _inlined(schema: dict[str, Any]) -> dict[str, Any]:
-    definitions = schema.pop("$defs", {})
-
-    def resolve(part: Any) -> Any:
-        if isinstance(part, dict):
-            if "$ref" in part:
-                target = resolve(definitions[part["$ref"].rpartition("/")[2]])
-                return target | {k: v for k, v in part.items() if k != "$ref"}
-            return {k: resolve(v) for k, v in part.items()}
-        return [resolve(p) for p in part] if isinstance(part, list) else part
-
-    resolved: dict[str, Any] = resolve(schema)
-    return resolved
+    rest = schema(Body)
+    return rest | {"properties": {"surface": _SURFACE} | rest["properties"], "required": ["surface"]}
 
 
 _BODY_FAULTS = (400, 413, 415)
@@ -123,6 +110,7 @@ FLATTEN = _route(
 FILES = _route(
     _answers({"application/octet-stream": {"schema": {"type": "string"}}}, 200, 404, 409, 410, 500, 503)
 )
+SETTINGS = _route(_answers(_json(record(("type", "properties")))))
 SAMPLES = _route(_answers(_json(record(("samples",), samples=listed(record(("name",)))))))
 SAMPLE = _route(_answers(_json(record(("surface",))), 200, 404))
 REQUEST = _route(_answers(_json(record(("surface", "boundary", "pattern", "panels"))), 200, 404))

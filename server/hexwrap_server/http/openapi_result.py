@@ -24,6 +24,7 @@ _MESH = _all(
     vertices=listed(POINT),
     faces=listed(listed(_INDEX, 3)),
     input_vertex=listed({"type": "integer", "minimum": -1}),
+    vertex_of_input=listed({"type": "integer", "minimum": -1}),
     loops=listed(listed(_INDEX), 2),
     repairs=listed(_TEXT),
 )
@@ -73,7 +74,9 @@ _QUALITY = _all(
     angle_deviation=_all(max=_MEASURE),
     surface_distance=_all(max=_MEASURE, mean=_MEASURE),
     gap=_all(
-        tangential=_all(min=_MEASURE, mean=_MEASURE, max=_MEASURE), normal=_all(mean=_MEASURE, max=_MEASURE)
+        tangential=_all(min=_MEASURE, mean=_MEASURE, max=_MEASURE),
+        normal=_all(mean=_MEASURE, max=_MEASURE),
+        over=nullable(_COUNT),
     ),
     overlaps=nullable(_COUNT),
     coverage=_MEASURE,

@@ -18,7 +18,7 @@ from hexwrap_server.http import openapi
 from hexwrap_server.http.answers import json_response, packed_response
 from hexwrap_server.http.bodies import read_body
 from hexwrap_server.http.routes import JobId, service_of
-from hexwrap_server.input.recall import request_document
+from hexwrap_server.input.form import Body, document, schema
 from hexwrap_server.input.uploads import sent_file
 from hexwrap_server.jobs.worker import Report
 from hexwrap_server.problems import body_is_the_surface, not_found
@@ -49,6 +49,12 @@ async def page() -> Response:
     )
 
 
+@router.get("/v1/settings", openapi_extra=openapi.SETTINGS)
+async def settings() -> Response:
+    """JSON Schema of a request but for the arrays of its surface, with help, units and bounds: for forms."""
+    return json_response(schema(Body))
+
+
 @router.get("/v1/samples", openapi_extra=openapi.SAMPLES)
 async def list_samples() -> Response:
     """The bundled surfaces."""
@@ -73,7 +79,9 @@ async def job_request(request: Request, id: JobId) -> Response:
     work = service.store.work(job.identity)
     if work is None:
         raise not_found("request", "The request of this job is no longer kept.")
-    return json_response(request_document(job.name, work.surface, work.wanted))
+    asked = document(work.wanted)
+    surface = {"id": work.surface} | (asked.pop("surface") or {})
+    return json_response({"name": job.name, "surface": surface} | asked)
 
 
 @router.post("/v1/surfaces/preview", openapi_extra=openapi.PREVIEW)

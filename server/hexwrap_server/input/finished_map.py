@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from hexwrap_server.cli.local import UsageError
-from hexwrap_solver.conformal.types import ConformalMap, Deck
+from hexwrap_solver.conformal.types import ConformalMap, Deck, Unrolled
 from hexwrap_solver.surface import Surface
 from hexwrap_solver.surface.topology import vertex_normals
 
@@ -66,11 +66,13 @@ def _map(get: Getter) -> ConformalMap:
     return ConformalMap(
         surface=surface,
         log_scale=np.asarray(get("map.log_scale"), dtype=float),
-        uv=uv[:, 0] + 1j * uv[:, 1],
-        sheet=np.asarray(get("map.sheet"), dtype=np.int64).reshape(-1, 3),
-        deck=Deck(float(get("map.deck.angle")), complex(*translation.tolist())),
+        domain=Unrolled(
+            uv[:, 0] + 1j * uv[:, 1],
+            np.asarray(get("map.sheet"), dtype=np.int64).reshape(-1, 3),
+            Deck(float(get("map.deck.angle")), complex(*translation.tolist())),
+            float(get("map.circumference")),
+        ),
         boundary_angles=(theta, eta),
-        circumference=float(get("map.circumference")),
         iterations=0,
         residual=float(get("map.residual")),
         flips=int(get("map.flips")),

@@ -10,8 +10,9 @@ import sys
 import orjson
 
 from hexwrap_server.input import quick
+from hexwrap_server.input.faults import escaped
 from hexwrap_server.input.requests import ParsedRequest
-from hexwrap_server.input.schemas import Request, escaped, parse_request
+from hexwrap_server.input.schemas import Request, parse_request
 from hexwrap_server.jobs import codec
 from hexwrap_server.jobs.worker import Report
 from hexwrap_server.problems import FormError

@@ -3,31 +3,32 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated, Any
 
-from hexwrap_solver.conformal.types import BoundaryCondition
-from hexwrap_solver.panels.types import PanelSettings
-from hexwrap_solver.pattern.types import PatternSettings
-from hexwrap_solver.surface.types import MeshSettings, NurbsSurface, SentMesh
+from hexwrap_solver.pipeline import SolveSettings
+from hexwrap_solver.setting import Setting
+from hexwrap_solver.surface.types import NurbsSurface, SentMesh, SurfaceSettings
 
 
 @dataclass(frozen=True)
 class SentSurface:
-    """A surface as it was sent: a mesh, or a NURBS surface and how to mesh it."""
+    """A surface as it was sent: a mesh or a NURBS surface.
+
+    settings: how to take it in, for requests that say nothing of that beside its id.
+    """
 
     mesh: SentMesh | None = None
     nurbs: NurbsSurface | None = None
-    meshing: MeshSettings | None = None
+    settings: SurfaceSettings | None = None
 
 
 @dataclass(frozen=True)
-class Wanted:
+class Wanted(SolveSettings):
     """What is to be done with a surface; identical for identical work."""
 
-    boundary: BoundaryCondition
-    pattern: PatternSettings | None
-    panels: PanelSettings | None
-    support: bool = False
+    surface: Annotated[
+        SurfaceSettings | None, Setting("how the surface is taken in; null: as it was sent", rare=True)
+    ] = None
 
 
 @dataclass(frozen=True)

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from pathlib import PurePath
 
 from hexwrap_server.input.readers.errors import FileTypeError, UnreadableFileError
 from hexwrap_server.input.readers.npz import read_npz
-from hexwrap_server.input.readers.polygons import read_obj, read_off
+from hexwrap_server.input.readers.obj import read_obj
+from hexwrap_server.input.readers.off import read_off
+from hexwrap_server.input.readers.ply import read_ply
 from hexwrap_server.input.readers.rhino import read_3dm
-from hexwrap_server.input.readers.triangles import read_ply, read_stl
+from hexwrap_server.input.readers.stl import read_stl
 from hexwrap_solver.errors import SurfaceError
 from hexwrap_solver.surface import NurbsSurface, SentMesh
 
@@ -38,12 +39,10 @@ def read_surface(data: bytes, filename: str) -> SentMesh | NurbsSurface:
         )
     try:
         return READERS[suffix](data)
-    except (SurfaceError, ImportError):  # a reader that is not installed well is no fault of the file
+    except SurfaceError:
         raise
     except (Exception, MemoryError) as error:  # foreign readers fail in every way on broken files
-        comma = re.search(r"'-?\d+,\d+'", str(error))
-        advice = "write numbers with a decimal point instead of a comma" if comma else "export it again"
         raise UnreadableFileError(
             f"The file {PurePath(filename).name} cannot be read as {suffix[1:].upper()} "
-            f"({type(error).__name__}: {str(error)[:200]}): {advice}."
+            f"({type(error).__name__}: {str(error)[:200]}): export it again."
         ) from error

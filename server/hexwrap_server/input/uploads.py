@@ -15,7 +15,7 @@ from hexwrap_server.input.surface_files import read_surface
 from hexwrap_server.jobs.work import checked
 from hexwrap_server.jobs.worker import Report
 from hexwrap_server.problems import FormError, body_is_the_surface
-from hexwrap_solver.surface.types import MeshSettings, NurbsSurface, SentMesh
+from hexwrap_solver.surface.types import MeshSettings, NurbsSurface, SentMesh, SurfaceSettings
 
 
 class UploadError(FormError):
@@ -41,8 +41,8 @@ def read_upload(
     """A file sent raw (with its name) or in a form → checked surface. Raises UploadError, SurfaceError."""
     read = sent_file(body, content_type, name, max_vertices, max_bytes)
     if isinstance(read, NurbsSurface):
-        meshing = MeshSettings(max_vertices=max_vertices)
-        return checked(report, SentSurface(nurbs=read, meshing=meshing), caching)
+        settings = SurfaceSettings(MeshSettings(max_vertices=max_vertices))
+        return checked(report, SentSurface(nurbs=read, settings=settings), caching)
     return checked(report, SentSurface(mesh=read), caching)
 
 

@@ -67,24 +67,25 @@ def decode(data: bytes) -> Any:
 
 
 def digest(*values: Any) -> str:
-    """SHA-256, in hex, of what the values say (not of how they are laid out in memory)."""
+    """SHA-256, in hex, of what the values say: not of how they are laid out in memory, nor of fields that do
+    not count when they are compared."""
     sha = hashlib.sha256()
     for value in values:
-        header, arrays = _split(value)
+        header, arrays = _split(value, all_fields=False)
         sha.update(header)
         for array in arrays:
             sha.update(_raw(array))
     return sha.hexdigest()
 
 
-def _split(value: Any) -> tuple[bytes, list[np.ndarray[Any, Any]]]:
+def _split(value: Any, all_fields: bool = True) -> tuple[bytes, list[np.ndarray[Any, Any]]]:
     arrays: list[np.ndarray[Any, Any]] = []
-    tree = _tree(value, arrays)
+    tree = _tree(value, arrays, all_fields)
     shapes = [[a.dtype.str, list(a.shape)] for a in arrays]
     return json.dumps({"value": tree, "arrays": shapes}, separators=(",", ":")).encode(), arrays
 
 
-def _tree(value: Any, arrays: list[np.ndarray[Any, Any]]) -> Any:
+def _tree(value: Any, arrays: list[np.ndarray[Any, Any]], all_fields: bool) -> Any:
     if value is None or isinstance(value, (bool, int, float, str)):
         return value
     if isinstance(value, np.ndarray):
@@ -93,17 +94,23 @@ def _tree(value: Any, arrays: list[np.ndarray[Any, Any]]) -> Any:
         arrays.append(np.ascontiguousarray(value))
         return {"array": len(arrays) - 1}
     if isinstance(value, np.generic):
-        return _tree(value.item(), arrays)
+        return _tree(value.item(), arrays, all_fields)
     if isinstance(value, complex):
         return {"complex": [value.real, value.imag]}
     if isinstance(value, (list, tuple)):
-        return {type(value).__name__: [_tree(v, arrays) for v in value]}
+        return {type(value).__name__: [_tree(v, arrays, all_fields) for v in value]}
     if isinstance(value, dict):
-        return {"dict": [[_tree(k, arrays), _tree(v, arrays)] for k, v in value.items()]}
+        return {
+            "dict": [[_tree(k, arrays, all_fields), _tree(v, arrays, all_fields)] for k, v in value.items()]
+        }
     if is_dataclass(value) and type(value).__module__.startswith(_PACKAGES):
         return {
             "object": f"{type(value).__module__}:{type(value).__name__}",
-            "fields": {f.name: _tree(getattr(value, f.name), arrays) for f in fields(value)},
+            "fields": {
+                f.name: _tree(getattr(value, f.name), arrays, all_fields)
+                for f in fields(value)
+                if f.compare or all_fields
+            },
         }
     raise TypeError(f"{type(value).__qualname__} cannot be stored")
 

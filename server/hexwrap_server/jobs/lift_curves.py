@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexwrap_server.cli.local import UsageError
-from hexwrap_server.input.curves import Curve, refined
+from hexwrap_server.input.curves import refined
+from hexwrap_server.input.readers.drawing import Curve
 from hexwrap_solver.arrays import Complexes, Floats
 from hexwrap_solver.conformal.types import ConformalMap, Deck
 from hexwrap_solver.domain import flatten, lift

@@ -23,8 +23,8 @@ from hexwrap_server.output.writers import WRITERS, Meta
 from hexwrap_server.problems import FormError, body_is_the_surface
 from hexwrap_solver import pipeline
 from hexwrap_solver.errors import HexwrapError
-from hexwrap_solver.surface import surface_from_mesh, surface_from_nurbs
-from hexwrap_solver.surface.types import Surface
+from hexwrap_solver.surface import surface_from_mesh, surface_from_nurbs, with_openings
+from hexwrap_solver.surface.types import Surface, SurfaceSettings
 
 #: Of this worker process.
 _SCRIBE = Scribe()
@@ -87,36 +87,29 @@ def _staged(
 ) -> pipeline.Solution:
     """sent: asked only where the checked surface is not remembered."""
     return pipeline.solve(
-        lambda: take_in(sent()),
-        wanted.boundary,
-        wanted.pattern,
-        wanted.panels,
-        runner,
-        source=surface_id,
-        with_support=wanted.support,
+        lambda: take_in(sent(), wanted.surface), wanted, runner, source=(surface_id, wanted.surface)
     )
 
 
-def take_in(sent: SentSurface) -> Surface:
-    """Raises SurfaceError."""
+def take_in(sent: SentSurface, asked: SurfaceSettings | None = None) -> Surface:
+    """asked: instead of the settings that were sent along. Raises SurfaceError."""
+    settings = asked or sent.settings or SurfaceSettings()
     if sent.mesh is not None:
-        return surface_from_mesh(sent.mesh)
+        return with_openings(surface_from_mesh(sent.mesh), settings.openings)
     assert sent.nurbs is not None
-    return surface_from_nurbs(sent.nurbs, sent.meshing)
+    return surface_from_nurbs(sent.nurbs, settings.mesh)
 
 
 @body_is_the_surface()
 def read_surface(report: Report, text: bytes, max_vertices: int, caching: CacheSettings) -> Intake:
     """JSON → checked surface. Raises FormError, SurfaceError."""
-    sent = parse_surface(loads(text), max_vertices, root="")
-    assert isinstance(sent, SentSurface)
-    return checked(report, sent, caching)
+    return checked(report, parse_surface(loads(text), max_vertices), caching)
 
 
 def checked(report: Report, sent: SentSurface, caching: CacheSettings) -> Intake:
     runner = CachingRunner(_stages(caching), report)
     id = codec.digest(sent)
-    surface = runner("surface", id, lambda progress: take_in(sent))
+    surface = runner("surface", (id, None), lambda progress: take_in(sent))
     loops = [surface.input_vertex[loop].tolist() for loop in surface.loops]
     answer = {
         "vertices": len(surface.vertices),

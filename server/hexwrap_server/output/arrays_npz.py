@@ -55,6 +55,7 @@ def _map(cmap: ConformalMap) -> Arrays:
         "mesh.faces": surface.faces,
         "mesh.normals": surface.normals,
         "mesh.input_vertex": surface.input_vertex,
+        "mesh.vertex_of_input": surface.vertex_of_input,
         "map.log_scale": cmap.log_scale,
         "map.uv": _plane(cmap.uv),
         "map.sheet": cmap.sheet,

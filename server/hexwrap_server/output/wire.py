@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from hexwrap_server.jobs.parts import PARTS, join_parts
 from hexwrap_server.output.colours import size_colours
 from hexwrap_solver.arrays import Complexes, Floats, Ints, Ragged
+from hexwrap_solver.conformal.net import Net
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.panels.types import Components, Panels, Support, TradeOff
 from hexwrap_solver.pattern.types import Pattern
@@ -67,25 +68,37 @@ def mesh(surface: Surface) -> dict[str, Any]:
         "vertices": flat(surface.vertices),
         "faces": flat(surface.faces),
         "input_vertex": flat(surface.input_vertex),
+        "vertex_of_input": flat(surface.vertex_of_input),
         "loops": [flat(loop) for loop in surface.loops],
         "repairs": list(surface.repairs),
     }
 
 
 def conformal(cmap: ConformalMap) -> dict[str, Any]:
-    apex = None if cmap.kind == "cylinder" else cmap.deck.apex
+    domain = cmap.domain
+    if isinstance(domain, Net):
+        sheets: dict[str, Any] = dict.fromkeys(("cone_angle", "uv", "sheet", "deck", "circumference", "apex"))
+        sheets["corners"] = plane(domain.corners)
+    else:
+        apex, shift = None if cmap.kind == "cylinder" else domain.deck.apex, domain.deck.translation
+        sheets = {
+            "cone_angle": float(domain.deck.angle),
+            "uv": plane(domain.uv),
+            "sheet": mostly_zero(domain.sheet),
+            "deck": {"angle": float(domain.deck.angle), "translation": [shift.real, shift.imag]},
+            "circumference": float(domain.circumference),
+            "apex": None if apex is None else [apex.real, apex.imag],
+        }
     return {
         "kind": cmap.kind,
-        "cone_angle": float(cmap.deck.angle),
+        **sheets,
+        "cones": [
+            {"vertex": int(vertex), "index": int(index), "moved": float(moved)}
+            for vertex, index, moved in zip(
+                cmap.cones.vertex, cmap.cones.index, cmap.cones.moved, strict=True
+            )
+        ],
         "log_scale": flat(cmap.log_scale),
-        "uv": plane(cmap.uv),
-        "sheet": mostly_zero(cmap.sheet),
-        "deck": {
-            "angle": float(cmap.deck.angle),
-            "translation": [cmap.deck.translation.real, cmap.deck.translation.imag],
-        },
-        "circumference": float(cmap.circumference),
-        "apex": None if apex is None else [apex.real, apex.imag],
         "boundary_angles": [flat(angles) for angles in cmap.boundary_angles],
         "iterations": int(cmap.iterations),
         "residual": float(cmap.residual),
@@ -186,6 +199,7 @@ def quality(solution: Solution) -> dict[str, Any]:
         "gap": {
             "tangential": summary(measured.gap_tangential, "min", "mean", "max"),
             "normal": summary(measured.gap_normal, "mean", "max"),
+            "over": measured.gaps_over,
         },
         "kink": summary(measured.kink, "mean", "max"),
         "overlaps": None if made is None else int(measured.overlaps),
@@ -203,6 +217,8 @@ def trade_off(curve: TradeOff) -> dict[str, Any]:
         "sizes": flat(curve.sizes),
         "uncovered": flat(curve.uncovered),
         "worst_gap": flat(curve.worst_gap),
+        "joint_mean": flat(curve.joint_mean),
+        "joint_max": flat(curve.joint_max),
     }
 
 

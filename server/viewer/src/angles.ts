@@ -1,9 +1,11 @@
-// Boundary angles given by hand, and the Gauss–Bonnet balance Σ(π − θ) = 0 over both loops, equation (1).
+// Boundary angles given by hand, and the Gauss–Bonnet balance over all loops, equation (1).
 import type { Result, Vec3 } from "./api";
 
 export interface Corner {
-  point: Vec3;
-  loop: 0 | 1;
+  /** null: not known before there is a result */
+  point: Vec3 | null;
+  /** null: not on the boundary, or not known */
+  loop: number | null;
   /** multiples of π */
   angle: number;
 }
@@ -16,22 +18,32 @@ export function choices(kind: string): { value: number; label: string }[] {
   return list;
 }
 
-export function balance(corners: Corner[]): { loops: [number, number]; total: number } {
-  const loops: [number, number] = [0, 0];
-  for (const c of corners) loops[c.loop] += 180 * (1 - c.angle);
-  return { loops, total: loops[0] + loops[1] };
+/** Σ(π − θ) in degrees: of each loop, and of all together less what the surface needs, 2π times χ. */
+export function balance(corners: Corner[], result: Result | null): { loops: number[]; total: number } {
+  const loops = result?.mesh.loops.map(() => 0) ?? [];
+  for (const { loop, angle } of corners) if (loop !== null) loops[loop] += 180 * (1 - angle);
+  return { loops, total: corners.reduce((sum, { angle }) => sum + 180 * (1 - angle), 0) - 360 * euler(result) };
+}
+
+/** Vertices − edges + faces; every edge has two faces, but those of the boundary one. */
+function euler(result: Result | null): number {
+  if (!result) return 0;
+  const { vertices, faces, loops } = result.mesh;
+  return vertices.length - (3 * faces.length + loops.flat().length) / 2 + faces.length;
 }
 
 /** Closes the balance: the last corner takes up what is missing if it can, otherwise all share it. */
-export function close(corners: Corner[]): Corner[] {
+export function close(corners: Corner[], result: Result | null): Corner[] {
   if (!corners.length) return corners;
-  const missing = balance(corners).total / 180;
+  const missing = balance(corners, result).total / 180;
   const last = corners[corners.length - 1];
   const angle = last.angle + missing;
   if (angle > 1e-6 && angle < 2.34) return [...corners.slice(0, -1), { ...last, angle }];
   return corners.map((c) => ({ ...c, angle: c.angle + missing / corners.length }));
 }
 
-export function loopOf(result: Result, vertex: number): 0 | 1 {
-  return result.mesh.loops[0].includes(vertex) ? 0 : 1;
+/** The loop that a vertex lies on. */
+export function loopOf(result: Result, vertex: number): number | null {
+  const loop = result.mesh.loops.findIndex((vertices) => vertices.includes(vertex));
+  return loop < 0 ? null : loop;
 }

@@ -1,4 +1,5 @@
 // The wire contract as this page uses it: types, and one function per route.
+import type { Schema } from "./form";
 
 export type Vec2 = [number, number];
 export type Vec3 = [number, number, number];
@@ -34,10 +35,7 @@ export interface BoundaryAngle {
 export interface Request {
   name?: string;
   surface: Record<string, unknown>;
-  boundary?: Record<string, unknown>;
-  pattern?: Record<string, unknown> | null;
-  panels?: Record<string, unknown> | null;
-  support?: boolean;
+  [setting: string]: unknown;
 }
 
 export interface TradeOff {
@@ -47,7 +45,7 @@ export interface TradeOff {
 }
 
 export interface Result {
-  mesh: { vertices: Vec3[]; faces: number[][]; input_vertex: number[]; loops: [number[], number[]]; repairs: string[] };
+  mesh: { vertices: Vec3[]; faces: number[][]; input_vertex: number[]; vertex_of_input: number[]; loops: number[][]; repairs: string[] };
   map: {
     kind: string;
     cone_angle: number;
@@ -153,6 +151,7 @@ export const api = {
   cancel: (id: string) => call(`/v1/jobs/${id}`, { method: "DELETE" }),
   result: (id: string) => json<Result>(`/v1/jobs/${id}/result`),
   request: (id: string) => json<Request>(`/v1/jobs/${id}/request`),
+  settings: () => json<Schema>("/v1/settings"),
   samples: () => json<{ samples: { name: string }[] }>("/v1/samples").then((answer) => answer.samples),
   sample: (name: string) => json<Request>(`/v1/samples/${name}`),
   /** The file's mesh as it stands, unchecked: to have something to point at when it is refused. */

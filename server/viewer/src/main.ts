@@ -1,19 +1,21 @@
 // The page: reads settings, submits jobs, shows results. All state stands in one object; draw functions read it.
 import { balance, choices, close, loopOf, type Corner } from "./angles";
-import { api, FILES, ProblemError, UnreachableError, type Job, type Problem, type Request, type Result } from "./api";
+import { api, FILES, ProblemError, UnreachableError, type BoundaryAngle, type Job, type Problem, type Request, type Result, type Vec3 } from "./api";
 import { flatOutline, histogram, tradeOff } from "./charts";
 import { colour, MODES, number, RAMP_CSS, type Legend, type Mode } from "./colors";
 import { DomainView } from "./domain";
+import { element, Form, type Json, type Schema, type Settings } from "./form";
 import { View3D } from "./view3d";
 
 const $ = <T extends HTMLElement = HTMLElement>(id: string) => document.getElementById(id) as T;
-const form = $<HTMLFormElement>("form");
-const field = (name: string) => form.elements.namedItem(name) as HTMLInputElement | HTMLSelectElement;
+const page = $<HTMLFormElement>("form");
+/** Every setting of the request; made when the server has described them. */
+let form: Form;
+let description: Schema;
 
 interface State {
   surface: Request["surface"] | null;
   name: string;
-  corners: Corner[];
   job: Job | null;
   result: Result | null;
   request: Request | null;
@@ -24,83 +26,64 @@ interface State {
 }
 
 const state: State = {
-  surface: null, name: "", corners: [], job: null, result: null, request: null, selected: null, mode: "size", turn: 0,
+  surface: null, name: "", job: null, result: null, request: null, selected: null, mode: "size", turn: 0,
 };
 const space = new View3D($("view3d"));
 const domain = new DomainView($("domain"));
 
-function element(tag: string, attributes: Record<string, string> = {}, ...children: (Node | string)[]): HTMLElement {
-  const node = document.createElement(tag);
-  for (const [name, value] of Object.entries(attributes)) node.setAttribute(name, value);
-  node.append(...children);
-  return node;
-}
-
 // ---------------------------------------------------------------- settings and submission
 
+/** All settings, those of the surface beside it. */
 function currentRequest(): Request {
-  const value = (name: string) => field(name).value;
-  const request: Request = { name: state.name, surface: state.surface! };
-  request.boundary = { mode: value("mode") };
-  if (value("mode") === "angles")
-    Object.assign(request.boundary, { angle_unit: "pi", angles: state.corners.map(({ point, angle }) => ({ point, angle })) });
-  const rotation = value("rotation");
-  request.pattern = {
-    kind: value("kind"), align: value("align"), boundary: value("edge"),
-    rotation: Number.isNaN(Number(rotation)) ? rotation : Number(rotation),
-  };
-  if (value("measure") === "around") request.pattern.around = Number(value("around"));
-  else if (Number(value("edge_length")) > 0) request.pattern.edge_length = Number(value("edge_length"));
-  request.panels = { sizes: Number(value("sizes")), target: value("target"), joint: Number(value("joint")) || 0 };
-  if ((field("support") as HTMLInputElement).checked) {
-    request.support = true;
-    request.panels.components = { depth: supportDepth() };
-  }
-  return request;
+  const { surface, ...others } = structuredClone(form.settings);
+  const { mesh, ...beside } = (surface ?? {}) as Settings;
+  const sizes = mesh && !("vertices" in state.surface!) ? { mesh } : {}; // a mesh is as fine as it is
+  return { ...others, name: state.name, surface: { ...state.surface!, ...beside, ...sizes } };
 }
 
 /** Beams as deep as a third of a mean edge: visible, and in proportion. */
-function supportDepth(): number {
+const supportDepth = () => meanEdge() / 3;
+
+/** Of the panels shown; 1 where there are none. */
+function meanEdge(): number {
   const lengths = state.result?.panels?.edge_length;
-  return lengths?.length ? lengths.reduce((a, b) => a + b, 0) / lengths.length / 3 : 1;
+  return lengths?.length ? lengths.reduce((a, b) => a + b, 0) / lengths.length : 1;
 }
 
+/** Takes over a whole request: what it does not say has its default. */
 function adopt(request: Request): void {
-  const set = (name: string, value: unknown) => {
-    if (value === undefined || value === null) return;
-    const control = field(name);
-    if (control instanceof HTMLSelectElement && ![...control.options].some((o) => o.value === String(value)))
-      control.append(element("option", { value: String(value) }, String(value)));
-    control.value = String(value);
-  };
-  const { boundary = {}, pattern, panels } = request;
-  set("mode", boundary.mode ?? "straight");
-  set("kind", pattern?.kind);
-  set("rotation", pattern?.rotation);
-  set("align", pattern?.align);
-  set("edge", pattern?.boundary);
-  if (pattern?.edge_length) set("measure", "edge_length");
-  else if (pattern?.around) set("measure", "around");
-  set("edge_length", pattern?.edge_length);
-  set("around", pattern?.around);
-  set("sizes", panels?.sizes);
-  set("target", panels?.target);
-  set("joint", panels?.joint);
-  (field("support") as HTMLInputElement).checked = Boolean(request.support);
+  const { surface, name, ...settings } = request;
+  const known = description.properties!.surface;
+  const own = Object.keys(known.anyOf?.find((part) => part.properties)?.properties ?? {});
+  const beside = Object.entries(surface).filter(([key]) => own.includes(key));
+  state.surface = Object.fromEntries(Object.entries(surface).filter(([key]) => !own.includes(key)));
+  state.name = name ?? "";
+  form.adopt({ ...settings, surface: beside.length ? Object.fromEntries(beside) : null } as Settings);
   drawForm();
 }
 
-/** The corners of a request, once the mesh is known that says on which loop each stands. */
-function adoptCorners(request: Request, result: Result): void {
-  const listed = (request.boundary?.angles as { vertex?: number; point?: [number, number, number]; angle: number }[]) ?? [];
-  const unit = { rad: 1 / Math.PI, deg: 1 / 180, pi: 1 }[(request.boundary?.angle_unit as string) ?? "rad"] ?? 1;
-  const all = result.mesh.loops.flat();
-  state.corners = listed.map(({ vertex, point, angle }) => {
-    const at = point
-      ? all.reduce((best, v) => (distance(result.mesh.vertices[v], point) < distance(result.mesh.vertices[best], point) ? v : best))
-      : Math.max(result.mesh.input_vertex.indexOf(vertex!), 0);
-    return { point: result.mesh.vertices[at], loop: loopOf(result, at), angle: angle * unit };
+/** The corners asked for, where the shown surface has them. */
+function corners(): Corner[] {
+  const { result } = state;
+  const unit = perHalfTurn();
+  return entries().map(({ vertex, point, angle }) => {
+    const at = !result ? null : point ? nearestOnBoundary(result, point) : (result.mesh.vertex_of_input[vertex!] ?? -1);
+    const known = at !== null && at >= 0;
+    return { point: known ? result!.mesh.vertices[at] : (point ?? null), loop: known ? loopOf(result!, at) : null, angle: angle / unit };
   });
+}
+
+const entries = () => form.get("boundary.angles") as unknown as BoundaryAngle[];
+type Unit = "rad" | "deg" | "pi";
+/** 180° in each unit of angles. */
+const HALF_TURN: Record<Unit, number> = { rad: Math.PI, deg: 180, pi: 1 };
+const perHalfTurn = () => HALF_TURN[form.get("boundary.angle_unit") as Unit];
+const byAngles = () => form.get("boundary.mode") === "angles";
+const setEntries = (list: BoundaryAngle[]) => form.set("boundary.angles", list as unknown as Json);
+
+function nearestOnBoundary(result: Result, point: Vec3): number {
+  const all = result.mesh.loops.flat();
+  return all.reduce((best, v) => (distance(result.mesh.vertices[v], point) < distance(result.mesh.vertices[best], point) ? v : best));
 }
 
 const distance = (p: number[], q: number[]) => Math.hypot(p[0] - q[0], p[1] - q[1], p[2] - q[2]);
@@ -220,7 +203,8 @@ function present(job: Job, result: Result, keepView: boolean): void {
 async function takeFile(file: File): Promise<void> {
   const turn = ++state.turn;
   state.surface = null;
-  state.corners = [];
+  setEntries([]);
+  drawAngles();
   state.name = file.name.replace(/\.[^.]*$/, "");
   ($("sample") as HTMLSelectElement).value = "";
   note(`Reading ${file.name} …`);
@@ -256,22 +240,11 @@ async function takeSample(name: string): Promise<void> {
   try {
     const request = await api.sample(name);
     if (turn !== state.turn) return;
-    state.surface = request.surface;
-    state.name = request.name ?? name;
-    state.corners = [];
-    adopt(request);
-    await solve(request);
-    showCorners(request);
+    adopt({ ...request, name: request.name ?? name });
+    await solve();
   } catch (error) {
     if (turn === state.turn) report(error);
   }
-}
-
-/** Once its result is shown: the corners that a request lists. */
-function showCorners(request: Request): void {
-  if (!state.result || state.request !== request || !sameSurface() || request.boundary?.mode !== "angles") return;
-  adoptCorners(request, state.result);
-  drawAngles();
 }
 
 async function openJob(id: string): Promise<void> {
@@ -279,13 +252,9 @@ async function openJob(id: string): Promise<void> {
   try {
     const [job, request] = await Promise.all([api.job(id), api.request(id)]);
     if (turn !== state.turn) return;
-    state.surface = request.surface;
-    state.name = request.name ?? "";
     state.request = request;
-    state.corners = [];
     adopt(request);
     await follow(job, turn, false);
-    showCorners(request);
   } catch (error) {
     if (turn === state.turn) report(error);
   }
@@ -315,8 +284,7 @@ function report(error: unknown): void {
     const { vertices = [], faces = [], edges = [] } = error.problem;
     // A refusal by a job speaks of the sent mesh; where the last result knows it, show the faults on it.
     if (result && vertices.length + faces.length + edges.length) {
-      const back = new Map(result.mesh.input_vertex.map((sent, i) => [sent, i]));
-      const here = (v: number) => back.get(v) ?? -1;
+      const here = (v: number) => result.mesh.vertex_of_input[v] ?? -1;
       space.showMesh(result.mesh.vertices, result.mesh.faces, {
         ...error.problem, vertices: vertices.map(here), faces: [], edges: edges.map(([a, b]) => [here(a), here(b)]),
       });
@@ -347,45 +315,50 @@ async function drawJobs(): Promise<void> {
 }
 
 function drawForm(): void {
-  for (const output of form.querySelectorAll("output")) output.textContent = output.parentElement!.querySelector("input")!.value;
-  const measure = field("measure").value;
-  for (const row of form.querySelectorAll<HTMLElement>("[data-for]")) row.hidden = row.dataset.for !== measure;
-  $("angles").hidden = field("mode").value !== "angles";
+  form.draw();
   const select = $<HTMLSelectElement>("angle-value");
   const chosen = select.value;
-  select.replaceChildren(...choices(field("kind").value).map(({ value, label }) => element("option", { value: String(value) }, label)));
+  select.replaceChildren(...choices(String(form.get("pattern.kind"))).map(({ value, label }) => element("option", { value: String(value) }, label)));
   if ([...select.options].some((o) => o.value === chosen)) select.value = chosen;
   drawAngles();
 }
 
 function drawAngles(): void {
-  const on = field("mode").value === "angles";
+  const on = byAngles();
+  $("angles").hidden = !on;
   const { result } = state;
+  const list = corners();
   const marked = new Set<number>();
   if (on && result)
-    for (const c of state.corners)
-      for (const v of result.mesh.loops[c.loop]) if (distance(result.mesh.vertices[v], c.point) < 1e-9 * (1 + Math.hypot(...c.point))) marked.add(v);
+    for (const { loop, point } of list)
+      for (const v of loop === null ? [] : result.mesh.loops[loop]) if (isSame(result.mesh.vertices[v], point!)) marked.add(v);
   space.showBoundary(on && result ? result.mesh.vertices : null, result?.mesh.loops ?? [], marked);
-  $("angle-list").replaceChildren(...state.corners.map((c, i) => {
+  $("angle-list").replaceChildren(...list.map((c, i) => {
     const remove = element("button", { type: "button", "aria-label": `Remove corner ${i + 1}` }, "×");
     remove.addEventListener("click", () => {
-      state.corners.splice(i, 1);
-      drawAngles();
+      setEntries(entries().filter((_, k) => k !== i));
+      drawForm();
       anglesChanged();
     });
-    return element("li", {}, `${number(180 * c.angle)}° on loop ${c.loop} `, remove);
+    const where = c.loop !== null ? `on loop ${c.loop} ` : result ? "not on the boundary " : "";
+    return element("li", {}, `${number(180 * c.angle)}° ${where}`, remove);
   }));
-  const { loops, total } = balance(state.corners);
+  const { loops, total } = balance(list, result);
   const closed = Math.abs(total) < 0.05;
-  $("balance").textContent = `Σκ: loop 0 ${degrees(loops[0])}, loop 1 ${degrees(loops[1])}; ${closed ? "balanced" : `${degrees(total)} too much`}`;
+  const sums = loops.map((sum, k) => `loop ${k} ${degrees(sum)}`).join(", ");
+  $("balance").textContent = list.length ? `Σκ${sums && ": "}${sums}; ${closed ? "balanced" : `${degrees(total)} too much`}` : "";
   $("balance").classList.toggle("open", !closed);
 }
 
+/** Whether two places are one, to rounding. */
+const isSame = (p: Vec3, q: Vec3) => distance(p, q) < 1e-9 * (1 + Math.hypot(...q));
 const degrees = (x: number) => `${number(Math.round(1e4 * x) / 1e4)}°`;
 
 function anglesChanged(): void {
-  if (Math.abs(balance(state.corners).total) < 0.05) solveSoon();
+  if (isBalanced()) solveSoon();
 }
+
+const isBalanced = () => Math.abs(balance(corners(), state.result).total) < 0.05;
 
 function drawColours(): void {
   const { result } = state;
@@ -416,7 +389,7 @@ function drawCharts(): void {
 }
 
 function chooseSizes(k: number): void {
-  field("sizes").value = String(k);
+  form.set("panels.sizes", k);
   drawForm();
   void solve();
 }
@@ -512,8 +485,8 @@ function asCurl(): string {
 }
 
 function asGrasshopper(): string {
-  const { boundary, pattern, panels } = state.request ?? currentRequest();
-  return JSON.stringify({ boundary, pattern, panels }, null, 1);
+  const { surface: _, name: __, ...settings } = state.request ?? currentRequest();
+  return JSON.stringify(settings, null, 1);
 }
 
 // ---------------------------------------------------------------- wiring
@@ -543,14 +516,15 @@ function pointer(view: HTMLElement, pick: (x: number, y: number) => number | nul
 
 function clickInSpace(x: number, y: number): void {
   const { result } = state;
-  if (field("mode").value === "angles" && result) {
+  if (byAngles() && result) {
     const v = space.pickBoundary(x, y);
     if (v !== null) {
       const point = result.mesh.vertices[v];
       const angle = Number($<HTMLSelectElement>("angle-value").value);
-      state.corners = state.corners.filter((c) => distance(c.point, point) > 1e-9 * (1 + Math.hypot(...point)));
-      state.corners.push({ point, loop: loopOf(result, v), angle });
-      drawAngles();
+      const others = corners();
+      const kept = entries().filter((_, i) => !others[i].point || !isSame(others[i].point!, point));
+      setEntries([...kept, { point, angle: angle * perHalfTurn() }]);
+      drawForm();
       return anglesChanged();
     }
   }
@@ -560,26 +534,33 @@ function clickInSpace(x: number, y: number): void {
 pointer($("view3d"), (x, y) => space.pick(x, y), clickInSpace);
 pointer($("domain"), (x, y) => domain.pick(x, y), (x, y) => select(domain.pick(x, y)));
 
-form.addEventListener("submit", (event) => {
+page.addEventListener("submit", (event) => {
   event.preventDefault();
   void solve();
 });
-form.addEventListener("input", (event) => {
+
+/** What a person has changed in the form. */
+function settingChanged(path: string, before: Json): void {
+  if (path === "boundary.angle_unit") // the angles stay what they are
+    setEntries(entries().map((entry) => ({ ...entry, angle: (entry.angle / HALF_TURN[before as Unit]) * perHalfTurn() })));
+  const components = form.get("panels.components") as Settings | null;
+  if (path === "support" && form.get("support") && !components?.depth && form.get("panels") !== null)
+    form.set("panels.components", { inset: 0, thickness: 0, ...components, depth: supportDepth() });
   drawForm();
-  const name = (event.target as HTMLInputElement).name;
-  if (!name) return;
-  if (field("mode").value === "angles" && Math.abs(balance(state.corners).total) > 0.05) return;
-  solveSoon();
-});
+  if (!byAngles() || isBalanced()) solveSoon();
+}
+
 $("cancel").addEventListener("click", () => void cancel());
 $("close-balance").addEventListener("click", () => {
-  state.corners = close(state.corners);
-  drawAngles();
+  const [before, after] = [corners(), close(corners(), state.result)];
+  const angle = (i: number) => Number((after[i].angle * perHalfTurn()).toPrecision(12));
+  setEntries(entries().map((entry, i) => (after[i].angle === before[i].angle ? entry : { ...entry, angle: angle(i) })));
+  drawForm();
   anglesChanged();
 });
 $("clear-angles").addEventListener("click", () => {
-  state.corners = [];
-  drawAngles();
+  setEntries([]);
+  drawForm();
 });
 
 const drop = $("drop");
@@ -654,8 +635,26 @@ function storedTheme(): boolean {
   return matchMedia("(prefers-color-scheme: dark)").matches;
 }
 
+/** Tries again while the server is away. */
+async function untilReached<T>(ask: () => Promise<T>): Promise<T> {
+  for (;;) {
+    try {
+      return await ask();
+    } catch (error) {
+      if (!(error instanceof UnreachableError)) throw error;
+      banner(error.message);
+      await new Promise((resolve) => setTimeout(resolve, 700));
+    }
+  }
+}
+
 async function start(): Promise<void> {
   theme(storedTheme());
+  description = await untilReached(api.settings);
+  form = new Form($("settings"), description, settingChanged, { "boundary.angles": $("angles") });
+  form.suggestion = (path) => (path === "pattern.around" ? 48 : Number(meanEdge().toPrecision(3)));
+  form.set("pattern.around", 48);
+  form.set("boundary.angle_unit", "deg");
   drawForm();
   const names = await api.samples().catch(() => []);
   $("sample").append(...names.map(({ name }) => element("option", { value: name }, name)));
@@ -668,9 +667,9 @@ async function start(): Promise<void> {
 
 declare global {
   interface Window {
-    hexwrapViewer: { space: View3D; domain: DomainView; state: State };
+    hexwrapViewer: { space: View3D; domain: DomainView; state: State; corners: () => Corner[] };
   }
 }
 // For those who script the page (and for the tests): where things stand on the screen.
-window.hexwrapViewer = { space, domain, state };
+window.hexwrapViewer = { space, domain, state, corners };
 void start();

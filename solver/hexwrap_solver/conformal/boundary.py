@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Literal
+
 import numpy as np
 
 from hexwrap_solver.arrays import Floats
-from hexwrap_solver.conformal.types import Targets
+from hexwrap_solver.conformal.types import Cones, Targets
 from hexwrap_solver.errors import BoundaryError
 from hexwrap_solver.surface.types import Surface
 
@@ -14,38 +17,62 @@ from hexwrap_solver.surface.types import Surface
 SNAP = 1e-9
 
 
-def straight(surface: Surface) -> Targets:
-    """Every boundary angle π: a straight cylinder."""
+#: What a loop may be asked for: prescribed angle sums (k,), u = 0 (the angles come out), or a prescribed
+#: curvature Σκ with u constant on the loop.
+LoopTarget = Floats | Literal["isometric"] | float
+
+
+def gauss_bonnet(surface: Surface) -> float:
+    """2πχ, what the curvatures of all loops and cones add up to: equation (1) of the paper, χ = 0, and its
+    like on all other surfaces of genus 0."""
+    return 2 * np.pi * (2 - len(surface.loops))
+
+
+def targets(surface: Surface, loops: Sequence[LoopTarget], cones: Cones | None = None) -> Targets:
+    """Targets from what each loop is asked for, aligned with surface.loops, and cones.
+
+    Isometric loops are pinned at u = 0. Where there are none, the first loop of prescribed curvature is, and
+    its curvature is what Gauss–Bonnet leaves.
+    """
     n = len(surface.vertices)
     angle = np.full(n, 2 * np.pi)
-    angle[np.concatenate(surface.loops)] = np.pi
-    return Targets(angle, np.full(n, -1, dtype=np.int64), np.zeros(0))
+    tie = np.full(n, -1, dtype=np.int64)
+    pinned = any(isinstance(wanted, str) for wanted in loops)
+    sums = [0.0]
+    for loop, wanted in zip(surface.loops, loops, strict=True):
+        angle[loop] = np.pi
+        if isinstance(wanted, str):
+            tie[loop] = 0
+        elif isinstance(wanted, np.ndarray):
+            angle[loop] = wanted
+        elif pinned:
+            tie[loop] = len(sums)
+            sums.append(len(loop) * np.pi - wanted)
+        else:
+            tie[loop], pinned = 0, True
+    if cones is not None:
+        angle[cones.vertex] -= cones.curvature
+    return Targets(angle, tie, np.array(sums if pinned else []))
 
 
-def prescribed(surface: Surface, boundary_angles: tuple[Floats, Floats]) -> Targets:
+def straight(surface: Surface) -> Targets:
+    """Every boundary angle π: a straight cylinder."""
+    return targets(surface, [np.full(len(loop), np.pi) for loop in surface.loops])
+
+
+def prescribed(surface: Surface, boundary_angles: Sequence[Floats]) -> Targets:
     """Angle sums given for each loop, aligned with surface.loops."""
-    targets = straight(surface)
-    angle = targets.angle.copy()
-    for loop, angles in zip(surface.loops, boundary_angles, strict=True):
-        angle[loop] = angles
-    return Targets(angle, targets.tie, targets.tie_angle)
+    return targets(surface, list(boundary_angles))
 
 
 def isometric(surface: Surface) -> Targets:
-    """u = 0 on both loops; the cone angle is what comes out."""
-    targets = straight(surface)
-    tie = targets.tie.copy()
-    tie[np.concatenate(surface.loops)] = 0
-    return Targets(targets.angle, tie, np.zeros(1))
+    """u = 0 on all loops; their curvatures are what comes out."""
+    return targets(surface, ["isometric"] * len(surface.loops))
 
 
-def constant_on_loops(surface: Surface, cone_angle: float) -> Targets:
-    """u = 0 on loop 0, one unknown constant on loop 1, whose total angle makes the cone angle K."""
-    targets = straight(surface)
-    tie = targets.tie.copy()
-    tie[surface.loops[0]], tie[surface.loops[1]] = 0, 1
-    total = len(surface.loops[1]) * np.pi + cone_angle  # Σκ over loop 1 is −K
-    return Targets(targets.angle, tie, np.array([0.0, total]))
+def constant_on_loops(surface: Surface, curvatures: Sequence[float], cones: Cones | None = None) -> Targets:
+    """u constant on each loop: 0 on loop 0, and on the others what gives them their curvature Σκ."""
+    return targets(surface, [float(K) for K in curvatures], cones)
 
 
 def cone_angle(boundary_angles: Floats) -> float:
@@ -53,16 +80,28 @@ def cone_angle(boundary_angles: Floats) -> float:
     return float((np.pi - boundary_angles).sum())
 
 
-def cone_angle_of(targets: Targets, sums: Floats, surface: Surface) -> float:
-    """K of a solution, exactly as prescribed where it is: Σκ over loop 0, or −Σκ over a tied loop 1.
+def curvatures(targets: Targets, sums: Floats, surface: Surface, cones: Cones | None = None) -> Floats:
+    """(b + c,) Σκ of every loop and cone of a solution, exactly as prescribed where they are.
 
-    sums: (n,) angle sums, prescribed or found.
+    sums: (n,) angle sums found. What is prescribed for no loop is found; where it is for all but one, that
+    one takes what Gauss–Bonnet leaves.
     """
-    if len(targets.tie_angle) > 1:
-        angle = float(targets.tie_angle[1]) - len(surface.loops[1]) * np.pi
-    else:
-        angle = cone_angle(sums[surface.loops[0]])
-    return snapped(angle)
+    cones = Cones.none() if cones is None else cones
+    found = np.zeros(len(surface.loops))
+    open_ = np.zeros(len(surface.loops), dtype=bool)
+    for i, loop in enumerate(surface.loops):
+        tie = int(targets.tie[loop[0]])
+        if tie > 0:
+            found[i] = len(loop) * np.pi - float(targets.tie_angle[tie])
+        else:
+            open_[i] = tie == 0
+            found[i] = cone_angle((sums if tie == 0 else targets.angle)[loop])
+        found[i] = snapped(found[i])
+    rest = gauss_bonnet(surface) - float(cones.curvature.sum())
+    last = np.flatnonzero(open_)[-1:] if open_.any() else np.arange(len(found))[-1:]
+    if len(last):
+        found[last] = snapped(rest - float(np.delete(found, last).sum()))
+    return np.concatenate([found, cones.curvature])
 
 
 def snapped(angle: float) -> float:
@@ -90,7 +129,7 @@ def spread_evenly(angles: Floats, curvature: float) -> Floats:
             raise BoundaryError(
                 f"The angles of a boundary loop of {len(angles)} vertices sum to {total:.4g} rad, too "
                 f"little to turn by {-missing:.4g} rad to a quantized cone angle; send a finer mesh.",
-                field=("boundary", "quantum"),
+                field=("quantum",),
             )
         return np.asarray(angles * (1 + missing / total))
     change = np.zeros_like(angles)
@@ -103,3 +142,19 @@ def spread_evenly(angles: Floats, curvature: float) -> Floats:
         change[capped] = -angles[capped] / 2
         open_ &= ~capped
     return np.asarray(angles + change)
+
+
+def rounded_jointly(found: Floats, quantum: float, total: float) -> Floats:
+    """(k,) multiples of the quantum that add up to ``total``, as near to ``found`` (k,) as possible.
+
+    Where the total is no multiple, because of prescribed loops that are none, the last one takes the rest.
+    """
+    steps = np.round(found / quantum)
+    missing = round(total / quantum - float(steps.sum()))
+    order = np.argsort(np.sign(missing) * (steps - found / quantum), kind="stable")
+    steps += np.bincount(order[np.arange(abs(missing)) % len(found)], minlength=len(found)) * np.sign(missing)
+    rounded = steps * quantum
+    rest = total - float(rounded.sum())
+    if abs(rest) > SNAP:
+        rounded[-1] += rest
+    return np.asarray(rounded)

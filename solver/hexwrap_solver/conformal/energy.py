@@ -133,10 +133,13 @@ class Energy:
 
     def scale_of(self, x: Floats) -> Floats:
         """(n,) u from the unknowns."""
-        return np.concatenate([[0.0], x])[self.dof + 1]
+        u = np.concatenate([[0.0], x])[self.dof + 1]
+        return u if self.targets.offset is None else u + self.targets.offset
 
     def unknowns_of(self, u: Floats) -> Floats:
         """(n_dof,) the unknowns from u, which is shifted to vanish where it is pinned."""
+        if self.targets.offset is not None:
+            u = u - self.targets.offset
         pinned = np.flatnonzero(self.dof < 0)
         x = np.zeros(self.n_dof + 1)
         x[self.dof + 1] = u - u[pinned].mean()

@@ -1,4 +1,4 @@
-"""Unrolling a flat metric on an annulus (paper, Figure 4): positions, sheets, deck transformation."""
+"""Laying a flat metric out in the plane (paper, Figure 4): places, and the motions that close it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from scipy.sparse.csgraph import breadth_first_order
 from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints
 from hexwrap_solver.conformal.cut import Cut, cut_open
 from hexwrap_solver.conformal.energy import Corners
-from hexwrap_solver.conformal.types import Deck
+from hexwrap_solver.conformal.net import Net
+from hexwrap_solver.conformal.types import Deck, Unrolled
 from hexwrap_solver.surface.topology import next_half_edge
 from hexwrap_solver.surface.types import Surface
 
@@ -29,28 +30,42 @@ NO_TRANSLATION = 1e-10
 
 @dataclass(frozen=True)
 class Layout:
-    """uv: (n,) complex. sheet: (m, 3). closing_error: greatest disagreement around the annulus, relative
-    to the circumference. The other fields as in ConformalMap."""
+    """closing_error: greatest disagreement across the cut, relative to the circumference of an annulus, to
+    the diameter of any other domain."""
 
-    uv: Complexes
-    sheet: Ints
-    deck: Deck
-    circumference: float
+    domain: Unrolled | Net
     closing_error: float
 
 
-def lay_out(surface: Surface, lengths: Floats, metric: Corners, cone_angle: float) -> Layout:
-    """Develops the triangles over a breadth-first tree of the faces and closes the result with g.
+def lay_out(
+    surface: Surface, lengths: Floats, metric: Corners, curvature: Floats, cones: Ints | None = None
+) -> Layout:
+    """Develops the triangles over a breadth-first tree of the faces and closes the result along the cut.
 
     lengths, metric: (3, m) of the flat metric (row k: corner k, and the edge opposite to it).
-    cone_angle: K. g is one turn around the surface in the direction of loop 0 (surface on its left).
+    curvature: (b + c,) Σκ of every loop, and of the vertices ``cones`` (c,).
 
-    Cylinder: g moves along +x, loop 0 lies around y = 0 with the surface above. Cone: the apex is the
-    origin, and the sheet is symmetric to the positive y axis; where the apex is FAR away, the cut starts at 0
-    and g moves it along +x. K = 2πm, m ≠ 0: loop 0 is centred at 0.
+    Annuli: g is one turn around the surface in the direction of loop 0 (surface on its left). On a
+    cylinder it moves along +x, and loop 0 lies around y = 0 with the surface above. Cone: the apex is the
+    origin, and the sheet is symmetric to the positive y axis; where the apex is FAR away, the cut starts
+    at 0 and g moves it along +x. K = 2πm, m ≠ 0: loop 0 is centred at 0. All others: the middle of the
+    corners is 0, and they spread most along the x axis.
     """
-    cut = cut_open(surface)
-    return _close(surface, _develop(cut.twin, lengths, metric), cut, cone_angle)
+    nothing = np.zeros(0, dtype=np.int64)
+    cut = cut_open(surface, nothing if cones is None else cones)
+    place = _develop(cut.twin, lengths, metric)
+    # The holonomy of what lies beyond a piece, seen from its right, is a rotation by minus its curvature.
+    angle = -(cut.beyond @ curvature)
+    glued = _glue(surface, place, cut, angle)
+    if len(surface.loops) != 2 or len(curvature) != 2:
+        net = _upright_net(_net(surface, cut, glued, angle))
+        size = abs(net.corners).max()
+        return Layout(net, glued.disagreement / (2 * size))
+    deck = Deck(float(curvature[0]), complex(glued.translation[0]))
+    sheet = np.where(cut.fan > 0, 1, 0).reshape(-1, 3)
+    foot = int(surface.faces.ravel()[cut.left[0]])
+    uv, deck, circumference = normalise(surface, glued.place, sheet, deck, foot)
+    return Layout(Unrolled(uv, sheet, deck, circumference), glued.disagreement / circumference)
 
 
 def _develop(twin: Ints, lengths: Floats, metric: Corners) -> Complexes:
@@ -114,19 +129,98 @@ def _face_tree(twin: Ints) -> tuple[Ints, Ints, Ints, Ints]:
     return order, place[parent[order]], parent, corner
 
 
-def _close(surface: Surface, corners: Complexes, cut: Cut, cone_angle: float) -> Layout:
-    flat, n = surface.faces.T.ravel(), len(surface.vertices)
-    rotation = np.exp(1j * cone_angle)
-    on_left = cut.sheet.T.ravel() > 0
-    right = _mean_position(flat[~on_left], corners.ravel()[~on_left], n)
-    left = _mean_position(flat[on_left], corners.ravel()[on_left], n)[cut.path]
-    # left = e^{iK} right + t along the cut: t in least squares; what is left over is the closing error.
-    offsets = left - rotation * right[cut.path]
-    translation = complex(offsets.mean())
-    disagreement = float(np.abs(offsets - translation).max())
-    deck = Deck(cone_angle, translation)
-    uv, deck, circumference = normalise(surface, right, cut.sheet, deck, int(cut.path[0]))
-    return Layout(uv, cut.sheet, deck, circumference, disagreement / circumference)
+@dataclass(frozen=True)
+class _Glued:
+    """place: (n,) every vertex at home (see ``Cut.fan``). rotation, shift: (fans,) the motion from home to
+    each fan. translation: (p,) of the motion of each piece of the cut. disagreement: what is left of
+    closing."""
+
+    place: Complexes
+    rotation: Complexes
+    shift: Complexes
+    translation: Complexes
+    disagreement: float
+
+
+def _glue(surface: Surface, corners: Complexes, cut: Cut, angle: Floats) -> _Glued:
+    """Motions across the cut, and one place for every vertex.
+
+    The left side of each piece is M(right side), M rotates by a known ``angle`` (p,); its translation is
+    found in least squares.
+    """
+    n, fans = len(surface.vertices), int(cut.fan.max(initial=0)) + 1
+    flat = surface.faces.T.ravel()
+    fan = cut.fan.reshape(-1, 3).T.ravel()
+    away = fan > 0
+    home = _mean_position(flat[~away], corners.ravel()[~away], n)
+    copies = _mean_position(fan, corners.ravel(), fans)
+    if not len(cut.left):
+        return _Glued(home, np.ones(1, complex), np.zeros(1, complex), np.zeros(0, complex), 0.0)
+    right = surface.twin[cut.left]
+    # At both ends of every edge of the cut, the corners to its left and to its right, each pair of fans once.
+    corner = np.stack([cut.left, next_half_edge(cut.left)], axis=1).ravel()
+    opposite = np.stack([next_half_edge(right), right], axis=1).ravel()
+    _, first = np.unique(cut.fan[corner] * fans + cut.fan[opposite], return_index=True)
+    once = np.sort(first)
+    vertex = surface.faces.ravel()[corner[once]]
+    one, other = cut.fan[corner[once]], cut.fan[opposite[once]]
+    piece = np.repeat(cut.piece, 2)[once]
+    turn = np.exp(1j * angle)
+    at_left = np.where(one > 0, copies[one], home[vertex])
+    at_right = np.where(other > 0, copies[other], home[vertex])
+    offset = at_left - turn[piece] * at_right
+    translation = _mean_position(piece, offset, len(angle))
+    disagreement = float(np.abs(offset - translation[piece]).max())
+    rotation, shift = _from_home(one, other, turn[piece], translation[piece], fans)
+    return _Glued(home, rotation, shift, translation, disagreement)
+
+
+def _from_home(
+    left: Ints, right: Ints, turn: Complexes, step: Complexes, fans: int
+) -> tuple[Complexes, Complexes]:
+    """(fans,) rotation and (fans,) shift of the motion from home, fan 0, to every fan. left, right: (k,) fans
+    at both sides of the cut; the motion z ↦ turn z + step leads from right to left."""
+    rotation, shift = np.ones(fans, dtype=complex), np.zeros(fans, dtype=complex)
+    known = np.zeros(fans, dtype=bool)
+    known[0] = True
+    while not known.all():
+        on = known[right] & ~known[left]
+        rotation[left[on]] = turn[on] * rotation[right[on]]
+        shift[left[on]] = turn[on] * shift[right[on]] + step[on]
+        back = known[left] & ~known[right]
+        rotation[right[back]] = np.conj(turn[back]) * rotation[left[back]]
+        shift[right[back]] = np.conj(turn[back]) * (shift[left[back]] - step[back])
+        known[left[on]] = known[right[back]] = True
+    return rotation, shift
+
+
+def _net(surface: Surface, cut: Cut, glued: _Glued, angle: Floats) -> Net:
+    twin, fan = surface.twin, cut.fan
+    corners = glued.rotation[fan] * glued.place[surface.faces.ravel()] + glued.shift[fan]
+    pieces = len(angle)
+    crossing = np.zeros(len(twin), dtype=np.int64)
+    crossing[cut.left] = 1 + 2 * cut.piece
+    crossing[twin[cut.left]] = 2 + 2 * cut.piece
+    turn = np.exp(1j * angle)
+    both = np.stack([glued.translation, -np.conj(turn) * glued.translation], axis=1)
+    inverse = np.arange(2 * pieces + 1)
+    inverse[1::2], inverse[2::2] = inverse[2::2].copy(), inverse[1::2].copy()
+    return Net(
+        corners.reshape(-1, 3),
+        np.where(twin >= 0, twin // 3, -1).reshape(-1, 3),
+        crossing.reshape(-1, 3),
+        np.concatenate([[0.0], np.stack([angle, -angle], axis=1).ravel()]),
+        np.concatenate([[0.0], both.ravel()]),
+        inverse,
+    )
+
+
+def _upright_net(net: Net) -> Net:
+    """Its middle at 0, its longest direction along the x axis."""
+    middle = complex(net.corners.mean())
+    spread = complex(((net.corners - middle) ** 2).mean())
+    turn = np.exp(-0.5j * np.angle(spread)) if abs(spread) > 0 else 1.0
+    return net.moved(turn, -turn * middle)
 
 
 def _mean_position(vertex: Ints, position: Complexes, n: int) -> Complexes:

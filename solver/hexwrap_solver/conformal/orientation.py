@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexwrap_solver.arrays import Bools, Complexes, Floats
+from hexwrap_solver.conformal.net import Net
 from hexwrap_solver.conformal.types import ConformalMap
 
 #: Corners are good to a few roundings of their distance from the origin.
@@ -35,6 +36,7 @@ def misdrawn(found: ConformalMap) -> Bools:
     if turned.any():
         return np.asarray(turned)
     told = np.full(len(found.surface.vertices), 2 * np.pi)
+    told[found.cones.vertex] -= found.cones.curvature
     for loop, angles in zip(found.surface.loops, found.boundary_angles, strict=True):
         told[loop] = angles
     here, one, two = corners, np.roll(corners, -1, axis=1), np.roll(corners, -2, axis=1)
@@ -45,16 +47,17 @@ def misdrawn(found: ConformalMap) -> Bools:
 
 
 def faithful(found: ConformalMap) -> bool:
-    """Whether the angles drawn at the boundary add up to ``boundary_angles``, and these to the cone angle."""
+    """Whether the angles drawn at the boundary add up to ``boundary_angles``, those at cones to their
+    angle, and these to the curvatures of loops."""
     sums, _ = _drawn(found)
-    return bool(_off_told(found, sums).max() <= ANGLE and _off_turn(found, sums) <= TURN)
+    return bool(_off_told(found, sums).max(initial=0.0) <= ANGLE and _off_turn(found, sums) <= TURN)
 
 
 @dataclass(frozen=True)
 class DrawnErrors:
     """angle: how far the angles drawn at the boundary are off ``boundary_angles``, beyond the rounding of
-    corners, which short edges far from the origin cannot do without. turn: how far the first loop is from
-    turning by the cone angle, per √n of its n vertices: as single roundings add up."""
+    corners, which short edges far from the origin cannot do without. turn: how far the loops are from turning
+    by their curvature, per √n of their n vertices: as single roundings add up."""
 
     angle: float
     turn: float
@@ -63,24 +66,29 @@ class DrawnErrors:
 def drawn_errors(found: ConformalMap) -> DrawnErrors:
     """Of a map as drawn, radians."""
     sums, rounding = _drawn(found)
-    return DrawnErrors(float((_off_told(found, sums) - rounding).max()), _off_turn(found, sums))
+    angle = float((_off_told(found, sums) - rounding).max(initial=0.0))
+    return DrawnErrors(angle, _off_turn(found, sums))
 
 
 def _off_told(found: ConformalMap, sums: Floats) -> Floats:
-    return np.asarray(np.abs(sums - np.concatenate(found.boundary_angles)))
+    told = np.concatenate([*found.boundary_angles, 2 * np.pi - found.cones.curvature])
+    return np.asarray(np.abs(sums - told))
 
 
 def _off_turn(found: ConformalMap, sums: Floats) -> float:
+    """Where the curvature is known from elsewhere: of loop 0 of an annulus."""
+    if isinstance(found.domain, Net):
+        return 0.0
     n = len(found.surface.loops[0])
     return abs(float((np.pi - sums[:n]).sum()) - found.deck.angle) / float(np.sqrt(n))
 
 
 def _drawn(found: ConformalMap) -> tuple[Floats, Floats]:
-    """(b,) angle sums of the vertices on both loops as drawn, and (b,) what the rounding of corners may do to
-    them."""
-    faces, loops = found.surface.faces, np.concatenate(found.surface.loops)
+    """(b,) angle sums of the vertices on all loops, and of the cones, as drawn, and (b,) what the rounding of
+    corners may do to them."""
+    faces, some = found.surface.faces, np.concatenate([*found.surface.loops, found.cones.vertex])
     inner = np.ones(len(found.surface.vertices), dtype=bool)
-    inner[loops] = False
+    inner[some] = False
     face, c = np.nonzero(~inner[faces])
     corners = found.corners()[face]
     k = np.arange(len(face))
@@ -90,4 +98,4 @@ def _drawn(found: ConformalMap) -> tuple[Floats, Floats]:
     rounding = np.zeros(len(inner))
     shortest = np.maximum(np.minimum(np.abs(a), np.abs(b)), np.finfo(float).tiny)
     np.maximum.at(rounding, faces[face, c], CORNER * np.abs(here) / shortest)
-    return sums[loops], rounding[loops]
+    return sums[some], rounding[some]

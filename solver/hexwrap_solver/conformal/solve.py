@@ -1,4 +1,4 @@
-"""The periodic conformal map of an annulus (paper, section 3)."""
+"""The discrete conformal map of a surface (paper, section 3)."""
 
 from __future__ import annotations
 
@@ -11,11 +11,23 @@ from hexwrap_solver.conformal import boundary
 from hexwrap_solver.conformal.corners import boundary_angles
 from hexwrap_solver.conformal.energy import Energy
 from hexwrap_solver.conformal.layout import lay_out
+from hexwrap_solver.conformal.net import Net
 from hexwrap_solver.conformal.newton import Minimum, minimise
+from hexwrap_solver.conformal.openings import cut_openings
 from hexwrap_solver.conformal.orientation import faithful, positive
 from hexwrap_solver.conformal.robust import FlatMetric, metric_with_flips, solve_with_flips, with_inserted
-from hexwrap_solver.conformal.span import MAX_SPAN, check_reach, check_span
-from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap, Deck, Targets
+from hexwrap_solver.conformal.span import MAX_SPAN, check_reach, check_span, cone_angle_of
+from hexwrap_solver.conformal.types import (
+    QUANTA,
+    BoundaryCondition,
+    Cones,
+    ConformalMap,
+    Deck,
+    Targets,
+    Unrolled,
+)
+from hexwrap_solver.errors import SingularitiesError
+from hexwrap_solver.surface.holes import fill_openings
 from hexwrap_solver.surface.types import Surface
 
 #: Cone angles this near to a multiple of the quantum are one, radians.
@@ -27,48 +39,96 @@ NO_ANGLES = (
 
 
 def conformal_map(
-    surface: Surface, condition: BoundaryCondition, progress: Progress = no_progress
+    surface: Surface,
+    condition: BoundaryCondition,
+    progress: Progress = no_progress,
+    cones: Cones | None = None,
 ) -> ConformalMap:
-    """Maps an annulus to a cylinder or cone of revolution, unrolled.
+    """Maps a surface of genus 0 to a flat domain: an annulus to a cylinder or cone of revolution, unrolled,
+    any other surface, and one with singularities, to a net. Openings to be cut are filled before and cut out
+    afterwards.
 
     The domain has the surface's scale: the area-weighted mean of u is 0, or, with an isometric boundary,
-    the length-weighted mean of u along the boundary.
-    Raises RequestError (boundary condition), ConvergenceError.
+    the length-weighted mean of u along the isometric loops.
+    Raises RequestError (boundary condition, singularities), ConvergenceError.
     """
-    if condition.mode == "isometric":
-        return _isometric(surface, condition, progress)
-    targets = boundary.straight(surface)
-    notes: tuple[str, ...] = ()
-    if condition.mode == "angles":
-        targets = boundary.prescribed(surface, boundary_angles(surface, condition))
-        if condition.angles is None or not len(condition.angles):
-            notes = (NO_ANGLES,)
-    found = _map(surface, targets, None, progress)
-    found = replace(found, notes=(*notes, *found.notes))
-    return _scaled(found, -_mean_on_area(found.surface, found.log_scale))
+    if surface.openings:
+        return cut_openings(conformal_map(fill_openings(surface), condition, progress, cones), surface)
+    cones = Cones.none() if cones is None else cones
+    check_cones(surface, cones)
+    angles = boundary_angles(surface, condition, cones)
+    found = _isometric(surface, condition, angles, cones, progress)
+    if found is None:
+        targets = boundary.targets(surface, [a for a in angles if a is not None], cones)
+        found = map_to(surface, targets, cones, None, progress)
+        found = scaled(found, -_mean_on_area(found.surface, found.log_scale))
+    if condition.mode == "angles" and not condition.angles:
+        found = replace(found, notes=(NO_ANGLES, *found.notes))
+    return found
 
 
-def _isometric(surface: Surface, condition: BoundaryCondition, progress: Progress) -> ConformalMap:
-    """The paper's two steps: u = 0 on the boundary, then again with the cone angle rounded to the quantum."""
-    targets = boundary.isometric(surface)
-    if condition.quantum is None:
-        return _map(surface, targets, None, progress)
+def check_cones(surface: Surface, cones: Cones) -> None:
+    """Raises SingularitiesError for cones on the boundary, two at one vertex, and angles of 0 or less."""
+    sent = surface.input_vertex[cones.vertex]
+    inner = np.ones(len(surface.vertices), dtype=bool)
+    for loop in surface.loops:
+        inner[loop] = False
+    outside = np.flatnonzero(~inner[cones.vertex])
+    if len(outside):
+        raise SingularitiesError(
+            f"Singularity {outside[0]} stands at vertex {sent[outside[0]]} of the boundary: singularities "
+            "lie inside; list an angle there instead.",
+            vertices=sent[outside],
+            field=("at", int(outside[0])),
+        )
+    if len(np.unique(cones.vertex)) < len(cones):
+        raise SingularitiesError("Two singularities stand at one vertex of the mesh; place them apart.")
+    sharp = np.flatnonzero(cones.curvature >= 2 * np.pi - NOISE)
+    if len(sharp):
+        raise SingularitiesError(
+            f"Singularity {sharp[0]} has index {cones.index[sharp[0]]}, which would leave nothing of the "
+            f"angle of 360° around it; with a quantum of {np.degrees(cones.quantum):.4g}° it must be less "
+            f"than {round(2 * np.pi / cones.quantum)}.",
+            vertices=sent[sharp],
+            field=("at", int(sharp[0]), "index"),
+        )
+
+
+def _isometric(
+    surface: Surface,
+    condition: BoundaryCondition,
+    angles: tuple[Floats | None, ...],
+    cones: Cones,
+    progress: Progress,
+) -> ConformalMap | None:
+    """The paper's two steps: u = 0 on the isometric loops, then again with their curvatures rounded to the
+    quantum. None where no loop is isometric."""
+    free = [i for i, listed in enumerate(angles) if listed is None]
+    if not free:
+        return None
+    asked: list[boundary.LoopTarget] = ["isometric" if listed is None else listed for listed in angles]
+    targets = boundary.targets(surface, asked, cones)
+    total = boundary.gauss_bonnet(surface) - float(cones.curvature.sum())
+    total -= sum(boundary.cone_angle(listed) for listed in angles if listed is not None)
+    quantum = QUANTA.get(condition.quantum)
+    if quantum is None or len(free) == 1:  # what Gauss–Bonnet leaves to a single loop cannot be rounded
+        found = map_to(surface, targets, cones, None, progress)
+        return found if quantum is None else scaled(found, -_mean_on(found, free))
     plain = _plain(surface, targets, None, _part(progress, 0.0))
     first = plain.metric if plain.holds else metric_with_flips(surface, targets, progress, plain.start)
     inserted = len(first.surface.vertices) - len(surface.vertices)
-    surface, loops = first.surface, first.surface.loops
-    angles = first.sums[loops[0]], first.sums[loops[1]]
-    found = (boundary.cone_angle(angles[0]) - boundary.cone_angle(angles[1])) / 2
-    rounded = boundary.nearest_multiple(found, condition.quantum)
-    if condition.spread == "optimal":
-        targets = boundary.constant_on_loops(surface, rounded)
-    else:
-        spread = boundary.spread_evenly
-        targets = boundary.prescribed(surface, (spread(angles[0], rounded), spread(angles[1], -rounded)))
-    second = _map(surface, targets, first.u, _part(progress, 0.5), flips=not plain.holds)
-    second = _scaled(second, -_mean_on_boundary(second.surface, second.log_scale))
-    second = with_inserted(second, inserted)
-    return replace(second, notes=(*_rounding_notes(found, rounded), *second.notes))
+    surface = first.surface
+    sums = [first.sums[loop] for loop in surface.loops]
+    curvature = np.array([boundary.cone_angle(sums[i]) for i in free])
+    curvature -= (curvature.sum() - total) / len(free)
+    rounded = boundary.rounded_jointly(curvature, quantum, total)
+    asked = [first.targets.angle[loop] for loop in surface.loops]
+    for i, K in zip(free, rounded, strict=True):
+        asked[i] = float(K) if condition.spread == "optimal" else boundary.spread_evenly(sums[i], K)
+    targets = boundary.targets(surface, asked, cones)
+    second = map_to(surface, targets, cones, first.u, _part(progress, 0.5), flips=not plain.holds)
+    second = with_inserted(scaled(second, -_mean_on(second, free)), inserted)
+    return replace(second, notes=(*_rounding_notes(surface, free, curvature, rounded), *second.notes))
 
 
 def _part(progress: Progress, begin: float) -> Progress:
@@ -76,13 +136,21 @@ def _part(progress: Progress, begin: float) -> Progress:
     return lambda fraction, what: progress(begin + fraction / 2, what)
 
 
-def _rounding_notes(found: float, rounded: float) -> tuple[str, ...]:
-    if abs(found - rounded) <= NOISE:
+def _rounding_notes(surface: Surface, free: list[int], found: Floats, rounded: Floats) -> tuple[str, ...]:
+    changed = np.flatnonzero(np.abs(found - rounded) > NOISE)
+    if not len(changed):
         return ()
-    shape = "a cylinder" if rounded == 0 else f"a cone angle of {np.degrees(rounded):.6g}°"
-    return (
-        f"The isometric boundary has a cone angle of {np.degrees(found):.4g}°; the domain was given {shape}.",
-    )
+    if len(surface.loops) == 2 == len(free):
+        shape = "a cylinder" if rounded[0] == 0 else f"a cone angle of {np.degrees(rounded[0]):.6g}°"
+        return (
+            f"The isometric boundary has a cone angle of {np.degrees(found[0]):.4g}°; the domain was given "
+            f"{shape}.",
+        )
+    told = [
+        f"{np.degrees(found[i]):.4g}° to {np.degrees(rounded[i]):.6g}° on loop {free[i]}" for i in changed[:4]
+    ]
+    more = f" and {len(changed) - 4} more" if len(changed) > 4 else ""
+    return (f"Curvatures of the isometric loops were rounded from {', '.join(told)}{more}.",)
 
 
 @dataclass(frozen=True)
@@ -100,7 +168,8 @@ class _Plain:
 
     @property
     def metric(self) -> FlatMetric:
-        return FlatMetric(self.surface, self.minimum.u, self.energy.angle_sums(self.minimum.corners))
+        sums = self.energy.angle_sums(self.minimum.corners)
+        return FlatMetric(self.surface, self.minimum.u, sums, self.energy.targets)
 
     @property
     def start(self) -> Floats | None:
@@ -114,60 +183,57 @@ def _plain(surface: Surface, targets: Targets, start: Floats | None, progress: P
         return _Plain(surface, energy, minimise(energy, start, progress))
 
 
-def _map(
-    surface: Surface, targets: Targets, start: Floats | None, progress: Progress, flips: bool = False
+def map_to(
+    surface: Surface,
+    targets: Targets,
+    cones: Cones,
+    start: Floats | None = None,
+    progress: Progress = no_progress,
+    flips: bool = False,
 ) -> ConformalMap:
-    """On the triangles as they are where that works; with flips where it does not, where triangles turn over
-    in the layout (be it by rounding), or from the beginning. With free u its scale is arbitrary."""
+    """The map of given targets, which hold the cones' angles: on the triangles as they are where that works;
+    with flips where it does not, where triangles turn over in the layout (be it by rounding), or from the
+    beginning. start: (n,) u to start from. With free u its scale is arbitrary. Raises ConvergenceError."""
     if not flips:
         plain = _plain(surface, targets, start, progress)
         if plain.holds:
-            found = _finish(plain)
+            found = _finish(plain, cones)
             if positive(found.corners()).all() and faithful(found):
                 return found
         start = start if plain.start is None else plain.start
-    return solve_with_flips(surface, targets, progress, start)
+    return solve_with_flips(surface, targets, progress, start, cones)
 
 
-def _scaled(found: ConformalMap, shift: float) -> ConformalMap:
+def scaled(found: ConformalMap, shift: float) -> ConformalMap:
     """The same map with a domain e^shift times as large. Raises ConvergenceError beyond all doubles."""
     u = found.log_scale + shift
-    check_reach(u, found.deck.angle)
     factor = float(np.exp(shift))
-    return replace(
-        found,
-        log_scale=u,
-        uv=found.uv * factor,
-        deck=Deck(found.deck.angle, found.deck.translation * factor),
-        circumference=found.circumference * factor,
-    )
+    domain = found.domain
+    if isinstance(domain, Net):
+        check_reach(u, None)
+        return replace(found, log_scale=u, domain=domain.moved(factor, 0.0))
+    check_reach(u, domain.deck.angle)
+    deck = Deck(domain.deck.angle, domain.deck.translation * factor)
+    larger = Unrolled(domain.uv * factor, domain.sheet, deck, domain.circumference * factor)
+    return replace(found, log_scale=u, domain=larger)
 
 
-def _finish(plain: _Plain) -> ConformalMap:
+def _finish(plain: _Plain, cones: Cones) -> ConformalMap:
     """Layout and everything measured on the result."""
     surface, energy, minimum, u = plain.surface, plain.energy, plain.minimum, plain.minimum.u
     sums = energy.angle_sums(minimum.corners)
-    pinned = bool((energy.targets.tie == 0).any())
-    known = sums if pinned else energy.targets.angle
-    angle = boundary.cone_angle_of(energy.targets, known, surface)
-    check_span(u, angle)
-    layout = lay_out(
-        surface,
-        energy.scaled_lengths(u),
-        minimum.corners,
-        angle,
-    )
+    curvature = boundary.curvatures(energy.targets, sums, surface, cones)
+    check_span(u, cone_angle_of(surface, curvature))
+    layout = lay_out(surface, energy.scaled_lengths(u), minimum.corners, curvature, cones.vertex)
     return ConformalMap(
         surface=surface,
         log_scale=u,
-        uv=layout.uv,
-        sheet=layout.sheet,
-        deck=layout.deck,
-        boundary_angles=(sums[surface.loops[0]], sums[surface.loops[1]]),
-        circumference=layout.circumference,
+        domain=layout.domain,
+        boundary_angles=tuple(sums[loop] for loop in surface.loops),
         iterations=minimum.iterations,
         residual=minimum.residual,
         closing_error=layout.closing_error,
+        cones=cones,
     )
 
 
@@ -180,10 +246,12 @@ def _mean_on_area(surface: Surface, u: Floats) -> float:
     return float(area @ (u[a] + u[b] + u[c]) / (3 * area.sum()))
 
 
-def _mean_on_boundary(surface: Surface, u: Floats) -> float:
-    """Length-weighted mean of u along both loops: boundary lengths are kept on average."""
+def _mean_on(found: ConformalMap, loops: list[int]) -> float:
+    """Length-weighted mean of u along some loops: boundary lengths are kept on average."""
+    surface, u = found.surface, found.log_scale
     total, weight = 0.0, 0.0
-    for loop in surface.loops:
+    for i in loops:
+        loop = surface.loops[i]
         following = np.roll(loop, -1)
         length = np.linalg.norm(surface.vertices[following] - surface.vertices[loop], axis=1)
         total += float(length @ (u[loop] + u[following]) / 2)

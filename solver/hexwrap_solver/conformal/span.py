@@ -8,6 +8,7 @@ import numpy as np
 
 from hexwrap_solver.arrays import Floats
 from hexwrap_solver.errors import ConvergenceError
+from hexwrap_solver.surface.types import Surface
 
 #: The largest difference of u that a layout in double precision can show where places have no centre: e^36
 #: is 4e15.
@@ -22,12 +23,20 @@ WIDE = 11.5
 CLEAR = 1e-3
 
 
-def largest_span(cone_angle: float) -> float:
+def cone_angle_of(surface: Surface, curvature: Floats) -> float | None:
+    """K of an annulus without cones, from the curvatures of its loops; None of all other surfaces: their
+    domains have no centre."""
+    return float(curvature[0]) if len(surface.loops) == 2 == len(curvature) else None
+
+
+def largest_span(cone_angle: float | None) -> float:
     """The largest difference of u that a domain of this cone angle can show."""
+    if cone_angle is None:
+        return MAX_SPAN
     return 2 * MAX_REACH if abs(math.remainder(cone_angle, 2 * math.pi)) > CLEAR else MAX_SPAN
 
 
-def check_span(u: Floats, cone_angle: float) -> None:
+def check_span(u: Floats, cone_angle: float | None) -> None:
     """Raises ConvergenceError where the domain would have finer parts than its coordinates have digits."""
     span = float(np.ptp(u))
     most = largest_span(cone_angle)
@@ -36,14 +45,16 @@ def check_span(u: Floats, cone_angle: float) -> None:
         raise ConvergenceError(_sentence(span, cone_angle, f"more than {held} can tell apart"))
 
 
-def check_reach(u: Floats, cone_angle: float) -> None:
+def check_reach(u: Floats, cone_angle: float | None) -> None:
     """Raises ConvergenceError where lengths or areas in the domain would leave the range of doubles."""
     if float(np.abs(u).max()) > MAX_REACH:
         span = float(np.ptp(u))
         raise ConvergenceError(_sentence(span, cone_angle, "beyond the range of double precision"))
 
 
-def failure(span: float, cone_angle: float, what: str, advice: str, vertices: list[int]) -> ConvergenceError:
+def failure(
+    span: float, cone_angle: float | None, what: str, advice: str, vertices: list[int]
+) -> ConvergenceError:
     """Why a map has not come out right: because of its span of u where that is wide, or else ``what``, with
     ``advice``."""
     sentence = f"{what}: {advice}."
@@ -52,10 +63,13 @@ def failure(span: float, cone_angle: float, what: str, advice: str, vertices: li
     return ConvergenceError(sentence, vertices=vertices)
 
 
-def _sentence(span: float, cone_angle: float, why: str) -> str:
-    angles = "boundary angles nearer to 180°" if abs(cone_angle) < CLEAR else "a smaller cone angle"
+def _sentence(span: float, cone_angle: float | None, why: str) -> str:
+    which, angles = "", "boundary angles nearer to 180°, or another place for singularities"
+    if cone_angle is not None:
+        which = f" (cone angle {np.degrees(cone_angle):.4g}°)"
+        angles = "boundary angles nearer to 180°" if abs(cone_angle) < CLEAR else "a smaller cone angle"
     return (
-        f"Under this boundary condition (cone angle {np.degrees(cone_angle):.4g}°) the map would shrink "
+        f"Under this boundary condition{which} the map would shrink "
         f"some parts of the surface about 10^{span / np.log(10):.0f} times as much as others, {why}; ask for "
         f"{angles}, or cut the surface where it is long and thin."
     )

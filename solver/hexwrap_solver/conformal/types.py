@@ -1,20 +1,68 @@
-"""Boundary conditions and the map they lead to (paper, section 3)."""
+"""Boundary conditions, singularities and the map they lead to (paper, section 3)."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 
 from hexwrap_solver.arrays import Complexes, Floats, Ints
+from hexwrap_solver.conformal.net import Net
+from hexwrap_solver.errors import SettingError
+from hexwrap_solver.setting import Setting
 from hexwrap_solver.surface.types import Surface
 
 AngleUnit = Literal["rad", "deg", "pi"]
 #: Radians of one unit.
 ANGLE_UNITS: dict[AngleUnit, float] = {"rad": 1.0, "deg": np.pi / 180, "pi": np.pi}
+Quantum = Literal["auto", "hex", "triangle", "quad", "none"]
+#: Names of the quanta (π/3 and π/2) that the cone angle of a pattern must be a multiple of.
+QUANTUM_OF: dict[str, Quantum] = {"hex": "hex", "triangle": "hex", "quad": "quad"}
+QUANTA: dict[Quantum, float] = {"hex": np.pi / 3, "triangle": np.pi / 3, "quad": np.pi / 2}
+
+
+@dataclass(frozen=True)
+class BoundaryAngle:
+    """A target angle sum, radians, at a boundary vertex: the one of this index in the sent mesh, or the one
+    nearest to a point. Raises SettingError unless exactly one of the two is given."""
+
+    angle: Annotated[float, Setting("target angle sum", unit="angle")]
+    vertex: Annotated[
+        int | None, Setting("boundary vertex, an index of the sent mesh", ge=0, lt=2**53, unit="vertex")
+    ] = None
+    point: Annotated[
+        tuple[float, float, float] | None, Setting("instead: the boundary vertex nearest to this point")
+    ] = None
+
+    def __post_init__(self) -> None:
+        if (self.vertex is None) == (self.point is None):
+            raise SettingError("give either 'vertex' or 'point'")
+
+
+BoundaryMode = Literal["straight", "angles", "isometric"]
+
+
+@dataclass(frozen=True)
+class LoopCondition:
+    """What one loop is asked for: the one of this number, or the one nearest to a point. Raises SettingError
+    unless exactly one of the two is given."""
+
+    mode: Annotated[BoundaryMode, Setting("what this loop becomes in the domain")]
+    loop: Annotated[int | None, Setting("number of the loop", ge=0, lt=2**31)] = None
+    point: Annotated[
+        tuple[float, float, float] | None, Setting("instead: the loop nearest to this point")
+    ] = None
+    angles: Annotated[
+        tuple[BoundaryAngle, ...],
+        Setting("target angles at vertices of this loop, for mode angles", most=10_000),
+    ] = ()
+
+    def __post_init__(self) -> None:
+        if (self.loop is None) == (self.point is None):
+            raise SettingError("give either 'loop' or 'point'")
 
 
 @dataclass(frozen=True)
@@ -22,38 +70,92 @@ class BoundaryCondition:
     """Paper, section 3.1.
 
     mode ``straight``: every boundary angle is π. ``angles``: the listed ones, π elsewhere.
-    ``isometric``: boundary lengths kept up to scale, the cone angle rounded to a multiple of quantum.
-    vertices: (k,) *sent* vertex indices, −1 where points gives a place instead. points: (k, 3).
-    angles: (k,) radians. unit: in which problems tell of them and give an example.
-    quantum: π/3, π/2, or None to leave the cone angle as it comes.
+    ``isometric``: boundary lengths kept up to scale, each loop's curvature rounded to a multiple of quantum.
+    Openings (loops from the third on) on which no angle is listed are isometric in every mode: they cannot
+    be straight, for they turn by −2π.
+    quantum: π/3, π/2 or none, by the pattern that is meant; ``auto``: that of the pattern that is laid.
     spread: how ``isometric`` distributes the rounding: ``even`` (the paper) or ``optimal`` (u constant on
-    each loop).
+    each loop). angle_unit: in which problems give angles; the same condition whatever it is.
     """
 
-    mode: Literal["straight", "angles", "isometric"] = "straight"
-    vertices: Ints | None = None
-    points: Floats | None = None
-    angles: Floats | None = None
-    unit: AngleUnit = "rad"
-    quantum: float | None = None
-    spread: Literal["even", "optimal"] = "even"
+    mode: Annotated[BoundaryMode, Setting("what the boundary becomes in the domain")] = "straight"
+    angles: Annotated[
+        tuple[BoundaryAngle, ...], Setting("target angles at boundary vertices, for mode angles", most=10_000)
+    ] = ()
+    angle_unit: Annotated[AngleUnit, Setting("unit of the angles", rare=True)] = field(
+        default="rad", compare=False
+    )
+    quantum: Annotated[Quantum, Setting("what the cone angle is a multiple of", rare=True)] = "auto"
+    spread: Annotated[
+        Literal["even", "optimal"], Setting("how an isometric boundary takes up the rounding", rare=True)
+    ] = "even"
+    loops: Annotated[
+        tuple[LoopCondition, ...], Setting("conditions of single loops, instead of the mode", rare=True)
+    ] = ()
+
+    def adapted(self, kind: str | None) -> BoundaryCondition:
+        """The condition for a pattern of this kind (None: no pattern), without what has no effect on the map:
+        equal for equal maps."""
+        name = self.quantum if self.quantum != "auto" else (kind or "none")
+        return replace(
+            self,
+            quantum=QUANTUM_OF.get(name, "none"),
+            angles=self.angles if self.mode == "angles" else (),
+        )
+
+
+@dataclass(frozen=True)
+class Cones:
+    """Singularities of the metric: vertices inside whose angle sum is not 2π.
+
+    vertex: (c,). index: (c,) k; the angle sum is 2π − k · quantum: one side fewer for k = 1 (a pentagon in a
+    pattern of hexagons), one more for k = −1. quantum: radians. moved: (c,) how far each one was moved on the
+    surface from where it was wanted, model units.
+    """
+
+    vertex: Ints
+    index: Ints
+    quantum: float
+    moved: Floats
+
+    @classmethod
+    def none(cls) -> Cones:
+        nothing = np.zeros(0, dtype=np.int64)
+        return cls(nothing, nothing, np.pi / 3, np.zeros(0))
+
+    @classmethod
+    def at(cls, vertex: Ints, index: Ints, quantum: float) -> Cones:
+        """Where they were wanted."""
+        return cls(vertex, index, quantum, np.zeros(len(vertex)))
+
+    @property
+    def curvature(self) -> Floats:
+        """(c,) 2π minus the angle sum, radians."""
+        return np.asarray(self.index * self.quantum)
+
+    def __len__(self) -> int:
+        return len(self.vertex)
 
 
 @dataclass(frozen=True)
 class Targets:
     """What the variational problem prescribes at each vertex; both routes (plain, flips) take it.
 
-    angle: (n,) target angle sums Θ: 2π inside, as wanted on the boundary (ignored where tie ≥ 0).
-    tie: (n,) −1 where u is free; vertices with equal tie ≥ 0 share one value of u. Tie 0 is pinned at u = 0.
+    angle: (n,) target angle sums Θ: 2π inside but at cones, as wanted on the boundary (ignored where
+    tie ≥ 0).
+    tie: (n,) −1 where u is free; vertices with equal tie ≥ 0 share one unknown c, and u = c + offset. Tie
+    0 is pinned at c = 0.
     tie_angle: (t,) prescribed *sum* of the angle sums over the vertices of each tie (entry 0 is ignored).
+    offset: (n,) fixed part of u, 0 by default; it matters on ties only.
 
     Prescribed angles everywhere: all ties −1 (u is then determined up to a constant). Isometric boundary:
-    both loops have tie 0. Least stretch at given cone angle: loop 0 has tie 0, loop 1 tie 1.
+    all loops have tie 0. Least stretch at given curvatures: loop b has tie b.
     """
 
     angle: Floats
     tie: Ints
     tie_angle: Floats
+    offset: Floats | None = None
 
 
 @dataclass(frozen=True)
@@ -104,50 +206,121 @@ class Deck:
 
 
 @dataclass(frozen=True)
+class Unrolled:
+    """The domain of an annulus without cones: one sheet, and the deck transformation that repeats it.
+
+    uv: (n,) complex; each vertex once, in one unrolled sheet.
+    sheet: (m, 3); corner c of face f stands at g^{sheet[f,c]}(uv[faces[f,c]]); every face is then a
+    positively oriented triangle.
+    circumference: length of one turn: |translation| on a cylinder; on a cone |K| × apex distance of its
+    middle ring (the geometric mean of the loops' mean distances); on a ring without an apex (K = 2πm), or
+    one that does not run around it (K near 2πm), the geometric mean of the loops' lengths.
+    """
+
+    uv: Complexes
+    sheet: Ints
+    deck: Deck
+    circumference: float
+
+    def corners(self, faces: Ints) -> Complexes:
+        """(m, 3) where the corners of every face stand."""
+        corners = self.uv[faces]
+        moved = self.sheet != 0
+        corners[moved] = self.deck.apply(corners[moved], self.sheet[moved])
+        return corners
+
+    def net(self, surface: Surface) -> Net:
+        """The same as a net; its motions are powers of the deck transformation."""
+        twin = surface.twin
+        inner = twin >= 0
+        # The tail of a half-edge is the head of its twin: both must name the same copy of the vertex.
+        head = np.roll(self.sheet, -1, axis=1).ravel()
+        shift = np.where(inner, self.sheet.ravel() - head[twin], 0)
+        most = int(np.abs(shift).max(initial=0))
+        powers, inverses = np.arange(1, most + 1), np.arange(most + 1, 2 * most + 1)
+        winding = np.concatenate([[0], powers, -powers])
+        return Net(
+            self.corners(surface.faces),
+            np.where(inner, twin // 3, -1).reshape(-1, 3),
+            np.where(shift >= 0, shift, most - shift).reshape(-1, 3),
+            self.deck.angle * winding,
+            self.deck.power(winding)[1],
+            np.concatenate([[0], inverses, powers]),
+            winding,
+        )
+
+
+@dataclass(frozen=True)
 class ConformalMap:
-    """A discrete periodic parameterization (paper, definition 1), unrolled.
+    """A discrete conformal map onto a plane domain whose edges are glued by motions (paper, definition 1).
 
     surface: the mesh that was solved (with inserted vertices where that was needed).
     log_scale: (n,) u; new edge lengths are e^{(u_i+u_j)/2}·l_ij where flips = 0. At inserted vertices the
     factor of the map there.
-    uv: (n,) complex; each vertex once, in one unrolled sheet.
-    sheet: (m, 3); corner c of face f stands at g^{sheet[f,c]}(uv[faces[f,c]]); every face is then a
-    positively oriented triangle.
+    domain: the sheet of a cylinder or cone; of all other surfaces a net.
     boundary_angles: per loop, angle sums in the domain, aligned with surface.loops.
-    circumference: length of one turn: |translation| on a cylinder; on a cone |K| × apex distance of its
-    middle ring (the geometric mean of the loops' mean distances); on a ring without an apex (K = 2πm), or
-    one that does not run around it (K near 2πm), the geometric mean of the loops' lengths.
     residual: max |angle sum − target|. flips: number of edges flipped; inserted: number of vertices inserted.
-    closing_error: largest disagreement of the layout around the annulus / length of one turn.
-    notes: sentences for the user.
+    closing_error: largest disagreement of the layout where it closes, relative to its size.
+    cones: singularities. notes: sentences for the user.
     """
 
     surface: Surface
     log_scale: Floats
-    uv: Complexes
-    sheet: Ints
-    deck: Deck
-    boundary_angles: tuple[Floats, Floats]
-    circumference: float
+    domain: Unrolled | Net
+    boundary_angles: tuple[Floats, ...]
     iterations: int
     residual: float
     flips: int = 0
     inserted: int = 0
     closing_error: float = 0.0
+    cones: Cones = field(default_factory=Cones.none)
     notes: tuple[str, ...] = ()
 
     @property
-    def kind(self) -> Literal["cylinder", "cone"]:
-        return "cylinder" if abs(self.deck.angle) < 1e-9 else "cone"
+    def kind(self) -> Literal["cylinder", "cone", "net"]:
+        if isinstance(self.domain, Net):
+            return "net"
+        return "cylinder" if abs(self.domain.deck.angle) < 1e-9 else "cone"
+
+    @property
+    def unrolled(self) -> Unrolled:
+        """The sheet of a cylinder or cone. Raises TypeError for other nets: ask for ``kind`` before."""
+        if isinstance(self.domain, Net):
+            raise TypeError("This domain is a net; it is not unrolled into sheets.")
+        return self.domain
+
+    @property
+    def uv(self) -> Complexes:
+        return self.unrolled.uv
+
+    @property
+    def sheet(self) -> Ints:
+        return self.unrolled.sheet
+
+    @property
+    def deck(self) -> Deck:
+        return self.unrolled.deck
+
+    @property
+    def circumference(self) -> float:
+        return self.unrolled.circumference
+
+    def with_domain(self, **changes: Any) -> ConformalMap:
+        """The same map with some fields of its sheet replaced."""
+        return replace(self, domain=replace(self.unrolled, **changes))
+
+    @cached_property
+    def net(self) -> Net:
+        """The domain of every kind of surface."""
+        return self.domain if isinstance(self.domain, Net) else self.domain.net(self.surface)
 
     def corners(self) -> Complexes:
-        """(m, 3) where the corners of every face stand in the unrolled domain. Not to be written to."""
+        """(m, 3) where the corners of every face stand in the domain. Not to be written to."""
         return self._corners
 
     @cached_property
     def _corners(self) -> Complexes:
-        corners = self.uv[self.surface.faces]
-        moved = self.sheet != 0
-        corners[moved] = self.deck.apply(corners[moved], self.sheet[moved])
+        domain = self.domain
+        corners = domain.corners.view() if isinstance(domain, Net) else domain.corners(self.surface.faces)
         corners.flags.writeable = False
         return corners

@@ -123,7 +123,7 @@ def _require_room(panels: Panels, thin: np.ndarray, inset: float, room: Floats) 
         raise PanelsError(
             f"An inset of {inset:g} leaves nothing of {len(empty)} panels (the smallest has room for"
             f" {room[empty].min():g}); ask for a smaller inset.",
-            field=("panels", "components", "inset"),
+            field=("components", "inset"),
             data={"panels": empty[:100].tolist()},
         )
 

@@ -9,6 +9,7 @@ import numpy as np
 from hexwrap_solver.arrays import Floats, Progress, no_progress
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.panels.congruence import congruence_classes
+from hexwrap_solver.panels.fewest import SLACK
 from hexwrap_solver.panels.gaps import gaps
 from hexwrap_solver.panels.halfedges import HalfEdges, half_edges
 from hexwrap_solver.panels.overlap import overlapping_pairs
@@ -60,6 +61,7 @@ def measure(
         gap_tangential=between.tangential,
         gap_normal=between.normal,
         kink=between.kink,
+        gaps_over=_count_wide(edges, panels, between.tangential),
         convex=row_maxima(angle, polygons.offsets) <= np.pi + 1e-9,
         congruence=congruence_classes(polygons, panels.normal),
         overlaps=_count_overlaps(pattern, edges, panels),
@@ -79,6 +81,14 @@ def _surface_distances(surface: Surface, pattern: Pattern, panels: Panels) -> Fl
     corner = np.minimum(corner, pattern.faces.lengths[panels.face][polygons.row] - 1)
     beside = pattern.triangle[pattern.faces.values[start[polygons.row] + corner].astype(np.int64)]
     return tree.farthest(points, row, n, np.concatenate([beside, tree.centroids.query(panels.center)[1]]))
+
+
+def _count_wide(edges: HalfEdges, panels: Panels, gap: Floats) -> int | None:
+    """Panels with a joint wider than ``max_gap``; joints as wide as that but for rounding are not."""
+    if panels.max_gap is None:
+        return None
+    wide = np.unique(edges.cell[gap > panels.max_gap * (1 + SLACK)])
+    return int(np.isin(wide, panels.face).sum())
 
 
 def _count_overlaps(pattern: Pattern, edges: HalfEdges, panels: Panels) -> int:

@@ -97,6 +97,7 @@ def quantize(fitted: FittedPanels, settings: PanelSettings) -> Panels:
             *said,
         ),
         outside=outside,
+        max_gap=settings.max_gap,
     )
 
 
@@ -106,7 +107,7 @@ def _fewest(fitted: FittedPanels, limit: Floats, settings: PanelSettings) -> tup
         raise PanelsError(
             "Sizes are 'fewest', but no greatest joint is given: set max_gap to the widest joint that may be"
             " left open, in the unit of the model.",
-            field=("panels", "max_gap"),
+            field=("max_gap",),
         )
     if fitted.facing is None or not len(limit):
         return floor_to(limit, settings.increment), ()
@@ -180,7 +181,7 @@ def _require_increment(allowed: Floats, panel: Ints, increment: float) -> None:
         raise PanelsError(
             f"The increment {increment:g} is longer than {len(nothing)} panels may be (the smallest allows"
             f" {allowed.min():g}); ask for a smaller increment or larger cells.",
-            field=("panels", "increment"),
+            field=("increment",),
             data={"panels": nothing[:100].tolist()},
         )
 

@@ -2,57 +2,89 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Literal
+from dataclasses import dataclass
+from typing import Annotated, Literal
 
 from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged
+from hexwrap_solver.errors import SettingError
 from hexwrap_solver.panels.facing import Facing
+from hexwrap_solver.setting import Setting
 
 
 @dataclass(frozen=True)
 class Weights:
     """Weights of the dimensionless energies: E_pl, E_α (λ_P), E_ℓ (μ_P), distance to the surface."""
 
-    planarity: float = 1.0
-    angle: float = 1.0
-    edge: float = 1.0
-    surface: float = 0.0
+    planarity: Annotated[float, Setting("weight of planarity in the energy", ge=0)] = 1.0
+    angle: Annotated[float, Setting("weight of equal angles", ge=0)] = 1.0
+    edge: Annotated[float, Setting("weight of equal edges", ge=0)] = 1.0
+    surface: Annotated[float, Setting("weight of closeness to the surface", ge=0)] = 0.0
 
 
 @dataclass(frozen=True)
 class ComponentSettings:
-    """Figure 9. Lengths in model units. inset: outline moved inwards; thickness: of the solid, outward;
-    depth: of the support's beams."""
+    """Figure 9."""
 
-    inset: float = 0.0
-    thickness: float = 0.0
-    depth: float = 0.0
+    inset: Annotated[float, Setting("components: outline moved inwards", ge=0, unit="length")] = 0.0
+    thickness: Annotated[
+        float, Setting("components: thickness of the solids, outwards", ge=0, unit="length")
+    ] = 0.0
+    depth: Annotated[float, Setting("depth of the support's beams", ge=0, unit="length")] = 0.0
 
 
 @dataclass(frozen=True)
 class PanelSettings:
-    """How panels are rationalized. Lengths in model units.
+    """How panels are rationalized (paper, section 5).
 
-    sizes: number of edge-length classes, fewer where more would be alike, None: one length per panel;
-    ``fewest``: as few as leave no joint wider than max_gap. max_gap: joints above it are counted.
-    edge_range: allowed (min, max).
-    size_cost: ``area`` (least uncovered area) or ``worst`` (least greatest loss).
-    target: upper limit of a panel's edge length. joint: least width left open between neighbours.
-    increment: lengths are rounded down to its multiples, 0: not at all.
+    sizes: fewer where more would be alike; ``fewest``: as few as leave no joint wider than ``max_gap``; None:
+    one length per panel. size_cost: ``area`` (least uncovered area) or ``worst`` (least greatest loss).
+    Raises SettingError for an ``edge_range`` out of order.
     """
 
-    mode: Literal["split", "watertight"] = "split"
-    sizes: int | Literal["fewest"] | None = 11
-    max_gap: float | None = None
-    size_cost: Literal["area", "worst"] = "area"
-    edge_range: tuple[float, float] | None = None
-    target: Literal["shortest", "inscribed", "best", "mean"] = "inscribed"
-    orientation: Literal["fit", "tangent"] = "fit"
-    joint: float = 0.0
-    method: Literal["exact", "energy"] = "exact"
-    weights: Weights = field(default_factory=Weights)
-    increment: float = 0.0
-    components: ComponentSettings | None = None
+    mode: Annotated[Literal["split", "watertight"], Setting("individual panels, or one watertight mesh")] = (
+        "split"
+    )
+    sizes: Annotated[
+        int | Literal["fewest"] | None,
+        Setting(
+            "number of edge lengths, fewer where some would be alike; 'fewest': as few as max_gap allows; "
+            "'none': one per panel",
+            ge=1,
+            le=1000,
+        ),
+    ] = 11
+    max_gap: Annotated[
+        float | None, Setting("widest joint wanted; wider ones are counted", ge=0, unit="length", rare=True)
+    ] = None
+    size_cost: Annotated[Literal["area", "worst"], Setting("what the sizes are best for", rare=True)] = "area"
+    edge_range: Annotated[
+        tuple[float, float] | None, Setting("allowed edge lengths", unit="length", rare=True)
+    ] = None
+    target: Annotated[
+        Literal["shortest", "inscribed", "best", "mean"], Setting("upper limit of a panel's size")
+    ] = "inscribed"
+    orientation: Annotated[
+        Literal["fit", "tangent"], Setting("planes of best fit, or tangent to the surface", rare=True)
+    ] = "fit"
+    joint: Annotated[
+        float, Setting("least width left open between neighbouring panels", ge=0, unit="length")
+    ] = 0.0
+    method: Annotated[
+        Literal["exact", "energy"], Setting("closed forms, or minimized energies", rare=True)
+    ] = "exact"
+    weights: Annotated[Weights, Setting("weights of the energies", rare=True)] = Weights()
+    increment: Annotated[
+        float,
+        Setting("edge lengths are rounded down to its multiples; 0: not", ge=0, unit="length", rare=True),
+    ] = 0.0
+    components: Annotated[ComponentSettings | None, Setting("what each panel is built from", rare=True)] = (
+        None
+    )
+
+    def __post_init__(self) -> None:
+        low, high = self.edge_range or (0.0, 1.0)
+        if not (0 <= low <= high and high > 0):
+            raise SettingError("'edge_range' must be [min, max] with 0 ≤ min ≤ max and max > 0")
 
 
 @dataclass(frozen=True)
@@ -112,7 +144,7 @@ class Panels:
     length allowed before quantization. center, normal: (q, 3). whole: (q,).
     class_length, class_count: (s,) the size classes, ascending. trade_off: None where sizes make no sense.
     energy: (steps,) value of the weighted energy, None for method ``exact``.
-    outside: panels whose limit lies below the allowed ``edge_range``.
+    outside: panels whose limit lies below the allowed ``edge_range``. max_gap: widest joint wanted.
     """
 
     mode: Literal["split", "watertight"]
@@ -130,6 +162,7 @@ class Panels:
     energy: Floats | None = None
     notes: tuple[str, ...] = ()
     outside: Ints | None = None
+    max_gap: float | None = None
 
     @property
     def n_panels(self) -> int:
@@ -144,6 +177,7 @@ class Quality:
     gap_tangential, gap_normal, kink (rad): aligned with the pattern's neighbours, NaN where there is none.
     surface_distance: (q,) greatest distance of a panel's corners and its centre to the input surface.
     convex: (q,). congruence: (q,) class of congruent shapes (mirror images told apart).
+    gaps_over: panels with a joint wider than was wanted, None where nothing was said of that.
     movement: greatest distance a shared vertex was moved (watertight), 0 otherwise.
     """
 
@@ -157,6 +191,7 @@ class Quality:
     gap_tangential: Floats | None = None
     gap_normal: Floats | None = None
     kink: Floats | None = None
+    gaps_over: int | None = None
     convex: Bools | None = None
     congruence: Ints | None = None
     overlaps: int = 0

@@ -14,7 +14,6 @@ from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.domain.interpolate import surface_weights
 from hexwrap_solver.domain.lift import points_at
 from hexwrap_solver.domain.locate import barycentric
-from hexwrap_solver.domain.net import net_of
 from hexwrap_solver.errors import PatternError
 from hexwrap_solver.pattern.lattice import LATTICES, Lattice
 from hexwrap_solver.pattern.lay.cells import (
@@ -58,6 +57,11 @@ def lay_pattern(cmap: ConformalMap, settings: PatternSettings, progress: Progres
     Raises NotAdaptedError where the cone angle does not suit the kind of pattern, PatternError where the
     cells are too many (``settings.max_cells``) or too large to close up around the surface.
     """
+    if cmap.kind == "net":
+        raise PatternError(
+            "Patterns are laid on tubes only; this surface has another number of boundary loops, or "
+            "singularities: ask for its map alone (pattern null)."
+        )
     lattice = LATTICES[settings.kind]
     settings, notes = with_rotation(cmap, lattice, settings)
     placing = Placing.of(cmap, lattice, settings)
@@ -110,7 +114,7 @@ def _lay(placing: Placing, settings: PatternSettings, progress: Progress) -> Pat
 
 def layout_of(cmap: ConformalMap, lattice: Lattice, placement: Placement) -> Layout:
     """The domain's triangles in lattice units."""
-    net = net_of(cmap)
+    net = cmap.net
     corners = placement.motion.carry(placement.place[cmap.surface.faces], cmap.sheet)
     winding = net.winding
     assert winding is not None, "an annulus"

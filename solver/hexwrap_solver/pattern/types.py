@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 
 from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints, Ragged
+from hexwrap_solver.errors import SettingError
+from hexwrap_solver.setting import Setting
 
 Kind = Literal["hex", "triangle", "quad"]
 
@@ -16,21 +18,41 @@ Kind = Literal["hex", "triangle", "quad"]
 class PatternSettings:
     """What a pattern should be like.
 
-    around: cells around the cylinder (on a cone, around its middle ring); edge_length: mean edge length
-    on the surface, model units; at most one of the two, neither means a sensible default.
-    rotation: ``edge``, ``vertex``, degrees, or ``u`` / ``v`` (follow a NURBS direction).
-    align: loops on which a lattice line must lie exactly. phase: shift in cells where freedom is left.
-    max_cells: refuse larger patterns (PatternError) before any large array is made.
+    around: on a cone, around its middle ring. With neither ``around`` nor ``edge_length`` the size is chosen.
+    align: loops on which a lattice line must lie exactly. phase: used where freedom is left.
+    Raises SettingError where both sizes are given.
     """
 
-    kind: Kind = "hex"
-    around: int | None = None
-    edge_length: float | None = None
-    rotation: float | Literal["edge", "vertex", "u", "v"] = "edge"
-    align: Literal["none", "first", "both"] = "both"
-    boundary: Literal["whole", "trim"] = "whole"
-    phase: tuple[float, float] = (0.0, 0.0)
-    max_cells: int = 1_000_000
+    kind: Annotated[Kind, Setting("kind of cells")] = "hex"
+    around: Annotated[int | None, Setting("cells around the surface", ge=1, le=1_000_000, unit="cells")] = (
+        None
+    )
+    edge_length: Annotated[
+        float | None, Setting("instead: mean edge length of the cells on the surface", gt=0, unit="length")
+    ] = None
+    rotation: Annotated[
+        float | Literal["edge", "vertex", "u", "v"],
+        Setting(
+            "'edge' or 'vertex' along the boundary, 'u' or 'v' of a NURBS surface, or degrees", unit="degrees"
+        ),
+    ] = "edge"
+    align: Annotated[
+        Literal["none", "first", "both"], Setting("on which loops a line of the pattern lies exactly")
+    ] = "both"
+    boundary: Annotated[
+        Literal["whole", "trim"], Setting("keep whole cells only, or trim cells at the boundary")
+    ] = "whole"
+    phase: Annotated[
+        tuple[float, float],
+        Setting("shift of the pattern, where it is free", ge=-1e6, le=1e6, unit="cells", rare=True),
+    ] = (0.0, 0.0)
+    max_cells: Annotated[
+        int, Setting("larger patterns are refused before any large array is made", limit=True)
+    ] = 1_000_000
+
+    def __post_init__(self) -> None:
+        if self.around is not None and self.edge_length is not None:
+            raise SettingError("give either 'around' or 'edge_length', the other one null")
 
 
 @dataclass(frozen=True)

@@ -38,12 +38,12 @@ def check_arrays(sent: SentMesh) -> None:
         raise ShapeError(
             f"There are {len(sent.normals)} normals for {len(sent.vertices)} vertices: send one (x, y, z) "
             "per vertex, or none at all.",
-            field=("surface", "normals"),
+            field=("normals",),
         )
     _check_faces(sent)
 
 
-def check_finite(points: Floats, what: str, field: tuple[str | int, ...] = ("surface", "vertices")) -> None:
+def check_finite(points: Floats, what: str, field: tuple[str | int, ...] = ("vertices",)) -> None:
     """Raises NonFiniteError for NaN, infinities and magnitudes whose areas a double cannot hold."""
     fine = np.abs(points) < LARGEST
     if not fine.all():
@@ -74,7 +74,7 @@ def _check_faces(sent: SentMesh) -> None:
             faces=wrong[:LISTED],
         )
     if not np.issubdtype(indices.dtype, np.integer):
-        raise ShapeError("Face indices must be integers.", field=("surface", "faces"))
+        raise ShapeError("Face indices must be integers.", field=("faces",))
     out = (indices < 0) | (indices >= len(sent.vertices))
     if out.any():
         faces = np.unique(sent.faces.row[out])

@@ -1,4 +1,4 @@
-"""Every way in which a sent surface can fail to be an annulus that can be mapped.
+"""Every way in which a sent surface can fail to be one that can be mapped.
 
 SurfaceError
 ├── of the data
@@ -14,11 +14,12 @@ SurfaceError
 │   ├── NonManifoldVertexError   faces that meet in a vertex only
 │   ├── SeveralComponentsError   more than one piece
 │   ├── NotOrientableError       a Möbius band
-│   └── NotAnnulusError          closed, wrong number of boundary loops, or handles
+│   └── HandlesError             a torus, or a surface with handles
 └── of a NURBS surface
     ├── NurbsDataError           degree, knots, weights or control points that define no surface
     ├── NotClosedError           closed in no direction, or not where it claims to be
     ├── PoleError                a boundary that shrinks to a point
+    ├── TrimError                a face whose boundary cannot be followed on its surface
     └── TooFineError             a mesh of more vertices than allowed
 """
 
@@ -40,31 +41,26 @@ class ShapeError(SurfaceError):
 class NonFiniteError(SurfaceError):
     slug = "not-finite"
     title = "The surface has coordinates that are no finite numbers"
-    default_field = ("surface", "vertices")
 
 
 class IndexRangeError(SurfaceError):
     slug = "index-out-of-range"
     title = "A face points at a vertex that was not sent"
-    default_field = ("surface", "faces")
 
 
 class PolygonSizeError(SurfaceError):
     slug = "polygon-size"
     title = "A face is neither triangle nor quad"
-    default_field = ("surface", "faces")
 
 
 class DegeneratePolygonError(SurfaceError):
     slug = "degenerate-face"
     title = "A face has no area"
-    default_field = ("surface", "faces")
 
 
 class FlatSurfaceError(SurfaceError):
     slug = "no-extent"
     title = "The surface has no area"
-    default_field = ("surface", "vertices")
 
 
 class NonManifoldEdgeError(SurfaceError):
@@ -87,32 +83,35 @@ class NotOrientableError(SurfaceError):
     title = "The surface has only one side"
 
 
-class NotAnnulusError(SurfaceError):
-    """data["reason"] is ``closed``, ``loops`` or ``handle``; the figures stand beside it."""
+class HandlesError(SurfaceError):
+    """edges: a loop to cut along; data: loops, Euler characteristic, genus and the loop's length."""
 
-    slug = "not-an-annulus"
-    title = "The surface is not tube-like"
+    slug = "handles"
+    title = "The surface has handles"
 
 
 class NurbsDataError(SurfaceError):
     slug = "nurbs-data"
     title = "The NURBS data define no surface"
-    default_field = ("surface", "nurbs")
 
 
 class NotClosedError(SurfaceError):
     slug = "nurbs-not-closed"
     title = "The NURBS surface does not close up"
-    default_field = ("surface", "nurbs", "closed")
 
 
 class PoleError(SurfaceError):
     slug = "nurbs-pole"
     title = "The NURBS surface shrinks to a point"
-    default_field = ("surface", "nurbs", "control_points")
+
+
+class TrimError(SurfaceError):
+    """data["face"] is the face's number in the Brep."""
+
+    slug = "brep-trim"
+    title = "A face of the polysurface has a faulty boundary"
 
 
 class TooFineError(SurfaceError):
     slug = "mesh-too-fine"
     title = "The mesh would have too many vertices"
-    default_field = ("surface", "mesh")

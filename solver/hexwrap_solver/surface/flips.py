@@ -51,17 +51,21 @@ def flip(faces: Ints, h: Ints, twin: Ints) -> None:
     faces[twin[h] // 3] = np.stack([d, b, c], axis=1)
 
 
-def flip_to_delaunay(vertices: Floats, faces: Ints) -> Ints:
+def flip_to_delaunay(vertices: Floats, faces: Ints, keep: Ints | None = None) -> Ints:
     """Faces over the same vertices in which no two angles opposite to an edge exceed π together.
 
     In space this shortens obtuse pairs of triangles as in the plane, while the mesh bends little over one
-    edge; pairs that would fold are left.
+    edge; pairs that would fold are left. keep: (k, 2) pairs of vertices whose edges stay.
     """
     faces, n = faces.copy(), len(vertices)
+    kept = None if keep is None else keep.min(axis=1) * n + keep.max(axis=1)
     for _ in range(ROUNDS):
         twin = twins(faces, n)
         h = np.arange(len(twin))
         h = h[(twin > h)]
+        if kept is not None:
+            start, end = (side[h] for side in half_edges(faces))
+            h = h[~np.isin(np.minimum(start, end) * n + np.maximum(start, end), kept)]
         angle = angle_sums_opposite(vertices, faces, h, twin[h])
         order = np.argsort(-angle, kind="stable")
         h = h[order[: int((angle > np.pi + SLACK).sum())]]

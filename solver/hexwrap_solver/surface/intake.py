@@ -1,4 +1,4 @@
-"""From a sent mesh to an annulus: check, split quads, weld, orient, drop what has no area, check again."""
+"""From a sent mesh to a surface: check, split quads, weld, orient, drop what has no area, check again."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ import numpy as np
 
 from hexwrap_solver.arrays import Bools, Ints
 from hexwrap_solver.errors import SurfaceError
-from hexwrap_solver.surface.annulus import (
-    SentNames,
-    annulus_loops,
-    check_connected,
-    check_edges,
-    not_orientable,
-)
 from hexwrap_solver.surface.checks import LISTED, check_arrays, check_extent
 from hexwrap_solver.surface.degenerate import flat, repair_flat
 from hexwrap_solver.surface.duplicates import first_of_equals
-from hexwrap_solver.surface.errors import DegeneratePolygonError
+from hexwrap_solver.surface.errors import DegeneratePolygonError, NotOrientableError
+from hexwrap_solver.surface.genus import (
+    SentNames,
+    check_connected,
+    check_edges,
+    loops_of,
+    not_orientable,
+)
 from hexwrap_solver.surface.normals import sent_normals
 from hexwrap_solver.surface.orient import flipped
 from hexwrap_solver.surface.topology import vertex_normals
@@ -28,7 +28,7 @@ from hexwrap_solver.surface.weld import TOLERANCE, relabelled, weldings
 
 
 def surface_from_mesh(sent: SentMesh) -> Surface:
-    """The annulus that a sent mesh describes, repaired as far as that leaves its shape alone.
+    """The surface that a sent mesh describes, repaired as far as that leaves its shape alone.
 
     Vertices keep the order in which they were sent. Raises SurfaceError: one child of it per way to fail.
     """
@@ -43,6 +43,8 @@ def surface_from_mesh(sent: SentMesh) -> Surface:
     for label in weldings(mesh, TOLERANCE * size):
         try:
             return _build(sent, mesh, polygon, label)
+        except NotOrientableError:  # without the weld at its seam a Möbius band would pass for a strip
+            raise
         except SurfaceError as error:  # less welding may help; where it does not, the fullest one's is told
             refusal = refusal or error
     raise refusal or AssertionError("there is always one way to weld")
@@ -77,7 +79,7 @@ class _Draft:
 
 
 def _build(sent: SentMesh, mesh: Triangles, polygon: Ints, label: Ints) -> Surface:
-    """The annulus that comes of one way of welding: label (n,) the lowest vertex each one is welded to."""
+    """The surface that comes of one way of welding: label (n,) the lowest vertex each one is welded to."""
     vertices, n = mesh.vertices, len(mesh.vertices)
     draft = _Draft(relabelled(mesh, label), polygon, [])
     used = _mark(mesh.faces, n)
@@ -100,7 +102,7 @@ def _build(sent: SentMesh, mesh: Triangles, polygon: Ints, label: Ints) -> Surfa
     new = np.full(n, -1, dtype=np.int64)
     new[index] = np.arange(len(index))
     faces = new[draft.faces]
-    loops = annulus_loops(faces, draft.mesh.twin, len(index), SentNames(index, draft.polygon))
+    loops = loops_of(vertices[index], faces, draft.mesh.twin, SentNames(index, draft.polygon))
     stand = np.where(used, new[label], -1)
     normals = vertex_normals(vertices[index], faces)
     if sent.normals is not None:

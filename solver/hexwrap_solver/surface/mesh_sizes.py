@@ -29,9 +29,7 @@ def check_settings(settings: MeshSettings) -> None:
     for name in ("max_edge", "tolerance"):
         value = getattr(settings, name)
         if value is not None and not (np.isfinite(value) and value > 0):
-            raise NurbsDataError(
-                f"mesh.{name} is {value}: it must be positive.", field=("surface", "mesh", name)
-            )
+            raise NurbsDataError(f"mesh.{name} is {value}: it must be positive.", field=(name,))
 
 
 def bounded(settings: MeshSettings, nurbs: NurbsSurface) -> MeshSettings:
@@ -79,7 +77,9 @@ def sample_of(nurbs: NurbsSurface) -> Sample:
     mean = density.reshape(shape)
     cells = (mean[1:, 1:] + mean[:-1, 1:] + mean[1:, :-1] + mean[:-1, :-1]) / 4
     area = float((cells * np.diff(t)[:, None] * np.diff(s)).sum())
-    return Sample(s, t, speed.reshape(shape), rise.reshape(shape), _curvature(jet).reshape(shape), area)
+    return Sample(
+        s, t, speed.reshape(shape), rise.reshape(shape), greatest_curvature(jet).reshape(shape), area
+    )
 
 
 def _dense(nurbs: NurbsSurface, direction: int) -> Floats:
@@ -87,7 +87,7 @@ def _dense(nurbs: NurbsSurface, direction: int) -> Floats:
     return spans(nurbs, direction, max(4, -(-SAMPLES // least)))
 
 
-def _curvature(jet: Jet) -> Floats:
+def greatest_curvature(jet: Jet) -> Floats:
     """(k,) greatest absolute principal curvature, from the first and second fundamental forms."""
     e, f, g = (np.einsum("ij,ij->i", a, b) for a, b in ((jet.du, jet.du), (jet.du, jet.dv), (jet.dv, jet.dv)))
     l, m, n = (np.einsum("ij,ij->i", a, jet.normal) for a in (jet.duu, jet.duv, jet.dvv))  # noqa: E741
@@ -117,22 +117,22 @@ def edge_length(sample: Sample, settings: MeshSettings, shrink: float) -> Floats
 def _graded(sample: Sample, h: Floats) -> Floats:
     """(b, a) sizes lowered where they would change faster than GRADE per length, around and along."""
     a = h.shape[1] - 1
-    around = _cumulated(np.tile(sample.speed[:, :-1], 2), np.tile(np.diff(sample.s), 2)[:-1])
-    along = _cumulated(sample.rise.T, np.diff(sample.t))
+    around = cumulated(np.tile(sample.speed[:, :-1], 2), np.tile(np.diff(sample.s), 2)[:-1])
+    along = cumulated(sample.rise.T, np.diff(sample.t))
     for _ in range(2):
-        turn = _limited(np.tile(h[:, :-1], 2), around)
+        turn = limited(np.tile(h[:, :-1], 2), around)
         h = np.minimum(turn[:, :a], turn[:, a:])[:, np.r_[:a, 0]]
-        h = _limited(h.T, along).T
+        h = limited(h.T, along).T
     return h
 
 
-def _cumulated(speed: Floats, steps: Floats) -> Floats:
+def cumulated(speed: Floats, steps: Floats) -> Floats:
     """(k, n) lengths from the beginning of each row, by the trapezoidal rule."""
     length = (speed[:, 1:] + speed[:, :-1]) / 2 * steps
     return np.concatenate([np.zeros((len(speed), 1)), np.cumsum(length, axis=1)], axis=1)
 
 
-def _limited(h: Floats, x: Floats) -> Floats:
+def limited(h: Floats, x: Floats) -> Floats:
     """The greatest function below h along each row, at places x, that changes nowhere faster than GRADE."""
     rising = np.minimum.accumulate(h - GRADE * x, axis=1) + GRADE * x
     falling = np.minimum.accumulate((h + GRADE * x)[:, ::-1], axis=1)[:, ::-1] - GRADE * x

@@ -8,7 +8,7 @@ import numpy as np
 
 from hexwrap_solver.arrays import Floats
 from hexwrap_solver.surface.checks import check_extent, check_finite
-from hexwrap_solver.surface.errors import NotAnnulusError, NotClosedError, NurbsDataError, PoleError
+from hexwrap_solver.surface.errors import HandlesError, NotClosedError, NurbsDataError, PoleError
 from hexwrap_solver.surface.nurbs import domain, evaluate_points
 from hexwrap_solver.surface.types import NurbsSurface
 
@@ -23,7 +23,7 @@ PER_SPAN = 5
 def checked(nurbs: NurbsSurface) -> tuple[NurbsSurface, list[str]]:
     """The surface with its closed direction verified, or found where none was named; and what was repaired.
 
-    Raises NurbsDataError, NonFiniteError, FlatSurfaceError, NotClosedError, NotAnnulusError, PoleError.
+    Raises NurbsDataError, NonFiniteError, FlatSurfaceError, NotClosedError, HandlesError, PoleError.
     """
     check_data(nurbs)
     size = float(np.linalg.norm([np.ptp(x) for x in nurbs.control_points[..., :3].reshape(-1, 3).T]))
@@ -35,7 +35,7 @@ def checked(nurbs: NurbsSurface) -> tuple[NurbsSurface, list[str]]:
             raise NotClosedError(
                 f"The NURBS surface is said to be closed in {NAMES[direction]}, but its ends are up to "
                 f"{gap[direction]:.4g} apart: join them to within {TOLERANCE * size:.2g}.",
-                field=("surface", "nurbs", "closed", direction),
+                field=("closed", direction),
             )
     closed = [gap[d] <= TOLERANCE * size for d in (0, 1)]
     if any(collapsed):
@@ -45,10 +45,10 @@ def checked(nurbs: NurbsSurface) -> tuple[NurbsSurface, list[str]]:
             "off along a parameter line."
         )
     if all(closed):
-        raise NotAnnulusError(
-            "The NURBS surface is closed in u and in v, like a torus: a tube is open in one of them, so "
-            "split it along a parameter line.",
-            data={"reason": "closed", "loops": 0, "euler_characteristic": 0, "genus": 1},
+        raise HandlesError(
+            "The NURBS surface is closed in u and in v, like a torus: split it along a parameter line, so "
+            "that it is open in one of them.",
+            data={"loops": 0, "euler_characteristic": 0, "genus": 1},
         )
     if not any(closed):
         raise NotClosedError(
@@ -65,14 +65,14 @@ def check_data(nurbs: NurbsSurface) -> None:
     if net.ndim != 3 or net.shape[2] != 4:
         raise NurbsDataError(
             f"The control points have the shape {net.shape}: a grid of (x, y, z, w) is needed.",
-            field=("surface", "nurbs", "control_points"),
+            field=("control_points",),
         )
-    check_finite(net.reshape(-1, 4), "Control point", ("surface", "nurbs", "control_points"))
+    check_finite(net.reshape(-1, 4), "Control point", ("control_points",))
     if not (net[..., 3] > 0).all():
         i, j = np.argwhere(~(net[..., 3] > 0))[0]
         raise NurbsDataError(
             f"Control point [{i}][{j}] has the weight {net[i, j, 3]:g}: weights must be positive.",
-            field=("surface", "nurbs", "control_points", int(i), int(j), 3),
+            field=("control_points", int(i), int(j), 3),
         )
     for direction in (0, 1):
         _check_knots(nurbs, direction)
@@ -83,7 +83,7 @@ def _check_knots(nurbs: NurbsSurface, direction: int) -> None:
     n = nurbs.control_points.shape[direction]
 
     def wrong(text: str, part: str = "knots") -> NurbsDataError:
-        return NurbsDataError(text, field=("surface", "nurbs", part, direction))
+        return NurbsDataError(text, field=(part, direction))
 
     if not 1 <= p <= HIGHEST_DEGREE:
         raise wrong(f"The degree in {name} is {p}: it must lie between 1 and {HIGHEST_DEGREE}.", "degree")
@@ -129,7 +129,25 @@ def _gap(nurbs: NurbsSurface, direction: int) -> float:
     return float(np.linalg.norm(low - high, axis=1).max())
 
 
+def closed_within(nurbs: NurbsSurface, tolerance: float) -> tuple[bool, bool]:
+    """Whether the two ends of u, of v are one line, to within the tolerance and not shrunk to a point."""
+    size = float(np.linalg.norm([np.ptp(x) for x in nurbs.control_points[..., :3].reshape(-1, 3).T]))
+    found = []
+    for direction in (0, 1):
+        width = domain(nurbs, direction)
+        low, high = (_line(nurbs, direction, x) for x in width)
+        across = _line(nurbs, direction, (width[0] + width[1]) / 2)
+        gap = float(np.linalg.norm(low - high, axis=1).max())
+        depth = float(np.linalg.norm(low - across, axis=1).max())
+        found.append(gap <= max(tolerance, TOLERANCE * size) and depth > 10 * gap)
+    return found[0], found[1]
+
+
+def collapsed(nurbs: NurbsSurface, direction: int, end: int, tolerance: float) -> bool:
+    """Whether the parameter line at the lower (0) or upper end (1) of direction is a point."""
+    return float(np.ptp(_line(nurbs, direction, domain(nurbs, direction)[end]), axis=0).max()) <= tolerance
+
+
 def _collapsed(nurbs: NurbsSurface, direction: int, tolerance: float) -> bool:
     """Whether a parameter line at an end of direction is a point."""
-    lines = [_line(nurbs, direction, x) for x in domain(nurbs, direction)]
-    return any(float(np.ptp(line, axis=0).max()) <= tolerance for line in lines)
+    return any(collapsed(nurbs, direction, end, tolerance) for end in (0, 1))

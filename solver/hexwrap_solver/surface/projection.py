@@ -14,6 +14,8 @@ STEPS = 30
 CHORD_STEPS = 1
 #: Newton steps below this part of the domain end the iteration.
 CONVERGED = 1e-13
+#: … and steps below this part end it where the start was good.
+SETTLED = 1e-9
 #: A step that does not bring the point nearer is halved so many times at most.
 HALVINGS = 12
 
@@ -30,7 +32,7 @@ def project(
     jet = evaluate(nurbs, uv)
     active = np.arange(len(uv))
     for _ in range(steps):
-        step = _newton_step(nurbs, _take(jet, active), points[active], uv[active])
+        step = newton_step(nurbs, _take(jet, active), points[active], uv[active])
         uv[active], moved = _search(nurbs, points[active], uv[active], jet.point[active], step)
         fresh = evaluate(nurbs, uv[active])
         for whole, part in zip(jet, fresh, strict=True):
@@ -79,11 +81,32 @@ def _shortest(nurbs: NurbsSurface, difference: Floats) -> Floats:
     return out
 
 
+def settle(nurbs: NurbsSurface, points: Floats, start: Floats, steps: int = 12) -> Floats:
+    """(k, 2) parameters of the nearest points, from starts near enough for Newton's method to need no search.
+
+    No step is longer than a quarter of the domain; where the method does not come to rest, its last place
+    is returned.
+    """
+    width = np.array([high - low for low, high in (domain(nurbs, d) for d in (0, 1))])
+    uv = wrap(nurbs, start)
+    active = np.arange(len(uv))
+    for _ in range(steps):
+        step = newton_step(nurbs, evaluate(nurbs, uv[active]), points[active], uv[active])
+        step = step / np.maximum(1.0, np.abs(step / width).max(axis=1, keepdims=True) * 4)
+        moved = wrap(nurbs, uv[active] + step)
+        far = np.abs(_shortest(nurbs, moved - uv[active]) / width).max(axis=1) > SETTLED
+        uv[active] = moved
+        active = active[far]
+        if len(active) == 0:
+            break
+    return uv
+
+
 def _take(jet: Jet, rows: Ints) -> Jet:
     return Jet(*(part[rows] for part in jet))
 
 
-def _newton_step(nurbs: NurbsSurface, jet: Jet, points: Floats, uv: Floats) -> Floats:
+def newton_step(nurbs: NurbsSurface, jet: Jet, points: Floats, uv: Floats) -> Floats:
     """(k, 2): Newton's step for half the squared distance; Gauss–Newton's where the Hessian is not positive.
 
     A parameter at an open end that would leave the domain is kept there.

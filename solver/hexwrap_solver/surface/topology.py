@@ -126,6 +126,12 @@ def unit(vectors: Floats) -> Floats:
     return np.asarray(vectors / np.where(length > 0, length, 1.0))
 
 
+def angles_between(one: Floats, two: Floats) -> Floats:
+    """(n,) angles between vectors (n, 3), 0 … π."""
+    sine = np.linalg.norm(np.cross(one, two), axis=1)
+    return np.asarray(np.arctan2(sine, np.einsum("ij,ij->i", one, two)))
+
+
 def edge_lengths(vertices: Floats, faces: Ints) -> Floats:
     """(m, 3) lengths of the half-edges, from coordinate differences: a far-away origin costs no digits beyond
     those the data has lost already."""

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Annotated, Literal
 
 import numpy as np
 
-from hexwrap_solver.arrays import Floats, Ints, Ragged
+from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged
+from hexwrap_solver.setting import Setting
 from hexwrap_solver.surface.closest import TriangleTree
 from hexwrap_solver.surface.topology import edge_groups, edge_lengths, half_edges, twins_of
+
+Openings = Literal["cut", "loop"]
 
 
 @dataclass(frozen=True)
@@ -26,16 +30,35 @@ class SentMesh:
 
 @dataclass(frozen=True)
 class MeshSettings:
-    """How finely a NURBS surface is meshed (paper, Figure 2), lengths in model units.
+    """How finely a NURBS surface is meshed (paper, Figure 2).
 
-    max_edge: no edge is longer; None: chosen from the surface's area, about 6,000 vertices.
-    tolerance: chord height, greatest distance of the middle of an edge from the surface; None: not asked for.
-    max_vertices: a finer mesh than this is refused (SurfaceError) before any large array is made.
+    With neither size, edges are chosen from the surface's area, for about 6,000 vertices.
     """
 
-    max_edge: float | None = None
-    tolerance: float | None = None
-    max_vertices: int = 1_000_000
+    max_edge: Annotated[
+        float | None, Setting("NURBS surfaces: longest edge of the mesh", gt=0, unit="length")
+    ] = None
+    tolerance: Annotated[
+        float | None,
+        Setting("NURBS surfaces: greatest distance of the mesh (chord height)", gt=0, unit="length"),
+    ] = None
+    max_vertices: Annotated[
+        int, Setting("finer meshes are refused before any large array is made", limit=True)
+    ] = 1_000_000
+
+
+@dataclass(frozen=True)
+class SurfaceSettings:
+    """How a sent surface is taken in.
+
+    openings ``cut``: loops beyond the two longest are filled smoothly, mapped as wall, and cut out again.
+    ``loop``: each is a boundary of its own.
+    """
+
+    mesh: Annotated[MeshSettings | None, Setting("how a NURBS surface is meshed", rare=True)] = None
+    openings: Annotated[
+        Openings, Setting("what loops beyond the two longest are: holes to cut out, or boundaries")
+    ] = "cut"
 
 
 @dataclass(frozen=True)
@@ -90,26 +113,31 @@ class Triangles:
 
 @dataclass(frozen=True)
 class Surface(Triangles):
-    """A triangle mesh that is an annulus: connected, oriented, manifold, two boundary loops, χ = 0.
+    """A triangle mesh of genus 0: connected, oriented, manifold, without handles.
 
     vertices: (n, 3). faces: (m, 3), counter-clockwise seen from outside.
-    loops: the two boundary loops as vertex indices, surface on the left; loop 0 holds the lowest sent
-    vertex index of the boundary.
+    loops: the boundary loops as vertex indices, surface on the left. Of two, loop 0 holds the lowest sent
+    vertex index of the boundary; of any other number, loops are sorted by length, the longest first.
     input_vertex: (n,) a sent vertex that stands at vertex i, or −1.
     vertex_of_input: (n_sent,) the vertex at which each sent vertex stands, or −1 where it was dropped.
     normals: (n, 3) unit vertex normals (sent ones, the NURBS surface's, or area-weighted face normals).
     repairs: one sentence each.
+    openings: so many loops, the last ones, are openings of the wall: the map is found with them filled, and
+    they are cut out of it. patch: (m,) on a filled surface, the faces that fill openings; None if there
+    are none.
     nurbs, parameters: the NURBS surface the mesh was made from, and (n, 2) its parameters at the
     vertices (in the closed direction, parameters are in the base period); None for sent meshes.
     """
 
-    loops: tuple[Ints, Ints]
+    loops: tuple[Ints, ...]
     input_vertex: Ints
     vertex_of_input: Ints
     normals: Floats
     repairs: tuple[str, ...] = ()
     nurbs: NurbsSurface | None = None
     parameters: Floats | None = None
+    openings: int = 0
+    patch: Bools | None = None
 
     def knowing(self, mesh: Triangles) -> Surface:
         """The surface itself, told what is known of the same triangles by other names of their vertices."""

@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from scipy.spatial import Delaunay
 
 from hexwrap_solver.arrays import Floats, Ints
+from hexwrap_solver.conformal.types import BoundaryAngle, BoundaryCondition
 from hexwrap_solver.surface.types import Surface
+
+
+def corners_at(vertices: Ints, angles: Floats, **others: Any) -> BoundaryCondition:
+    """The given angles at the given sent vertices."""
+    pairs = zip(np.asarray(vertices).tolist(), np.asarray(angles).tolist(), strict=True)
+    return BoundaryCondition("angles", tuple(BoundaryAngle(a, vertex=v) for v, a in pairs), **others)
 
 
 def annulus(vertices: Floats, faces: Ints, loops: tuple[Ints, Ints]) -> Surface:

@@ -7,16 +7,16 @@ import pytest
 
 from hexwrap_solver.arrays import Floats
 from hexwrap_solver.conformal import conformal_map
-from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap
-from tests.solver.conformal.annuli import bump, catenoid, flat_cone, grid, revolution
+from hexwrap_solver.conformal.types import QUANTA, BoundaryCondition, ConformalMap
+from tests.solver.conformal.annuli import bump, catenoid, corners_at, flat_cone, grid, revolution
 from tests.solver.conformal.checks import faults
 
 CONDITIONS = [
     BoundaryCondition(),
     BoundaryCondition("isometric"),
-    BoundaryCondition("isometric", quantum=np.pi / 3),
-    BoundaryCondition("isometric", quantum=np.pi / 3, spread="optimal"),
-    BoundaryCondition("isometric", quantum=np.pi / 2),
+    BoundaryCondition("isometric", quantum="hex"),
+    BoundaryCondition("isometric", quantum="hex", spread="optimal"),
+    BoundaryCondition("isometric", quantum="quad"),
 ]
 
 
@@ -54,10 +54,8 @@ def test_every_mode_keeps_the_promises_of_the_contract(condition: BoundaryCondit
     cmap = conformal_map(bump(40, 20), condition)
     assert_honest(cmap)
     assert cmap.residual < 1e-11
-    if condition.quantum:
-        assert cmap.deck.angle / condition.quantum == pytest.approx(
-            round(cmap.deck.angle / condition.quantum), abs=1e-14
-        )
+    if quantum := QUANTA.get(condition.quantum):
+        assert cmap.deck.angle / quantum == pytest.approx(round(cmap.deck.angle / quantum), abs=1e-14)
 
 
 def test_straight_loops_lie_on_two_parallels_with_loop_0_below() -> None:
@@ -106,17 +104,18 @@ def test_a_flat_cone_maps_to_itself() -> None:
 
 
 def test_a_rounded_cone_angle_is_told() -> None:
-    cmap = conformal_map(bump(40, 20), BoundaryCondition("isometric", quantum=np.pi / 3))
+    cmap = conformal_map(bump(40, 20), BoundaryCondition("isometric", quantum="hex"))
     [note] = cmap.notes
     assert "-60°" in note
-    cylinder = conformal_map(bump(40, 20), BoundaryCondition("isometric", quantum=2 * np.pi))
+    funnel = grid(40, 10, revolution(lambda s: 1 + 0.1 * s, lambda s: 2 * s))
+    cylinder = conformal_map(funnel, BoundaryCondition("isometric", quantum="hex"))
     assert cylinder.kind == "cylinder"
     assert "a cylinder" in cylinder.notes[0]
 
 
 def test_a_cone_angle_that_needs_no_rounding_is_no_news() -> None:
     tube = grid(12, 10, revolution(lambda s: 1 + 0.3 * np.sin(np.pi * s), lambda s: 2 * s))
-    cmap = conformal_map(tube, BoundaryCondition("isometric", quantum=np.pi / 3))
+    cmap = conformal_map(tube, BoundaryCondition("isometric", quantum="hex"))
     assert cmap.kind == "cylinder"
     assert cmap.notes == ()
 
@@ -124,10 +123,9 @@ def test_a_cone_angle_that_needs_no_rounding_is_no_news() -> None:
 def test_a_long_tube_on_a_cone_has_a_map() -> None:
     """A tube 160 times as long as around, on a cone: one end is e^167 times as large as the other."""
     tube = grid(8, 200, revolution(lambda s: 0.02 + 0 * s, lambda s: 20 * s))
-    corners = BoundaryCondition(
-        "angles",
-        vertices=np.array([0, int(tube.loops[1][0])]),
-        angles=np.array([2 * np.pi / 3, 4 * np.pi / 3]),
+    corners = corners_at(
+        np.array([0, int(tube.loops[1][0])]),
+        np.array([2 * np.pi / 3, 4 * np.pi / 3]),
     )
     cone = conformal_map(tube, corners)
     assert faults(cone) == []
@@ -148,7 +146,7 @@ def ring_with_corners(off: float) -> ConformalMap:
     inner, outer = surface.loops
     vertices = np.concatenate([outer[::12], inner[::12]])
     angles = np.repeat([2 * np.pi / 3 - off / 6, 4 * np.pi / 3 + off / 6], 6)
-    return conformal_map(surface, BoundaryCondition("angles", vertices=vertices, angles=angles))
+    return conformal_map(surface, corners_at(vertices, angles))
 
 
 @pytest.mark.parametrize("off", [1e-8, -1e-6, 1e-4, 1e-2])

@@ -11,21 +11,19 @@ from hypothesis import strategies as st
 
 from hexwrap_solver.conformal import conformal_map
 from hexwrap_solver.conformal.corners import GAUSS_BONNET_TOLERANCE, boundary_angles
-from hexwrap_solver.conformal.types import ANGLE_UNITS, AngleUnit, BoundaryCondition
-from hexwrap_solver.errors import BoundaryError, GaussBonnetError
+from hexwrap_solver.conformal.types import ANGLE_UNITS, AngleUnit, BoundaryAngle, BoundaryCondition, Quantum
+from hexwrap_solver.errors import BoundaryError, GaussBonnetError, SettingError
 from hexwrap_solver.surface.types import Surface
-from tests.solver.conformal.annuli import bump
+from tests.solver.conformal.annuli import bump, corners_at
 from tests.solver.conformal.test_conformal_map import assert_honest
 
 SURFACE = bump(36, 12)
 TOP = SURFACE.loops[1]
 
 
-def listed(*pairs: tuple[int, float], quantum: float | None = None) -> BoundaryCondition:
+def listed(*pairs: tuple[int, float], quantum: Quantum = "none") -> BoundaryCondition:
     vertices, angles = zip(*pairs, strict=True)
-    return BoundaryCondition(
-        "angles", vertices=np.array(vertices), angles=np.array(angles, dtype=float), quantum=quantum
-    )
+    return corners_at(np.array(vertices), np.array(angles, dtype=float), quantum=quantum)
 
 
 def test_an_entrance_on_a_cylinder() -> None:
@@ -44,24 +42,24 @@ def test_corners_on_both_loops_make_a_cone() -> None:
     """Figure 5, middle: three corners on one loop and their counterparts on the other."""
     bottom = [(v, np.pi - np.pi / 3) for v in (0, 12, 24)]
     top = [(int(TOP[k]), np.pi + np.pi / 3) for k in (0, 12, 24)]
-    cmap = conformal_map(SURFACE, listed(*bottom, *top, quantum=np.pi / 3))
+    cmap = conformal_map(SURFACE, listed(*bottom, *top, quantum="hex"))
     assert_honest(cmap)
     assert cmap.deck.angle == pytest.approx(np.pi, abs=1e-14)
 
 
 def test_points_mean_their_nearest_boundary_vertex() -> None:
     near = SURFACE.vertices[[5, int(TOP[3])]] * 1.001
-    condition = BoundaryCondition(
-        "angles", vertices=np.array([-1, -1]), points=near, angles=np.array([2.0, 2 * np.pi - 2.0])
-    )
+    angles = (2.0, 2 * np.pi - 2.0)
+    entries = (BoundaryAngle(a, point=tuple(p)) for a, p in zip(angles, near.tolist(), strict=True))
+    condition = BoundaryCondition("angles", tuple(entries))
     bottom, top = boundary_angles(SURFACE, condition)
     assert bottom[5] == pytest.approx(2.0)
     assert top[3] == pytest.approx(2 * np.pi - 2.0)
 
 
 @settings(max_examples=30, deadline=None)
-@given(st.floats(-0.99e-3, 0.99e-3), st.sampled_from([None, np.pi / 3, np.pi / 2]))
-def test_a_small_rest_goes_to_the_vertices_left_at_pi(rest: float, quantum: float | None) -> None:
+@given(st.floats(-0.99e-3, 0.99e-3), st.sampled_from(["none", "hex", "quad"]))
+def test_a_small_rest_goes_to_the_vertices_left_at_pi(rest: float, quantum: Quantum) -> None:
     condition = listed((4, 2 * np.pi / 3), (int(TOP[4]), 4 * np.pi / 3 + rest), quantum=quantum)
     bottom, top = boundary_angles(SURFACE, condition)
     assert (np.pi - bottom).sum() + (np.pi - top).sum() == pytest.approx(0, abs=1e-12)
@@ -69,7 +67,7 @@ def test_a_small_rest_goes_to_the_vertices_left_at_pi(rest: float, quantum: floa
     assert top[4] == 4 * np.pi / 3 + rest
     others = np.concatenate([np.delete(bottom, 4), np.delete(top, 4)])
     assert np.abs(others - np.pi).max() <= abs(rest) / 30 + 1e-15
-    if quantum == np.pi / 3:
+    if quantum == "hex":
         assert (np.pi - bottom).sum() == pytest.approx(np.pi / 3, abs=1e-13)
 
 
@@ -90,7 +88,7 @@ def test_gauss_bonnet_names_both_sums_what_is_missing_and_an_example_that_closes
 def test_gauss_bonnet_speaks_the_unit_of_the_request(unit: AngleUnit, told: tuple[str, ...]) -> None:
     asked = listed((3, 4 * np.pi / 3), (int(TOP[0]), np.pi / 2))
     with pytest.raises(GaussBonnetError) as caught:
-        boundary_angles(SURFACE, replace(asked, unit=unit))
+        boundary_angles(SURFACE, replace(asked, angle_unit=unit))
     assert all(figure in caught.value.detail for figure in told)
     assert " rad" not in caught.value.detail
     example, data = caught.value.data["example"], caught.value.data
@@ -126,7 +124,7 @@ def assert_closes(surface: Surface, example: object) -> None:
 def test_angles_that_no_vertex_can_have(angle: float) -> None:
     with pytest.raises(BoundaryError, match="positive") as caught:
         boundary_angles(SURFACE, listed((0, 3.0), (1, angle)))
-    assert caught.value.field == ("boundary", "angles", 1, "angle")
+    assert caught.value.field == ("angles", 1, "angle")
 
 
 def test_angles_too_large_for_any_surface() -> None:
@@ -139,12 +137,13 @@ def test_vertices_inside_are_refused_with_the_nearest_boundary_vertex() -> None:
     with pytest.raises(BoundaryError, match="nearest to 40 is 4,") as caught:
         boundary_angles(SURFACE, listed((0, 3.0), (40, 3.2)))
     assert caught.value.vertices == [40]
-    assert caught.value.field == ("boundary", "angles", 1, "vertex")
+    assert caught.value.field == ("angles", 1, "vertex")
 
 
 def test_vertices_that_were_never_sent() -> None:
-    with pytest.raises(BoundaryError, match="only vertices 0 to"):
-        boundary_angles(SURFACE, listed((10_000, 3.0)))
+    for vertex in (10_000, -1):
+        with pytest.raises(BoundaryError, match="only vertices 0 to"):
+            boundary_angles(SURFACE, listed((vertex, 3.0)))
 
 
 def test_one_vertex_listed_twice() -> None:
@@ -153,10 +152,15 @@ def test_one_vertex_listed_twice() -> None:
     assert caught.value.vertices == [4]
 
 
-def test_an_entry_without_a_place() -> None:
-    condition = BoundaryCondition("angles", vertices=np.array([-1]), angles=np.array([3.0]))
-    with pytest.raises(BoundaryError, match="neither a vertex nor a point"):
-        boundary_angles(SURFACE, condition)
+def test_an_entry_names_a_vertex_or_a_point() -> None:
+    for place in ({}, {"vertex": 3, "point": (0.0, 0.0, 0.0)}):
+        with pytest.raises(SettingError, match="either 'vertex' or 'point'"):
+            BoundaryAngle(3.0, **place)
+
+
+def test_a_point_that_is_nowhere() -> None:
+    with pytest.raises(BoundaryError, match="not finite numbers"):
+        boundary_angles(SURFACE, BoundaryCondition("angles", (BoundaryAngle(3.0, point=(0.0, np.nan, 0.0)),)))
 
 
 @pytest.mark.parametrize("all_of", [(0,), (1,), (0, 1)])
@@ -167,15 +171,14 @@ def test_a_loop_whose_vertices_are_all_listed_gives_way_to_the_quantum(all_of: t
     loop_of = np.isin(vertices, surface.loops[1]).astype(int)
     counts = np.bincount(loop_of)
     angles = np.round(np.pi + np.array([-1, 1])[loop_of] * np.pi / 3 / counts[loop_of], 5)
-    condition = BoundaryCondition("angles", vertices=vertices, angles=angles, quantum=np.pi / 3)
+    condition = corners_at(vertices, angles, quantum="hex")
     first, second = boundary_angles(surface, condition)
     assert (np.pi - first).sum() == pytest.approx(np.pi / 3, abs=1e-12)
     assert (np.pi - second).sum() == pytest.approx(-np.pi / 3, abs=1e-12)
 
 
-@pytest.mark.parametrize("angles", [None, np.zeros(0)])
-def test_a_list_without_angles_is_straight_and_says_so(angles) -> None:
-    empty = conformal_map(SURFACE, BoundaryCondition("angles", angles=angles))
+def test_a_list_without_angles_is_straight_and_says_so() -> None:
+    empty = conformal_map(SURFACE, BoundaryCondition("angles"))
     straight = conformal_map(SURFACE, BoundaryCondition())
     assert np.array_equal(empty.uv, straight.uv)
     assert any("list of angles is empty" in note for note in empty.notes)

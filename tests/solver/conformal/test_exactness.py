@@ -18,6 +18,7 @@ from hexwrap_solver.surface.types import Surface
 from tests.solver.conformal.annuli import (
     bump,
     catenoid,
+    corners_at,
     flat_cone,
     grid,
     irregular,
@@ -34,18 +35,17 @@ seeds = st.integers(0, 2**32 - 1)
 conditions = st.sampled_from(
     [
         BoundaryCondition(),
-        BoundaryCondition(
-            "angles",
-            vertices=np.array([3, int(TOWER.loops[1][5])]),
-            angles=np.array([2 * np.pi / 3, 4 * np.pi / 3]),
+        corners_at(
+            np.array([3, int(TOWER.loops[1][5])]),
+            np.array([2 * np.pi / 3, 4 * np.pi / 3]),
         ),
     ]
 )
 isometric_conditions = st.sampled_from(
     [
         BoundaryCondition("isometric"),
-        BoundaryCondition("isometric", quantum=np.pi / 3),
-        BoundaryCondition("isometric", quantum=np.pi / 3, spread="optimal"),
+        BoundaryCondition("isometric", quantum="hex"),
+        BoundaryCondition("isometric", quantum="hex", spread="optimal"),
     ]
 )
 
@@ -122,7 +122,7 @@ def test_labels_and_the_place_of_the_cut_change_nothing(seed: int, condition: Bo
 @given(seeds)
 def test_the_circumference_of_a_ring_without_an_apex_does_not_depend_on_the_cut(seed: int) -> None:
     plane = grid(30, 8, ring())
-    condition = BoundaryCondition("isometric", quantum=np.pi / 3)
+    condition = BoundaryCondition("isometric", quantum="hex")
     before, after = conformal_map(plane, condition), conformal_map(shuffled(plane, seed)[0], condition)
     assert before.deck.apex is None
     assert before.kind == "cone"
@@ -154,7 +154,7 @@ def polar(cmap: ConformalMap, z: Complexes) -> tuple[Floats, Floats]:
 
 def test_a_flat_cylinder_maps_to_itself() -> None:
     cylinder = grid(24, 10, prism(24, 3.0))
-    for condition in (BoundaryCondition(), BoundaryCondition("isometric", quantum=np.pi / 3)):
+    for condition in (BoundaryCondition(), BoundaryCondition("isometric", quantum="hex")):
         cmap = conformal_map(cylinder, condition)
         assert np.abs(cmap.log_scale).max() < 1e-12
         assert cmap.deck == Deck(0.0, pytest.approx(2 * np.pi, rel=1e-12))
@@ -172,7 +172,7 @@ def test_flat_cones_map_to_themselves(angle: float) -> None:
 def test_a_flat_ring_maps_to_itself_and_g_is_the_identity() -> None:
     """K = 2π: a rotation by a whole turn, so g has no apex; here it is not even a translation."""
     flat = irregular(40, 8, ring())
-    cmap = conformal_map(flat, BoundaryCondition("isometric", quantum=np.pi / 3))
+    cmap = conformal_map(flat, BoundaryCondition("isometric", quantum="hex"))
     assert cmap.deck == Deck(pytest.approx(2 * np.pi, abs=1e-14), 0j)
     assert cmap.deck.apex is None
     place = flat.vertices[:, 0] + 1j * flat.vertices[:, 1]
@@ -187,7 +187,7 @@ def test_a_ring_with_a_full_turn_may_have_a_translation() -> None:
         place[:, 2] = 0.3 * np.exp(-8 * ((place[:, 0] + 0.3) ** 2 + (place[:, 1] - 0.6) ** 2))
         return place
 
-    cmap = conformal_map(irregular(40, 8, dented), BoundaryCondition("isometric", quantum=np.pi / 3))
+    cmap = conformal_map(irregular(40, 8, dented), BoundaryCondition("isometric", quantum="hex"))
     assert cmap.deck.angle == pytest.approx(2 * np.pi, abs=1e-14)
     assert cmap.deck.is_translation
     assert abs(cmap.deck.translation) > 1e-4
@@ -285,10 +285,9 @@ def test_powers_of_g_form_a_group(
 @pytest.mark.parametrize("angle", [1e-2, 1e-5, 1e-8, -1e-8])
 def test_cones_that_are_nearly_cylinders_keep_their_digits(angle: float) -> None:
     """The apex is far away; neither uv nor g may lose digits to it."""
-    condition = BoundaryCondition(
-        "angles",
-        vertices=np.array([3, int(TOWER.loops[1][5])]),
-        angles=np.array([np.pi - angle, np.pi + angle]),
+    condition = corners_at(
+        np.array([3, int(TOWER.loops[1][5])]),
+        np.array([np.pi - angle, np.pi + angle]),
     )
     cmap = conformal_map(TOWER, condition)
     assert_honest(cmap)
@@ -303,7 +302,7 @@ def test_optimal_spreading_has_less_dirichlet_energy_than_the_even_one() -> None
     tower = irregular(48, 16, BULGE)
     energy = {}
     for spread in ("even", "optimal"):
-        cmap = conformal_map(tower, BoundaryCondition("isometric", quantum=np.pi / 3, spread=spread))  # type: ignore[arg-type]
+        cmap = conformal_map(tower, BoundaryCondition("isometric", quantum="hex", spread=spread))  # type: ignore[arg-type]
         problem = Energy(tower, boundary.straight(tower))
         diagonal, off_diagonal = problem.hessian(problem.corners(np.zeros(problem.n)))
         x = problem.unknowns_of(cmap.log_scale)

@@ -7,7 +7,6 @@ import pytest
 
 from hexwrap_solver.arrays import Floats, Ints, no_progress
 from hexwrap_solver.conformal import boundary, conformal_map
-from hexwrap_solver.conformal.cut import cut_open
 from hexwrap_solver.conformal.energy import opposite_lengths
 from hexwrap_solver.conformal.orientation import misdrawn
 from hexwrap_solver.conformal.robust import solve as robust
@@ -24,7 +23,7 @@ from tests.solver.conformal.torture import TORTURE, crooked_prism, random_flips,
 
 def _mirrored(surface: Surface) -> MirrorMesh:
     log_length = np.log(opposite_lengths(surface.vertices, surface.faces))[[2, 0, 1]].T.ravel()
-    return mirror_mesh(surface, log_length, robust._turns(cut_open(surface).sheet).ravel())
+    return mirror_mesh(surface, log_length, robust._turns(robust._sheets(surface)).ravel())
 
 
 def _everywhere(mesh: MirrorMesh, random: np.random.Generator) -> Places:

@@ -9,7 +9,7 @@ from hexwrap_solver.conformal import conformal_map
 from hexwrap_solver.conformal.types import BoundaryCondition
 from hexwrap_solver.errors import ConvergenceError
 from hexwrap_solver.surface.types import Surface
-from tests.solver.conformal.annuli import annulus, bump, grid, irregular, revolution, ring, uneven
+from tests.solver.conformal.annuli import annulus, bump, corners_at, grid, irregular, revolution, ring, uneven
 from tests.solver.conformal.checks import asked_angles, faults
 from tests.solver.conformal.torture import MODES, band, extreme, random_flips, taken_in
 
@@ -55,7 +55,7 @@ def corners(surface: Surface, kind: str) -> BoundaryCondition:
             [pi - 2 * pi / k] * k + [pi + 2 * pi / len(second)] * len(second),
         ),
     }[kind]
-    return BoundaryCondition("angles", vertices=np.asarray(vertices), angles=np.array(angles))
+    return corners_at(np.asarray(vertices), np.array(angles))
 
 
 @pytest.mark.parametrize("name", SURFACES)
@@ -64,8 +64,8 @@ def corners(surface: Surface, kind: str) -> BoundaryCondition:
     [
         BoundaryCondition(),
         BoundaryCondition("isometric"),
-        BoundaryCondition("isometric", quantum=np.pi / 3),
-        BoundaryCondition("isometric", quantum=np.pi / 3, spread="optimal"),
+        BoundaryCondition("isometric", quantum="hex"),
+        BoundaryCondition("isometric", quantum="hex", spread="optimal"),
     ],
     ids=["straight", "isometric", "even", "optimal"],
 )
@@ -109,9 +109,7 @@ def test_corners_wider_than_a_turn_are_gone_around_once_and_a_bit() -> None:
     surface = wheel(155, 98, 109)
     loops = surface.loops
     angles = [np.pi - sign * 4 * np.pi / len(loop) for loop, sign in zip(loops, (1, -1), strict=True)]
-    condition = BoundaryCondition(
-        "angles", vertices=np.concatenate(loops), angles=np.repeat(angles, [len(loop) for loop in loops])
-    )
+    condition = corners_at(np.concatenate(loops), np.repeat(angles, [len(loop) for loop in loops]))
     found = conformal_map(surface, condition)
     assert faults(found, asked_angles(found, surface, condition)) == []
 
@@ -142,7 +140,7 @@ def test_splits_that_only_call_for_further_splits_are_not_made() -> None:
     vertices = vertices + random.normal(scale=0.02, size=vertices.shape)
     faces = random_flips(tower.faces, len(vertices), random, int(random.integers(0, 600)))
     surface = taken_in(vertices, faces)
-    found = conformal_map(surface, BoundaryCondition("isometric", quantum=np.pi / 3))
+    found = conformal_map(surface, BoundaryCondition("isometric", quantum="hex"))
     assert faults(found) == []
 
 

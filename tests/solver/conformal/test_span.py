@@ -13,7 +13,7 @@ from hexwrap_solver.panels import measure
 from hexwrap_solver.pattern import lay_pattern
 from hexwrap_solver.pattern.types import PatternSettings
 from hexwrap_solver.surface.types import Surface
-from tests.solver.conformal.annuli import grid, revolution
+from tests.solver.conformal.annuli import corners_at, grid, revolution
 from tests.solver.conformal.checks import asked_angles, faults
 from tests.solver.conformal.torture import MODES
 
@@ -45,7 +45,7 @@ def cone(surface: Surface, angle: float) -> BoundaryCondition:
     """The cone angle spread evenly over all vertices of both loops."""
     each = np.repeat([np.pi - angle / AROUND, np.pi + angle / AROUND], AROUND)
     vertices = surface.input_vertex[np.concatenate(surface.loops)]
-    return BoundaryCondition("angles", vertices=vertices, angles=each)
+    return corners_at(vertices, each)
 
 
 def growth(angle: float) -> float:

@@ -11,7 +11,7 @@ from hexwrap_solver.arrays import Floats, Ints, Ragged
 from hexwrap_solver.conformal.types import BoundaryCondition
 from hexwrap_solver.surface import SentMesh, surface_from_mesh
 from hexwrap_solver.surface.types import Surface
-from tests.solver.conformal.annuli import bump, grid, revolution
+from tests.solver.conformal.annuli import bump, corners_at, grid, revolution
 
 Random = np.random.Generator
 
@@ -366,15 +366,15 @@ def extreme(surface: Surface, random: Random) -> BoundaryCondition:
 
 
 def _listed(surface: Surface, vertices: Ints, angles: Floats) -> BoundaryCondition:
-    return BoundaryCondition("angles", vertices=surface.input_vertex[vertices], angles=angles)
+    return corners_at(surface.input_vertex[vertices], angles)
 
 
 def isometric_even(surface: Surface, random: Random) -> BoundaryCondition:
-    return BoundaryCondition("isometric", quantum=np.pi / 3, spread="even")
+    return BoundaryCondition("isometric", quantum="hex", spread="even")
 
 
 def isometric_optimal(surface: Surface, random: Random) -> BoundaryCondition:
-    return BoundaryCondition("isometric", quantum=np.pi / 3, spread="optimal")
+    return BoundaryCondition("isometric", quantum="hex", spread="optimal")
 
 
 def isometric_free(surface: Surface, random: Random) -> BoundaryCondition:

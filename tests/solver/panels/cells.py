@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from hexwrap_solver.arrays import Floats, Ragged
-from hexwrap_solver.conformal.types import ConformalMap, Deck
+from hexwrap_solver.conformal.types import ConformalMap, Deck, Unrolled
 from hexwrap_solver.pattern.types import Pattern
 from hexwrap_solver.surface.types import Surface
 
@@ -180,11 +180,8 @@ def grid_map(chart: Chart, columns: int, rows: int, low: float, high: float) -> 
     return ConformalMap(
         surface=surface,
         log_scale=-np.log(scale),
-        uv=x + 1j * y,
-        sheet=sheet,
-        deck=Deck(0.0, 2 * np.pi + 0j),
+        domain=Unrolled(x + 1j * y, sheet, Deck(0.0, 2 * np.pi + 0j), 2 * np.pi),
         boundary_angles=(straight, straight),
-        circumference=2 * np.pi,
         iterations=0,
         residual=0.0,
     )

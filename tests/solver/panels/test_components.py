@@ -66,7 +66,7 @@ def test_solids_are_closed_and_have_the_prism_volume(panels):
 def test_an_inset_that_leaves_nothing_is_refused(panels):
     with pytest.raises(PanelsError, match="inset") as caught:
         make_components(panels, ComponentSettings(inset=1.0))
-    assert caught.value.field == ("panels", "components", "inset")
+    assert caught.value.field == ("components", "inset")
 
 
 def test_without_an_inset_any_panel_is_its_own_outline():

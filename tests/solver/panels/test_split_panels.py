@@ -240,7 +240,7 @@ def test_a_joint_wider_than_the_cells_is_refused():
 def test_an_increment_longer_than_the_panels_is_refused():
     with pytest.raises(PanelsError, match="increment") as caught:
         panelize(torus, increment=10.0)
-    assert caught.value.field == ("panels", "increment")
+    assert caught.value.field == ("increment",)
 
 
 def fitted_with(limit):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hexwrap_solver.conformal.types import ConformalMap, Deck
+from hexwrap_solver.conformal.types import ConformalMap, Deck, Unrolled
 from hexwrap_solver.surface.types import Surface
 
 
@@ -55,11 +55,8 @@ def make_map(points, faces, sheet, uv, deck, around, log_scale=None) -> Conforma
     return ConformalMap(
         surface=surface,
         log_scale=np.zeros(n) if log_scale is None else log_scale,
-        uv=uv,
-        sheet=sheet,
-        deck=deck,
+        domain=Unrolled(uv, sheet, deck, circumference),
         boundary_angles=(angle[loops[0]], angle[loops[1]]),
-        circumference=circumference,
         iterations=0,
         residual=0.0,
     )

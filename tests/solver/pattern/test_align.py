@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hexwrap_solver.conformal import conformal_map
-from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap
+from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.errors import PatternError
 from hexwrap_solver.pattern import lay_pattern
 from hexwrap_solver.pattern.lattice import LATTICES
@@ -20,6 +20,7 @@ from hexwrap_solver.pattern.place.glued import Glued
 from hexwrap_solver.pattern.place.rows import rows_along
 from hexwrap_solver.pattern.place.sides import sides_of
 from hexwrap_solver.pattern.types import PatternSettings
+from tests.solver.conformal.annuli import corners_at
 from tests.solver.pattern import annuli
 from tests.solver.pattern.test_lay import check_closed
 from tests.solver.pattern.test_trim import cell_areas, domain_area, euler
@@ -44,7 +45,7 @@ def bell(case: str) -> ConformalMap:
     cmap = annuli.make_map(points, base.surface.faces, base.sheet, base.uv, base.deck, n)
     vertices = np.array(low + [n * rows + i for i in high])
     angles = np.pi * np.array(low_angles + high_angles)
-    return conformal_map(cmap.surface, BoundaryCondition(mode="angles", vertices=vertices, angles=angles))
+    return conformal_map(cmap.surface, corners_at(vertices, angles))
 
 
 MAPS = {case: bell(case) for case in CASES}
@@ -179,7 +180,7 @@ def test_a_mesh_of_corners_alone_has_nothing_to_deform():
     """A frustum of six vertices: each stands where two lines meet."""
     base = annuli.revolution(lambda z: 2 - z, np.linspace(0, 1, 2), 3)
     angles = np.pi * np.repeat([4 / 3, 2 / 3], 3)
-    cmap = conformal_map(base.surface, BoundaryCondition(mode="angles", vertices=np.arange(6), angles=angles))
+    cmap = conformal_map(base.surface, corners_at(np.arange(6), angles))
     pattern = lay_pattern(cmap, PatternSettings(around=24))
     check_closed(pattern)
     assert np.isfinite(pattern.distortion)

@@ -166,7 +166,7 @@ def test_flat_rings_close_with_the_translation_as_a_lattice_vector(shift, turns)
     points = np.stack([z.real, z.imag, np.tile(phi, (rows + 1, 1))], axis=-1).reshape(-1, 3)
     deck = Deck(2 * np.pi * turns, complex(shift))
     cmap = annuli.make_map(points, faces, sheet, z.ravel(), deck, n)
-    cmap = replace(cmap, circumference=2 * np.pi * turns * 0.63)
+    cmap = cmap.with_domain(circumference=2 * np.pi * turns * 0.63)
     for kind in ("hex", "triangle", "quad"):
         pattern = lay_pattern(cmap, PatternSettings(kind=kind, around=64 * turns, boundary="whole"))
         check_closed(pattern)

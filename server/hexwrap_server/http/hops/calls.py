@@ -13,9 +13,10 @@ import numpy as np
 
 from hexwrap_server.http.hops.components import COMPONENTS, LIFT, PANELS, HopsError
 from hexwrap_server.http.hops.values import output, read_inputs
-from hexwrap_server.input.curves import Curve, rhino_curve
 from hexwrap_server.input.json_text import loads, packed
+from hexwrap_server.input.readers.drawing import Curve
 from hexwrap_server.input.readers.rhino import convert
+from hexwrap_server.input.readers.rhino_curves import rhino_curve
 from hexwrap_server.input.requests import ParsedRequest, SentSurface, Wanted
 from hexwrap_server.input.schemas import Request, parse_request
 from hexwrap_server.jobs.lift_curves import lift_curves
@@ -23,7 +24,7 @@ from hexwrap_server.jobs.work import solution_at
 from hexwrap_server.jobs.worker import Report
 from hexwrap_server.output import wire
 from hexwrap_solver.pipeline import Solution
-from hexwrap_solver.surface.types import MeshSettings, SentMesh
+from hexwrap_solver.surface.types import MeshSettings, SentMesh, SurfaceSettings
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,7 @@ def _wanted(values: dict[str, Any], max_vertices: int, max_panels: int) -> Wante
 def _surface(geometry: Any, max_vertices: int) -> SentSurface:
     read = convert(geometry)
     if not isinstance(read, SentMesh):
-        return SentSurface(nurbs=read, meshing=MeshSettings(max_vertices=max_vertices))
+        return SentSurface(nurbs=read, settings=SurfaceSettings(MeshSettings(max_vertices=max_vertices)))
     if len(read.vertices) > max_vertices:
         raise HopsError(f"The mesh has {len(read.vertices)} vertices, this server takes {max_vertices}.")
     return SentSurface(mesh=read)

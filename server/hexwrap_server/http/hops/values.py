@@ -17,7 +17,7 @@ from hexwrap_server.http.hops.components import RESULT_TYPES, HopsError, Paramet
 def read_inputs(parameters: tuple[Parameter, ...], values: object) -> tuple[dict[str, Any], list[int]]:
     """Value of every parameter, and the branch that the first one came from. Raises HopsError.
 
-    An input that was left out, or whose tree holds no item, has its default.
+    An input that was left out, or whose tree holds no item but nulls, has its default.
     """
     trees = _trees(values)
     unknown = trees.keys() - {p.name for p in parameters}
@@ -26,7 +26,8 @@ def read_inputs(parameters: tuple[Parameter, ...], values: object) -> tuple[dict
     found: dict[str, Any] = {}
     branch = [0]
     for number, parameter in enumerate(parameters):
-        items = [(path, item) for path, row in trees.get(parameter.name, {}).items() for item in row]
+        tree = trees.get(parameter.name, {})
+        items = [(path, item) for path, row in tree.items() for item in row if not _is_null(item)]
         if not items:
             if parameter.required:
                 raise HopsError(f"{parameter.name} is empty: {parameter.description}")
@@ -64,6 +65,10 @@ def _branch(path: str) -> list[int]:
         raise HopsError(f"'{path[:40]}' is no path of a data tree.") from None
 
 
+def _is_null(item: Any) -> bool:
+    return item is None or (isinstance(item, dict) and item.get("data") in (None, "", "null"))
+
+
 def _read(parameter: Parameter, item: Any) -> Any:
     if not isinstance(item, dict) or not isinstance(item.get("data"), str):
         raise HopsError(f"{parameter.name}: every item needs its 'data' as a text of JSON.")
@@ -83,6 +88,9 @@ def _read(parameter: Parameter, item: Any) -> Any:
         decoded = None
     if decoded is None:
         raise HopsError(f"{parameter.name}: an item is no {parameter.kind.lower()} that can be read.")
+    if not isinstance(decoded, _GEOMETRY[parameter.kind]):
+        came, needed = type(decoded).__name__, _NEEDED[parameter.kind]
+        raise HopsError(f"{parameter.name}: a {came} came, but {needed} is needed.")
     return decoded
 
 
@@ -112,4 +120,10 @@ def _plane(frame: list[list[float]]) -> str:
     return json.dumps({name: dict(zip("XYZ", axis, strict=True)) for name, axis in named})
 
 
+#: What an input of each kind takes: a surface is meshed by the server.
+_GEOMETRY: dict[str, tuple[type, ...]] = {
+    "Mesh": (rhino3dm.Mesh, rhino3dm.Brep, rhino3dm.Surface),
+    "Curve": (rhino3dm.Curve,),
+}
+_NEEDED = {"Mesh": "a mesh or a surface", "Curve": "a curve"}
 _WRITE: dict[str, Callable[[Any], str]] = {"Curve": _curve, "Plane": _plane}

@@ -60,6 +60,8 @@ def _rows(faces: np.ndarray[Any, np.dtype[Any]]) -> Ragged:
             "four integers are needed."
         )
     table = faces.astype(np.int64)
+    if faces.dtype.kind == "u":
+        table[faces == np.iinfo(faces.dtype).max] = -1  # the −1 of a type without a sign
     if table.shape[1] == 3:
         return Ragged.from_table(table)
     whole = (table[:, 3] >= 0) & (table[:, 3] != table[:, 2])

@@ -8,6 +8,7 @@ import numpy as np
 import rhino3dm
 
 from hexwrap_server.input.readers.errors import SeveralObjectsError, UnreadableFileError
+from hexwrap_server.input.readers.rhino_brep import nurbs_surface
 from hexwrap_solver.arrays import Floats, Ragged
 from hexwrap_solver.surface import NurbsSurface, SentMesh
 
@@ -49,14 +50,14 @@ def convert(geometry: Any) -> SentMesh | NurbsSurface:
         return _mesh(geometry)
     if isinstance(geometry, rhino3dm.Brep):
         return _brep(geometry)
-    return _nurbs(geometry)
+    return nurbs_surface(geometry)
 
 
 def _brep(brep: Any) -> SentMesh | NurbsSurface:
     """Its surface where it has one untrimmed face, else the render meshes that Rhino saved with it."""
     faces = [brep.Faces[i] for i in range(len(brep.Faces))]
     if len(faces) == 1 and brep.IsSurface:
-        surface = _nurbs(faces[0].UnderlyingSurface())
+        surface = nurbs_surface(faces[0].UnderlyingSurface())
         return _turned(surface) if faces[0].OrientationIsReversed else surface
     meshes = [face.GetMesh(rhino3dm.MeshType.Any) for face in faces]
     if any(mesh is None for mesh in meshes):
@@ -93,31 +94,6 @@ def _normals(mesh: Any, n: int) -> Floats | None:
 
 def _xyz(point: Any) -> tuple[float, float, float]:
     return point.X, point.Y, point.Z
-
-
-def _nurbs(surface: Any) -> NurbsSurface:
-    """Rhino leaves out the first and the last knot, which no basis function depends on, and multiplies
-    control points by their weights."""
-    nurbs: Any = surface if isinstance(surface, rhino3dm.NurbsSurface) else surface.ToNurbsSurface()
-    if nurbs is None:
-        raise UnreadableFileError("The surface in the Rhino file has no NURBS form: convert it to a mesh.")
-    points = nurbs.Points
-    net = np.array(
-        [
-            [(*_xyz(p), p.W) for p in (points[i, j] for j in range(points.CountV))]
-            for i in range(points.CountU)
-        ],
-        dtype=np.float64,
-    )
-    net[..., :3] /= net[..., 3:]
-    knots = [np.array(list(k), dtype=np.float64) for k in (nurbs.KnotsU, nurbs.KnotsV)]
-    full = [np.concatenate([k[:1], k, k[-1:]]) for k in knots]
-    return NurbsSurface(
-        (nurbs.Degree(0), nurbs.Degree(1)),
-        (full[0], full[1]),
-        net,
-        (bool(nurbs.IsClosed(0)), bool(nurbs.IsClosed(1))),
-    )
 
 
 def _turned(surface: NurbsSurface) -> NurbsSurface:

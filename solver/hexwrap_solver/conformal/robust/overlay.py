@@ -148,8 +148,9 @@ class Overlay:
             found,
             surface=surface,
             log_scale=problem.u,
-            uv=straighten(surface, problem.targets, uv, sheet, found.deck),
-            sheet=sheet,
+            domain=replace(
+                found.unrolled, uv=straighten(surface, problem.targets, uv, sheet, found.deck), sheet=sheet
+            ),
             boundary_angles=(sums[0][surface.loops[0]], sums[1][surface.loops[1]]),
         )
         return drawn, start

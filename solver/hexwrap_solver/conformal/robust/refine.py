@@ -82,6 +82,7 @@ def split_edges(problem: Problem, marked: Ints, place: Floats) -> Problem:
         ),
         input_vertex=np.concatenate([surface.input_vertex, np.full(len(h), -1, dtype=np.int64)]),
         normals=normals,
+        patch=None if surface.patch is None else surface.patch[source],
         parameters=_blend_parameters(surface, i, j, s),
     )
     tie = np.where(inner | (targets.tie[i] != targets.tie[j]), -1, targets.tie[i])

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hexwrap_solver.arrays import Floats, Ints, Progress, no_progress
-from hexwrap_solver.conformal.boundary import cone_angle_of
+from hexwrap_solver.conformal.boundary import curvatures
 from hexwrap_solver.conformal.cut import cut_open
 from hexwrap_solver.conformal.energy import Energy, opposite_lengths
 from hexwrap_solver.conformal.layout import normalise
@@ -29,7 +29,7 @@ from hexwrap_solver.conformal.robust.refine import (
 )
 from hexwrap_solver.conformal.robust.straight import straighten
 from hexwrap_solver.conformal.span import MAX_SPAN, check_reach, check_span, failure, largest_span
-from hexwrap_solver.conformal.types import ConformalMap, Deck, Targets
+from hexwrap_solver.conformal.types import Cones, ConformalMap, Deck, Targets, Unrolled
 from hexwrap_solver.errors import ConvergenceError
 from hexwrap_solver.surface.types import Surface
 
@@ -50,7 +50,11 @@ REFINED = "The mesh was refined:"
 
 
 def solve_with_flips(
-    surface: Surface, targets: Targets, progress: Progress = no_progress, start: Floats | None = None
+    surface: Surface,
+    targets: Targets,
+    progress: Progress = no_progress,
+    start: Floats | None = None,
+    cones: Cones | None = None,
 ) -> ConformalMap:
     """The discretely conformal map that every annulus has if its triangulation may change.
 
@@ -62,6 +66,11 @@ def solve_with_flips(
     Sources: Gu, Luo, Sun, Wu 2018 (existence); Springborn 2020; Gillespie, Springborn, Crane 2021 (flips).
     Raises ConvergenceError where double precision does not suffice.
     """
+    if len(surface.loops) != 2 or cones:
+        raise ConvergenceError(
+            "The mesh does not suit this map as it is: triangles would break or turn over in the domain; "
+            "remesh it more evenly."
+        )
     problem = _problem(surface, targets, start)
     omitted: list[int] = []
     try:
@@ -140,7 +149,7 @@ def _inserted(
 def _in_one_piece(found: ConformalMap, first: Ints) -> ConformalMap:
     """The same map with its faces laid out side by side, but for one cut, if corners are near enough to the
     origin there to keep their digits. first: (m,) where the first corner of each face then stands."""
-    whole = replace(found, sheet=found.sheet + first[:, None])
+    whole = found.with_domain(sheet=found.sheet + first[:, None])
     if misdrawn(whole).any():
         return found
     before, after = drawn_errors(found), drawn_errors(whole)
@@ -152,20 +161,27 @@ def _in_one_piece(found: ConformalMap, first: Ints) -> ConformalMap:
 @dataclass(frozen=True)
 class FlatMetric:
     """A flat metric that has not been drawn. surface: the one it belongs to, with vertices inserted where
-    triangles could have had no room. u: (n,) logarithmic factors. sums: (n,) angle sums."""
+    triangles could have had no room. u: (n,) logarithmic factors. sums: (n,) angle sums. targets: of
+    that surface."""
 
     surface: Surface
     u: Floats
     sums: Floats
+    targets: Targets
 
 
 def metric_with_flips(
     surface: Surface, targets: Targets, progress: Progress = no_progress, start: Floats | None = None
 ) -> FlatMetric:
     """The metric of ``solve_with_flips``, whether or not straight triangles can be drawn in it."""
+    if len(surface.loops) != 2:
+        raise ConvergenceError(
+            "The mesh does not suit this map as it is: triangles would break or turn over in the domain; "
+            "remesh it more evenly."
+        )
     problem, cut = _uncollapse(_problem(surface, targets, start))
     flat = _flatten(problem, cut, progress)
-    return FlatMetric(problem.surface, flat.descent.u, flat.sums)
+    return FlatMetric(problem.surface, flat.descent.u, flat.sums, problem.targets)
 
 
 def _problem(surface: Surface, targets: Targets, start: Floats | None) -> Problem:
@@ -179,11 +195,17 @@ def _turns(sheet: Ints) -> Ints:
     return np.asarray(np.roll(sheet, -1, axis=1) - sheet)
 
 
+def _sheets(surface: Surface) -> Ints:
+    """(m, 3) sheet of every corner: 1 to the left of the cut, 0 elsewhere."""
+    fan = cut_open(surface, np.zeros(0, dtype=np.int64)).fan
+    return np.where(fan > 0, 1, 0).reshape(-1, 3)
+
+
 def _uncollapse(problem: Problem) -> tuple[Problem, Ints]:
     """Splits what has no room in the domain, until there is nothing of the kind. Also gives the sheets of a
     ``Cut``."""
     while True:
-        sheet = cut_open(problem.surface).sheet
+        sheet = _sheets(problem.surface)
         marked = collapsing(problem.surface, problem.targets, _turns(sheet).ravel())
         if not len(marked):
             return problem, sheet
@@ -226,11 +248,11 @@ def _flatten(problem: Problem, cut: Ints, progress: Progress, known_span: float 
     unit = float(np.median(log_length))  # logarithms near 0 have the most digits behind the point
     mesh = mirror_mesh(surface, log_length - unit, _turns(cut).ravel())
     flips = make_delaunay(mesh, np.zeros(mesh.n), euclidean=True)
-    span = MAX_SPAN if free else largest_span(cone_angle_of(targets, targets.angle, surface))
+    span = MAX_SPAN if free else largest_span(_cone_angle(targets, targets.angle, surface))
     descent = descend(FlipEnergy(Energy(surface, targets), mesh), problem.u, span, progress)
     sums = angle_sums(mesh, descent.metric)
     known = sums if free else targets.angle
-    angle = cone_angle_of(targets, known, surface)
+    angle = _cone_angle(targets, known, surface)
     check_span(descent.u, angle)
     off = _off(targets, sums, surface)
     if not (descent.residual <= ACCEPTED and off <= PROMISED):
@@ -259,20 +281,23 @@ def _draw(problem: Problem, flat: _Flat) -> tuple[ConformalMap, Ints, Ints]:
     unit = np.exp(flat.unit)
     deck = Deck(flat.cone_angle, laid.translation * unit)
     uv, deck, circumference = normalise(surface, laid.uv * unit, sheet, deck, foot)
+    uv = straighten(surface, targets, uv, sheet, deck)
     found = ConformalMap(
         surface=surface,
         log_scale=u,
-        uv=straighten(surface, targets, uv, sheet, deck),
-        sheet=sheet,
-        deck=deck,
-        boundary_angles=(sums[surface.loops[0]], sums[surface.loops[1]]),
-        circumference=circumference,
+        domain=Unrolled(uv, sheet, deck, circumference),
+        boundary_angles=tuple(sums[loop] for loop in surface.loops),
         iterations=descent.iterations,
         residual=descent.residual,
         flips=flat.flips,
         closing_error=laid.gap,
     )
     return found, laid.lift, first
+
+
+def _cone_angle(targets: Targets, sums: Floats, surface: Surface) -> float:
+    """K of an annulus."""
+    return float(curvatures(targets, sums, surface)[0])
 
 
 def _off(targets: Targets, sums: Floats, surface: Surface) -> float:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexwrap_solver.arrays import Bools, Complexes, Ints
+from hexwrap_solver.conformal.net import Net
 from hexwrap_solver.conformal.types import ConformalMap
-from hexwrap_solver.domain.net import Net
 from hexwrap_solver.pattern.lattice import Isometry, Lattice
 
 

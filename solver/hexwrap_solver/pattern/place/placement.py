@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -66,7 +66,7 @@ def quantized(cmap: ConformalMap, lattice: Lattice) -> ConformalMap:
     exact = quantum_turns(cmap, lattice) * lattice.quantum
     if abs(cmap.deck.angle - exact) <= EXACT:
         return cmap
-    return replace(cmap, deck=Deck(exact, cmap.deck.translation))
+    return cmap.with_domain(deck=Deck(exact, cmap.deck.translation))
 
 
 def check_phase(settings: PatternSettings) -> None:
@@ -75,7 +75,7 @@ def check_phase(settings: PatternSettings) -> None:
         raise PatternError(
             f"The phase is {settings.phase[0]:.6g}, {settings.phase[1]:.6g} cells, but at most "
             f"{MAX_PHASE:,.0f} are understood.",
-            field=("pattern", "phase"),
+            field=("phase",),
         )
 
 

@@ -40,7 +40,7 @@ def with_rotation(
         raise PatternError(
             f"The {settings.rotation} direction of the surface turns too much in the domain to be followed "
             f"by the pattern (agreement {abs(mean):.2f} of 1): give rotation as edge, vertex or degrees.",
-            field=("pattern", "rotation"),
+            field=("rotation",),
         )
     followed = np.exp(1j * np.angle(mean) / lattice.order)
     boundary = boundary_direction(cmap, lattice, anchor_vertex(cmap))
@@ -64,7 +64,7 @@ def parameter_directions(cmap: ConformalMap, direction: int) -> Complexes:
         raise PatternError(
             "Only a NURBS surface has u and v directions to follow: give rotation as edge, vertex or "
             "degrees.",
-            field=("pattern", "rotation"),
+            field=("rotation",),
         )
     parameters = parameter_corners(surface, np.arange(len(surface.faces)))
     other, own = parameters[..., 1 - direction], parameters[..., direction]

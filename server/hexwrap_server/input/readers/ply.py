@@ -1,0 +1,261 @@
+"""PLY: text and binary, faces of any size, triangle strips."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hexwrap_server.input.readers.errors import UnreadableFileError
+from hexwrap_server.input.readers.text import MARKS, Width, as_utf8, count, floats, rows
+from hexwrap_solver.arrays import Floats, Ints, Ragged
+from hexwrap_solver.surface import SentMesh
+
+_TYPES = {
+    "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2", "ushort": "u2",
+    "uint16": "u2", "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4", "long": "i8", "int64": "i8",
+    "ulong": "u8", "uint64": "u8", "float": "f4", "float32": "f4", "double": "f8", "float64": "f8",
+}  # fmt: skip
+_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
+_END = re.compile(rb"(?<=[\r\n])[ \t]*end_header[ \t]*(\r\n|\n|\r)", re.IGNORECASE)
+FACES = ("face", "tristrips")
+_CORNERS = ("vertex_indices", "vertex_index", "indices")
+
+
+@dataclass(frozen=True)
+class _Property:
+    """count: the type of a list's length, None for a single number."""
+
+    name: str
+    kind: str
+    count: str | None = None
+
+
+@dataclass(frozen=True)
+class _Element:
+    name: str
+    count: int
+    properties: tuple[_Property, ...]
+
+
+@dataclass(frozen=True)
+class _Rows:
+    """What was read of an element: columns of single numbers, and lists."""
+
+    single: dict[str, NDArray[np.float64]]
+    lists: dict[str, Ragged]
+
+
+def read_ply(data: bytes) -> SentMesh:
+    """The vertices with their normals, where it has some, and the faces or strips.
+
+    Raises UnreadableFileError.
+    """
+    order, elements, body = _head(data)
+    found = _text(body, elements) if order == "" else _binary(body, elements, order)
+    vertex = found.get("vertex")
+    if vertex is None or not {"x", "y", "z"} <= vertex.single.keys():
+        raise UnreadableFileError("The PLY file holds no mesh: it has no vertices with x, y and z.")
+    faces = _faces(found)
+    if faces is None or faces.n_rows == 0:
+        raise UnreadableFileError("The PLY file holds no mesh: it has no faces, only points.")
+    normals = None
+    if {"nx", "ny", "nz"} <= vertex.single.keys():
+        normals = np.stack([vertex.single[name] for name in ("nx", "ny", "nz")], axis=1)
+    return SentMesh(np.stack([vertex.single[name] for name in "xyz"], axis=1), faces, normals)
+
+
+def _head(data: bytes) -> tuple[str, list[_Element], bytes]:
+    """Byte order ("" for text), the elements, and what follows the header. Raises UnreadableFileError."""
+    if data.startswith(tuple(MARKS)):
+        data = as_utf8(data)
+    end = _END.search(data)
+    if not data[:3].lower() == b"ply" or end is None:
+        raise UnreadableFileError("The file is no PLY file: it has no header from 'ply' to 'end_header'.")
+    start = end.end()
+    if end[1] == b"\r\n" and b"\r\n" not in data[: end.start()]:
+        start -= 1  # lines end with \r alone, and the first byte of the body happens to be a \n
+    order = None
+    elements: list[_Element] = []
+    for line in data[: end.start()].decode("latin-1").splitlines():
+        match line.lower().split():
+            case ["format", name, *_]:
+                order = _ORDERS.get(name)
+            case ["element", name, count, *_] if count.isdecimal():
+                elements.append(_Element(name, int(count), ()))
+            case ["property", "list", count, kind, name, *_] if elements:
+                _add(elements, _Property(name, _type(kind), _type(count)))
+            case ["property", kind, name, *_] if elements:
+                _add(elements, _Property(name, _type(kind)))
+            case ["element" | "property", *_]:
+                raise UnreadableFileError(f"The header of the PLY file cannot be read: '{line[:60]}'.")
+    if order is None:
+        raise UnreadableFileError("The PLY file does not tell whether it is text or binary.")
+    return order, elements, data[start:]
+
+
+def _type(name: str) -> str:
+    if name not in _TYPES:
+        raise UnreadableFileError(f"The PLY file names a type '{name[:40]}', which is not one of PLY.")
+    return _TYPES[name]
+
+
+def _add(elements: list[_Element], found: _Property) -> None:
+    last = elements[-1]
+    elements[-1] = _Element(last.name, last.count, (*last.properties, found))
+
+
+def _text(body: bytes, elements: list[_Element]) -> dict[str, _Rows]:
+    lines = [line for raw in body.splitlines() if (line := raw.split())]
+    held = [element for element in elements if element.properties]
+    parts = [(element.name, element.count, _width(element)) for element in held]
+    cut = rows(lines, parts)
+    return {element.name: _text_rows(element, found) for element, found in zip(held, cut, strict=True)}
+
+
+def _width(element: _Element) -> Width:
+    def width(words: list[bytes], at: int) -> int:
+        place = at
+        for item in element.properties:
+            place += 1 if item.count is None else 1 + count(words[place])
+        return place - at
+
+    return width
+
+
+def _text_rows(element: _Element, found: list[list[bytes]]) -> _Rows:
+    single: dict[str, NDArray[np.float64]] = {}
+    lists: dict[str, Ragged] = {}
+    what = f"rows of '{element.name}' in the PLY file"
+    at = [0] * len(found)  # where the property stands in each row
+    for item in element.properties:
+        if item.count is None:
+            single[item.name] = floats([row[k] for row, k in zip(found, at, strict=True)], what)
+            at = [k + 1 for k in at]
+        else:
+            counts = [int(row[k]) for row, k in zip(found, at, strict=True)]
+            words = [x for row, k, c in zip(found, at, counts, strict=True) for x in row[k + 1 : k + 1 + c]]
+            lists[item.name] = Ragged(floats(words, what), np.append(0, np.cumsum(counts)).astype(np.int64))
+            at = [k + 1 + c for k, c in zip(at, counts, strict=True)]
+    return _Rows(single, lists)
+
+
+def _binary(body: bytes, elements: list[_Element], order: str) -> dict[str, _Rows]:
+    found: dict[str, _Rows] = {}
+    at = 0
+    for element in elements:
+        if "vertex" in found and any(found[name].lists for name in FACES if name in found):
+            break  # edges, materials and other things behind the faces do not matter
+        found[element.name], at = _binary_rows(body, at, element, order)
+    return found
+
+
+def _binary_rows(body: bytes, at: int, element: _Element, order: str) -> tuple[_Rows, int]:
+    """The rows of an element that begins there, and where the next one begins."""
+    n, items = element.count, element.properties
+    if n == 0 or not items:
+        return _Rows({i.name: np.zeros(0) for i in items if i.count is None}, {}), at
+    starts, counts, end = _places(body, at, element, order)
+    raw = np.frombuffer(body, dtype=np.uint8)
+    single: dict[str, NDArray[np.float64]] = {}
+    lists: dict[str, Ragged] = {}
+    place = starts
+    for number, item in enumerate(items):
+        size = np.dtype(item.kind).itemsize
+        if item.count is None:
+            single[item.name] = _gathered(raw, place, order + item.kind)
+            place = place + size
+            continue
+        first = place + np.dtype(item.count).itemsize
+        many = counts[number]
+        offsets = np.append(0, np.cumsum(many)).astype(np.int64)
+        within = np.arange(offsets[-1]) - np.repeat(offsets[:-1], many)
+        lists[item.name] = Ragged(
+            _gathered(raw, np.repeat(first, many) + size * within, order + item.kind), offsets
+        )
+        place = first + size * many
+    return _Rows(single, lists), end
+
+
+def _gathered(raw: NDArray[np.uint8], starts: Ints, kind: str) -> Floats:
+    """The numbers that begin at these bytes."""
+    size = np.dtype(kind).itemsize
+    numbers: Floats = raw[starts[:, None] + np.arange(size)].view(kind)[:, 0].astype(np.float64)
+    return numbers
+
+
+def _places(body: bytes, at: int, element: _Element, order: str) -> tuple[Ints, dict[int, Ints], int]:
+    """Where each row begins, the lengths of its lists by property, and where the last row ends.
+
+    Raises UnreadableFileError where the file ends before.
+    """
+    n, items = element.count, element.properties
+    if len(body) - at < n:  # a row has at least one byte, so memory is bounded by the file
+        raise _cut_short(element, len(body) - at)
+    sizes = [np.dtype(item.kind).itemsize for item in items]
+    if all(item.count is None for item in items):
+        step = sum(sizes)
+        if at + n * step > len(body):
+            raise _cut_short(element, (len(body) - at) // step)
+        return at + step * np.arange(n), {}, at + n * step
+    heads = [item.count and (np.dtype(item.count).itemsize, item.count[0] == "i") for item in items]
+    byteorder = "little" if order == "<" else "big"
+    starts = np.zeros(n, dtype=np.int64)
+    counts = {k: np.zeros(n, dtype=np.int64) for k, head in enumerate(heads) if head}
+    end = len(body)
+    for row in range(n):  # where a row begins is known only when the one before has been read
+        starts[row] = at
+        for k, head in enumerate(heads):
+            if not head:
+                at += sizes[k]
+                continue
+            wide, signed = head
+            many = int.from_bytes(body[at : at + wide], byteorder, signed=signed)  # type: ignore[arg-type]
+            at += wide + many * sizes[k]
+            if many < 0 or at > end:
+                raise _cut_short(element, row)
+            counts[k][row] = many
+        if at > end:
+            raise _cut_short(element, row)
+    return starts, counts, at
+
+
+def _cut_short(element: _Element, held: int) -> UnreadableFileError:
+    return UnreadableFileError(
+        f"The PLY file announces {element.count} rows of '{element.name}' but holds {held}: it is cut short "
+        "or damaged, so export it again."
+    )
+
+
+def _faces(found: dict[str, _Rows]) -> Ragged | None:
+    """The corners of the faces; strips are taken apart."""
+    for element in FACES:
+        lists = found[element].lists if element in found else {}
+        named = next((name for name in _CORNERS if name in lists), next(iter(lists), None))
+        if named is None or lists[named].n_rows == 0:
+            continue
+        corners = lists[named]
+        whole = Ragged(np.asarray(corners.values).astype(np.int64), corners.offsets)
+        return whole if element == "face" else _strips(whole)
+    return None
+
+
+def _strips(strips: Ragged) -> Ragged:
+    """Each corner from the third on makes a triangle with the two before it; −1 ends a strip within a row.
+
+    Every second triangle is turned over, since a strip zigzags.
+    """
+    index, row = np.asarray(strips.values, dtype=np.int64), strips.row
+    ends = np.flatnonzero(index < 0)
+    piece = row + np.searchsorted(ends, np.arange(len(index)))
+    kept = index >= 0
+    index, piece = index[kept], piece[kept]
+    first = np.searchsorted(piece, piece)  # pieces do not decrease
+    at = np.flatnonzero(np.arange(len(index)) - first >= 2)
+    odd = (at - first[at]) % 2 == 1
+    a, b, c = index[at - 2], index[at - 1], index[at]
+    triangles = np.stack([np.where(odd, b, a), np.where(odd, a, b), c], axis=1)
+    real = (a != b) & (b != c) & (c != a)  # repeated corners steer a strip around a turn
+    return Ragged.from_table(triangles[real])

@@ -1,0 +1,63 @@
+"""The domain as a net: triangles of the plane that motions glue to each other across their edges.
+
+Cylinder, cone, ring, disk, dome, sphere and tower with openings are all of this form. Inside the cut-open
+surface neighbours simply stand beside each other; across the cut the neighbour stands beside a face only
+after a motion z ↦ e^{iα} z + t, one of a small table. Composed around a cone the motions are a rotation by
+its curvature about its place, around a boundary loop they are the loop's holonomy. The net may overlap
+itself: places are the same if the faces that hold them are, never because they coincide in the plane.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints
+
+
+@dataclass(frozen=True)
+class Net:
+    """Half-edge c of face f runs from its corner c to corner c + 1.
+
+    corners: (m, 3) complex, every face positively oriented.
+    across: (m, 3) face on the other side of each half-edge, −1 at the boundary.
+    crossing: (m, 3) the motion that brings that face here: beside face f, across half-edge c, stands
+    M(corners[across]). Motion 0 is the identity.
+    angle: (t,) rotation of each motion, radians. translation: (t,) complex.
+    inverse: (t,) which motion undoes each.
+    winding: (t,) of annuli without cones, which power of the deck transformation each motion is; else None.
+    """
+
+    corners: Complexes
+    across: Ints
+    crossing: Ints
+    angle: Floats
+    translation: Complexes
+    inverse: Ints
+    winding: Ints | None = None
+
+    def apply(self, motion: Ints, z: Complexes) -> Complexes:
+        """M(z) for arrays of motions and places."""
+        return np.asarray(np.exp(1j * self.angle[motion]) * z + self.translation[motion])
+
+    def moved(self, factor: complex, shift: complex) -> Net:
+        """The same net after z ↦ factor · z + shift."""
+        turn = np.exp(1j * self.angle)
+        return replace(
+            self,
+            corners=factor * self.corners + shift,
+            translation=factor * self.translation + (1 - turn) * shift,
+        )
+
+    def restricted(self, keep: Bools) -> Net:
+        """The net of some faces, keep (m,); what lay across to others is boundary then."""
+        new = np.full(len(keep) + 1, -1, dtype=np.int64)  # the last one stands for −1
+        new[np.flatnonzero(keep)] = np.arange(int(keep.sum()))
+        across = new[self.across[keep]]
+        return replace(
+            self,
+            corners=self.corners[keep],
+            across=across,
+            crossing=np.where(across < 0, 0, self.crossing[keep]),
+        )

@@ -1,0 +1,347 @@
+"""Triangles of one face: rows of points inside its boundary, Delaunay, splits where edges are too long."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+import shapely
+from scipy.spatial import cKDTree
+
+from hexwrap_solver.arrays import Bools, Floats, Ints
+from hexwrap_solver.surface.brep.plane import triangulated
+from hexwrap_solver.surface.brep.pull import Patch, free
+from hexwrap_solver.surface.brep.sizes import Field, Sizes, bilinear
+from hexwrap_solver.surface.errors import TrimError
+from hexwrap_solver.surface.flips import flip_to_delaunay, independent
+from hexwrap_solver.surface.mesh_sizes import ROW, cumulated
+from hexwrap_solver.surface.nurbs import evaluate, evaluate_points
+from hexwrap_solver.surface.projection import project
+from hexwrap_solver.surface.topology import edge_lengths, face_normals, half_edges, sum_rows, twins
+
+#: Points inside keep away from the boundary by this part of its edges' lengths, which are looked at in so
+#: many places each.
+AWAY, PLACES = 0.5, 4
+#: Rounds of splits; each halves the edges that are too long.
+ROUNDS = 24
+#: Triangles with an angle below this, radians, are made better by moving their vertices, so often at first.
+SMALL, SMOOTHINGS = np.deg2rad(38), 3
+#: Moves are taken back at most so often before all of them are.
+UNDOINGS = 8
+#: A row may be so much lower than equilateral.
+FLATTEST = 3.0
+
+
+@dataclass(frozen=True)
+class Outline:
+    """The boundary of a face, and lines on it that have to be edges.
+
+    id: (k,) the mesh vertex of each corner, −1 for corners of lines inside; several corners may be one
+    vertex, at seams and poles. uv: (k, 2). points: (k, 3). loops: (l + 1,) the first corners of loops; those
+    beyond are inside. lines: (s, 2) pairs of corners joined inside.
+    """
+
+    id: Ints
+    uv: Floats
+    points: Floats
+    loops: Ints
+    lines: Ints
+
+    @property
+    def segments(self) -> Ints:
+        """(k, 2) pairs of corners that become edges."""
+        k = np.arange(self.loops[-1])
+        following = k + 1
+        following[self.loops[1:] - 1] = self.loops[:-1]
+        return np.concatenate([np.stack([k, following], axis=1), self.lines])
+
+    @property
+    def polygon(self) -> shapely.Polygon:
+        return polygon_of(self.uv, self.loops)
+
+
+@dataclass(frozen=True)
+class Piece:
+    """The mesh of one face: first the vertices of its outline, then its own.
+
+    faces: (m, 3) counter-clockwise in the parameters' plane. lines: edges inside that stay. loose: (n, 2)
+    whether a parameter means nothing there, at poles. fixed: (n,) vertices that stay where they are.
+    """
+
+    uv: Floats
+    points: Floats
+    faces: Ints
+    lines: Ints
+    loose: Bools
+    fixed: Bools
+
+    def middle(self, start: Ints, end: Ints) -> Floats:
+        """(k, 2) parameters halfway along edges."""
+        a, b = self.uv[start], self.uv[end]
+        a, b = np.where(self.loose[start], b, a), np.where(self.loose[end], a, b)
+        return np.asarray((a + b) / 2)
+
+
+def polygon_of(uv: Floats, loops: Ints) -> shapely.Polygon:
+    rings = [uv[a:b] for a, b in pairwise(loops)]
+    return shapely.Polygon(rings[0], rings[1:])
+
+
+def piece_of(patch: Patch, outline: Outline, field: Field, sizes: Sizes, most: int, name: int) -> Piece:
+    """Triangles inside the outline; no inner edge longer than wanted. Raises TrimError."""
+    chart = Chart.of(field)
+    inner = _inner(patch, chart, outline)
+    uv = np.concatenate([outline.uv, inner])
+    xy = chart.at(uv)
+    polygon = polygon_of(xy, outline.loops)
+    if not polygon.is_valid:
+        raise TrimError(
+            f"The boundary of face {name} of the polysurface crosses itself "
+            f"({shapely.is_valid_reason(polygon).split('[')[0].lower()}): rebuild that face in Rhino.",
+            data={"face": name},
+        )
+    faces = triangulated(xy, outline.segments, polygon)
+    if faces is None:
+        raise TrimError(
+            f"Face {name} of the polysurface could not be filled with triangles: its boundary nearly touches "
+            "itself. Rebuild that face in Rhino, or save the object with render meshes.",
+            data={"face": name},
+        )
+    points = np.concatenate([outline.points, evaluate_points(patch.opened, inner)])
+    merged = _one_per_pole(outline, points, len(uv))
+    faces = merged[faces]
+    faces = faces[(faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])]
+    lines = merged[outline.lines]
+    faces = flip_to_delaunay(points, faces, keep=lines)
+    loose = np.zeros(uv.shape, dtype=bool)
+    pole = np.unique(merged[merged != np.arange(len(uv))])
+    loose[pole] = free(patch, uv[pole])
+    fixed = np.arange(len(uv)) < len(outline.uv)
+    piece = Piece(uv, points, faces, lines, loose, fixed)
+    for _ in range(SMOOTHINGS):
+        piece = _smoothed(patch, piece)
+    return _split_long(patch, piece, sizes, most)
+
+
+def _one_per_pole(outline: Outline, points: Floats, n: int) -> Ints:
+    """(n,) vertices, neighbours on the outline at one and the same place (a pole) being one."""
+    label = np.arange(n)
+    for a, b in zip(outline.loops[:-1], outline.loops[1:], strict=True):
+        following = np.roll(np.arange(a, b), -1)
+        same = outline.id[a:b] == outline.id[following]
+        for i, j in zip(np.arange(a, b)[same], following[same], strict=True):
+            label[label == label[j]] = label[i]
+    return label
+
+
+@dataclass(frozen=True)
+class Chart:
+    """A map of the parameters to the plane in which edges of the wanted length are about 1 long.
+
+    Rows run along s; swapped: s is v and t is u. x: (b, a) and y: (b, a) over the grid of s (a,) and t (b,);
+    y counts rows in their heights, and in all there are ``rows``.
+    """
+
+    s: Floats
+    t: Floats
+    swapped: bool
+    x: Floats
+    y: Floats
+    rows: int
+    along: Floats
+
+    @classmethod
+    def of(cls, field: Field) -> Chart:
+        """Rows run in the direction across which they are of more even heights."""
+        density = field.density / field.h**2
+        rates = []
+        for speed in (field.speed_u, field.speed_v):
+            s = speed / field.h
+            rates.append((s, density / np.maximum(s, 1e-9 * s.max()) / ROW))
+        uneven = [_unevenness(rates[0][1], field.inside), _unevenness(rates[1][1].T, field.inside.T)]
+        swapped = uneven[1] < 0.9 * uneven[0]
+        s, t = (field.v, field.u) if swapped else (field.u, field.v)
+        along, rise = (x.T if swapped else x for x in rates[1 if swapped else 0])
+        height = cumulated(rise.T, np.diff(t)).T
+        needed = height[-1]
+        rows = max(1, int(np.ceil(float(needed.max()) - 1e-6)))
+        y = height / np.maximum(needed, 1e-12 * needed.max()) * rows * ROW
+        flat = np.maximum(needed / rows, 1 / FLATTEST)
+        weight = np.where((field.inside.T if swapped else field.inside), 1.0, 1e-3)
+        mean = (along * weight).sum(axis=0) / weight.sum(axis=0)
+        x = cumulated(mean[None], np.diff(s))[0]
+        return cls(s, t, bool(swapped), np.tile(x, (len(t), 1)), y, rows, along / flat)
+
+    def at(self, uv: Floats) -> Floats:
+        """(k, 2) places in the plane; mirrored where swapped, so that turns stay what they are."""
+        st = uv[:, ::-1] if self.swapped else uv
+        x = bilinear(self.s, self.t, self.x, st)
+        return np.stack([-x if self.swapped else x, bilinear(self.s, self.t, self.y, st)], axis=1)
+
+    def lattice(self) -> Floats:
+        """(k, 2) parameters of staggered rows of points over the whole grid, its ends left out."""
+        out = []
+        k = np.arange(1, self.rows)
+        heights = np.stack(
+            [np.interp(k * ROW, self.y[:, i], self.t) for i in range(len(self.s))], axis=1
+        ).reshape(len(k), -1)
+        along = np.stack(
+            [np.interp(heights[:, i], self.t, self.along[:, i]) for i in range(len(self.s))], axis=1
+        ).reshape(len(k), -1)
+        total = cumulated(along, np.diff(self.s))
+        for row in range(len(k)):
+            n = max(1, int(np.ceil(total[row, -1] - 1e-6)))
+            place = (np.arange(n) + 0.5 * (k[row] % 2)) / n * total[row, -1]
+            s = np.interp(place, total[row], self.s)
+            out.append(np.stack([s, np.interp(s, self.s, heights[row])], axis=1))
+        st = np.concatenate(out) if out else np.zeros((0, 2))
+        return np.asarray(st[:, ::-1] if self.swapped else st)
+
+
+def _unevenness(rise: Floats, inside: Bools) -> float:
+    """Mean variation of the height of rows (b, a) along themselves."""
+    weight = np.where(inside, 1.0, 1e-3)
+    mean = (rise * weight).sum(axis=1) / weight.sum(axis=1)
+    spread = (np.abs(rise - mean[:, None]) * weight).sum(axis=1) / weight.sum(axis=1)
+    return float((spread / np.maximum(mean, 1e-300)).mean())
+
+
+def _inner(patch: Patch, chart: Chart, outline: Outline) -> Floats:
+    """(k, 2) parameters of points inside, not too near to the outline."""
+    uv = chart.lattice()
+    polygon = outline.polygon
+    shapely.prepare(polygon)
+    uv = uv[shapely.contains_xy(polygon, uv)]
+    if len(uv) == 0:
+        return np.asarray(uv)
+    one, two = outline.points[outline.segments[:, 0]], outline.points[outline.segments[:, 1]]
+    part = (np.arange(PLACES) / PLACES)[:, None, None]
+    length = np.linalg.norm(two - one, axis=1)
+    distance, nearest = cKDTree((one + part * (two - one)).reshape(-1, 3)).query(
+        evaluate_points(patch.opened, uv)
+    )
+    return np.asarray(uv[distance > AWAY * length[nearest % len(one)]])
+
+
+def _split_long(patch: Patch, piece: Piece, sizes: Sizes, most: int) -> Piece:
+    """Halves inner edges that are longer or farther off the surface than wanted, and flips to Delaunay."""
+    for _ in range(ROUNDS):
+        long = _too_long(patch, piece, sizes)
+        if len(long) == 0 or len(piece.points) > most:
+            break
+        piece = _halved(patch, piece, long)
+        piece = replace(piece, faces=flip_to_delaunay(piece.points, piece.faces, keep=piece.lines))
+        piece = _smoothed(patch, piece)
+    return piece
+
+
+def _smoothed(patch: Patch, piece: Piece) -> Piece:
+    """Vertices around triangles of small angles move to the middle of their neighbours, on the surface, where
+    that turns no triangle over; then edges are flipped to Delaunay."""
+    n = len(piece.points)
+    poor = piece.faces[_least_angles(piece.points, piece.faces) < SMALL].ravel()
+    near = np.zeros(n, dtype=bool)
+    near[poor] = True
+    near[piece.faces[near[piece.faces].any(axis=1)]] = True
+    pole = np.logical_or(*piece.loose.T)
+    near[piece.faces[pole[piece.faces].any(axis=1)]] = False
+    move = np.flatnonzero(near & ~piece.fixed)
+    if len(move) == 0:
+        return piece
+    start, end = half_edges(piece.faces)
+    count = np.maximum(np.bincount(start, minlength=n), 1)
+    middle = sum_rows(piece.points[end], start, n) / count[:, None]
+    jet = evaluate(patch.opened, piece.uv[move])
+    away = middle[move] - jet.point
+    pairs = (jet.du, jet.du), (jet.du, jet.dv), (jet.dv, jet.dv)
+    e, f, g = (np.einsum("ij,ij->i", a, b) for a, b in pairs)
+    p, q = np.einsum("ij,ij->i", away, jet.du), np.einsum("ij,ij->i", away, jet.dv)
+    determinant = np.maximum(e * g - f * f, 1e-12 * np.maximum(e * g, 1e-300))
+    step = np.stack([g * p - f * q, e * q - f * p], axis=1) / determinant[:, None]
+    uv, points = piece.uv.copy(), piece.points.copy()
+    uv[move] += step
+    points[move] = evaluate_points(patch.opened, uv[move])
+    before = _least_angles(piece.points, piece.faces)
+    normal = face_normals(piece.points, piece.faces)
+    for _ in range(UNDOINGS):
+        worse = np.einsum("ij,ij->i", face_normals(points, piece.faces), normal) <= 0
+        worse |= _least_angles(points, piece.faces) < np.minimum(before, SMALL) * 0.7
+        if not worse.any():
+            break
+        back = np.unique(piece.faces[worse])
+        uv[back], points[back] = piece.uv[back], piece.points[back]
+    else:
+        return piece
+    return replace(piece, uv=uv, points=points, faces=flip_to_delaunay(points, piece.faces, keep=piece.lines))
+
+
+def _least_angles(points: Floats, faces: Ints) -> Floats:
+    """(m,) the smallest angle of each triangle, radians, between its longer sides."""
+    length = np.sort(edge_lengths(points, faces), axis=1)
+    area = np.linalg.norm(face_normals(points, faces), axis=1)
+    sine = area / np.maximum(length[:, 1] * length[:, 2], 1e-300)
+    return np.asarray(np.arcsin(np.clip(sine, 0.0, 1.0)))
+
+
+def _too_long(patch: Patch, piece: Piece, sizes: Sizes) -> Ints:
+    """Inner half-edges to be halved, the worst first."""
+    twin = twins(piece.faces, len(piece.points))
+    h = np.flatnonzero(twin > np.arange(len(twin)))
+    start, end = (side[h] for side in half_edges(piece.faces))
+    length = np.linalg.norm(piece.points[start] - piece.points[end], axis=1)
+    excess = length / sizes.longest
+    if np.isfinite(sizes.height):
+        middle = (piece.points[start] + piece.points[end]) / 2
+        uv = piece.middle(start, end)
+        height = np.linalg.norm(evaluate_points(patch.opened, uv) - middle, axis=1)
+        high = np.flatnonzero(height > sizes.height)
+        if len(high):
+            foot, _, _ = project(patch.opened, middle[high], uv[high], 3)
+            height[high] = np.linalg.norm(middle[high] - foot, axis=1)
+        excess = np.maximum(excess, np.sqrt(height / sizes.height))
+    worst = np.flatnonzero(excess > 1)
+    return h[worst[np.argsort(-excess[worst], kind="stable")]]
+
+
+def _halved(patch: Patch, piece: Piece, h: Ints) -> Piece:
+    """Edges (no two of a face) split at the middle of their parameters."""
+    twin = twins(piece.faces, len(piece.points))
+    h = independent(h, twin, len(piece.faces))
+    faces = piece.faces
+    start, end = (side[h] for side in half_edges(faces))
+    uv = piece.middle(start, end)
+    new = len(piece.uv) + np.arange(len(h))
+    t = twin[h]
+    c = faces.ravel()[_third(h)]
+    d = faces.ravel()[_third(t)]
+    out = faces.copy()
+    out[h // 3] = np.stack([start, new, c], axis=1)
+    out[t // 3] = np.stack([end, new, d], axis=1)
+    more = [np.stack([new, end, c], axis=1), np.stack([new, start, d], axis=1)]
+    lines, on_lines = _halved_lines(piece.lines, start, end, new)
+    return Piece(
+        np.concatenate([piece.uv, uv]),
+        np.concatenate([piece.points, evaluate_points(patch.opened, uv)]),
+        np.concatenate([out, *more]),
+        lines,
+        np.concatenate([piece.loose, np.zeros((len(new), 2), dtype=bool)]),
+        np.concatenate([piece.fixed, np.isin(new, on_lines)]),
+    )
+
+
+def _third(h: Ints) -> Ints:
+    return 3 * (h // 3) + (h + 2) % 3
+
+
+def _halved_lines(lines: Ints, start: Ints, end: Ints, new: Ints) -> tuple[Ints, Ints]:
+    """Lines that were split are replaced by their halves; and the new vertices on them."""
+    n = int(new.max(initial=0)) + 1
+    key = np.minimum(start, end) * n + np.maximum(start, end)
+    own = lines.min(axis=1) * n + lines.max(axis=1)
+    order = np.argsort(key)
+    place = np.minimum(np.searchsorted(key[order], own), len(key) - 1)
+    hit = key[order][place] == own
+    middle = new[order[place[hit]]]
+    halves = [np.stack([lines[hit, 0], middle], axis=1), np.stack([middle, lines[hit, 1]], axis=1)]
+    return np.concatenate([lines[~hit], *halves]), middle

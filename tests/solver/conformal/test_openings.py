@@ -1,0 +1,87 @@
+"""Openings: filled smoothly, mapped as wall, and cut out again."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hexwrap_solver.arrays import Bools
+from hexwrap_solver.conformal import boundary, conformal_map
+from hexwrap_solver.conformal.types import BoundaryCondition
+from hexwrap_solver.surface import with_openings
+from hexwrap_solver.surface.holes import fill_openings
+from hexwrap_solver.surface.types import Surface
+from tests.solver.conformal.annuli import bump
+from tests.solver.conformal.test_net import CENTRES, SPHERE, check, holed, sent
+
+TOWER = bump(48, 20)
+
+
+def windows(count: int, width: int = 4, height: int = 4) -> Surface:
+    """The tower with so many windows, evenly around it."""
+    column, row = TOWER.faces % 48, TOWER.faces // 48
+    left = np.where(np.ptp(column, axis=1) > 24, 47, column.min(axis=1))
+    low = row.min(axis=1)
+    away: Bools = np.zeros(len(TOWER.faces), dtype=bool)
+    for k in range(count):
+        first = k * 48 // count + 1
+        away |= (left >= first) & (left < first + width) & (low >= 8) & (low < 8 + height)
+    return sent(TOWER.vertices, TOWER.faces[~away])
+
+
+@settings(max_examples=8, deadline=None)
+@given(st.integers(1, 8), st.integers(1, 5), st.integers(1, 8))
+def test_the_fill_is_smooth_and_manifold(count: int, width: int, height: int) -> None:
+    """A window is filled to within a tenth of an edge of the wall that was there."""
+    surface = with_openings(windows(count, width, height), "cut")
+    assert surface.openings == count
+    filled = fill_openings(surface)
+    again = sent(filled.vertices, filled.faces)  # the intake's checks
+    assert len(again.loops) == 2 == len(filled.loops)
+    assert np.array_equal(filled.faces[: len(surface.faces)], surface.faces)
+    new = filled.vertices[len(surface.vertices) :]
+    if len(new):
+        assert TOWER.tree.nearest(new).distance.max() < 0.1 * TOWER.lengths.mean()
+
+
+@pytest.mark.parametrize("mode", ["straight", "isometric"])
+def test_the_map_beside_a_window_is_what_it_would_be_without(mode: str) -> None:
+    asked = BoundaryCondition(mode, quantum="hex")  # type: ignore[arg-type]
+    surface = with_openings(windows(6), "cut")
+    found, whole = conformal_map(surface, asked), conformal_map(TOWER, asked)
+    check(found)
+    assert found.surface is surface
+    assert found.kind == whole.kind
+    assert (found.cones.vertex == whole.cones.vertex).all()
+    there = whole.log_scale[surface.input_vertex]
+    assert np.abs(found.log_scale - there).max() < 0.02
+    for angles in found.boundary_angles[2:]:
+        assert float((np.pi - angles).sum()) == pytest.approx(-2 * np.pi, abs=1e-9)
+    assert "6 openings" in found.notes[0]
+
+
+def test_a_window_that_does_not_lie_flat() -> None:
+    """A ring-like hole around most of the tower: no plane shows it without overlap."""
+    surface = with_openings(windows(1, 40, 2), "cut")
+    found = conformal_map(surface, BoundaryCondition())
+    check(found)
+    assert len(found.surface.loops) == 3
+
+
+def test_with_loops_the_openings_are_boundaries() -> None:
+    surface = with_openings(windows(3), "loop")
+    found = conformal_map(surface, BoundaryCondition(quantum="hex"))
+    check(found)
+    assert found.kind == "net"
+    sums = [boundary.cone_angle(angles) for angles in found.boundary_angles]
+    assert sums == pytest.approx([0, 0, *[-2 * np.pi] * 3], abs=1e-8)
+
+
+def test_a_dome_keeps_its_longest_two_loops() -> None:
+    surface = with_openings(holed(SPHERE, CENTRES[:4], 0.35), "cut")
+    found = conformal_map(surface, BoundaryCondition("isometric", quantum="hex"))
+    check(found)
+    assert found.kind in ("cylinder", "cone")
+    assert len(found.surface.loops) == 4
