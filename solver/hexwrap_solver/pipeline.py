@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, Protocol, TypeVar
 
 from hexwrap_solver.arrays import Progress, no_progress
@@ -21,6 +21,8 @@ from hexwrap_solver.panels.types import Components, ComponentSettings, Panels, P
 from hexwrap_solver.pattern import lay_pattern
 from hexwrap_solver.pattern.types import Pattern, PatternSettings
 from hexwrap_solver.setting import Setting
+from hexwrap_solver.singularities.solve import closed_map, needs_singularities, seated
+from hexwrap_solver.singularities.types import SingularitySettings
 from hexwrap_solver.surface.types import Surface
 from hexwrap_solver.threads import one_blas_thread
 
@@ -72,6 +74,10 @@ class SolveSettings:
     panels: Annotated[PanelSettings | None, Setting("the panels; null stops after the pattern")] = field(
         default_factory=PanelSettings
     )
+    singularities: Annotated[
+        SingularitySettings | None,
+        Setting("cells with more or fewer sides; null: none, except where the topology asks for them"),
+    ] = None
     support: Annotated[
         bool, Setting("add the torsion-free support structure, with beams where components have a depth")
     ] = False
@@ -99,7 +105,7 @@ def _solve(
     pattern, panels = settings.pattern, settings.panels
     boundary = settings.boundary.adapted(pattern.kind if pattern else None)
     surface = run("surface", source, lambda progress: take_in())
-    cmap = run("map", boundary, lambda progress: conformal_map(surface, boundary, progress))
+    cmap = _map(surface, settings, boundary, run)
     if pattern is None:
         return Solution(cmap, run("quality", None, lambda progress: measure(cmap, None, None)))
     laid = run("pattern", pattern, lambda progress: lay_pattern(cmap, pattern, progress))
@@ -117,3 +123,28 @@ def _solve(
         depth = wanted.depth if wanted is not None else 0.0
         frame = run("support", depth, lambda progress: support(laid, depth, progress))
     return Solution(cmap, quality, laid, made, parts, frame)
+
+
+def _map(
+    surface: Surface, settings: SolveSettings, boundary: BoundaryCondition, run: StageRunner
+) -> ConformalMap:
+    """With singularities where they are asked for, or needed."""
+    asked, pattern = settings.singularities, settings.pattern
+    if asked is None and needs_singularities(surface, boundary):
+        asked = SingularitySettings("auto")
+    if asked is None or (asked.count in (None, 0) and not asked.at):
+        return run("map", boundary, lambda progress: conformal_map(surface, boundary, progress))
+    wanted = asked
+    sizes = settings.panels.sizes if settings.panels is not None else None
+    classes = sizes if isinstance(sizes, int) else None
+    shape = None if pattern is None else replace(pattern, phase=(0.0, 0.0), max_cells=0)
+    seats = run(
+        "singularities",
+        (wanted, boundary, shape, classes),
+        lambda progress: seated(surface, boundary, wanted, pattern, classes, progress),
+    )
+    return run(
+        "map",
+        boundary,
+        lambda progress: closed_map(surface, seats.frame, seats.placing, boundary, progress),
+    )

@@ -73,7 +73,8 @@ def _pattern(around: int, rings: int, edge: float, turn: float, origin: Floats) 
     cells = around * rings
     across = np.stack([_across(ring, place, k, rings, around) for k in range(6)], axis=1)
     return Pattern(
-        "hex", points, normals, uv @ [1, 1j], Ragged.from_table(index.reshape(cells, 6)), sheet,
+        "hex", points, normals, uv @ [1, 1j], Ragged.from_table(index.reshape(cells, 6)),
+        uv[index.ravel()] @ [1, 1j] + sheet * 3 * around * edge / 2, np.zeros(cells, dtype=int), sheet,
         Ragged.from_table(across), np.zeros(len(uv), dtype=int), np.full((len(uv), 3), 1 / 3),
         np.ones(cells, dtype=bool), ring, place, rings, around, 0.0, edge, 0.0,
     )  # fmt: skip
@@ -104,4 +105,5 @@ def _panels(pattern: Pattern, edge: float, sizes: int) -> Panels:
     return Panels(
         "split", Ragged.from_table(polygons), np.arange(n), size, lengths[size], np.full(n, 0.95 * edge),
         centre, normal, np.ones(n, dtype=bool), lengths, np.bincount(size, minlength=sizes),
+        np.full(sizes, 6),
     )  # fmt: skip

@@ -29,7 +29,7 @@ def test_sizes_have_as_many_different_colours(n: int) -> None:
 
 
 def test_panels_without_a_size_are_grey() -> None:
-    rgb = panel_colours(np.array([0, -1, 1]), 2)
+    rgb = panel_colours(np.array([0, -1, 1]), size_colours(2))
     assert to_hex(rgb) == [size_colours(2)[0], UNSIZED, size_colours(2)[1]]
 
 

@@ -98,7 +98,7 @@ def test_results_are_as_described(client: Live, changes: dict[str, Any], include
         ("mesh", "faces", [[0, 1]]),
         ("mesh", "vertices", [[0, 0, None]]),
         ("map", "kind", "sphere"),
-        ("map", "deck", None),
+        ("map", "residual", None),
         ("pattern", "whole", [1]),
         ("pattern", "neighbours", [[-2]]),
         ("panels", "label", None),

@@ -17,9 +17,9 @@ import numpy as np
 import pytest
 
 from hexwrap_server.input.readers.errors import UnreadableFileError
-from hexwrap_server.input.surface_files import read_surface
+from hexwrap_server.input.surface_files import read_file
 from hexwrap_solver.surface import SentMesh, surface_from_mesh
-from tests.server.test_reading import obj, off, ply
+from tests.server.test_reading import obj, off, ply, read_surface
 from tests.solver.surface.shapes import triangles, tube
 
 CASES = Path(__file__).parents[3] / "shared" / "cases" / "files"
@@ -254,8 +254,8 @@ def test_triangle_strips(binary: bool) -> None:
     else:
         rows = [*points.tolist(), *([len(s), *s] for s in strips)]
         body = "\n".join(" ".join(map(str, row)) for row in rows).encode()
-    sent = read_surface("\n".join(head).encode() + body, "a.ply")
-    assert isinstance(sent, SentMesh)
+    sent = read_file("\n".join(head).encode() + body, "a.ply").mesh
+    assert sent is not None
     turned = [face[np.argmin(face) :] + face[: np.argmin(face)] for face in sent.faces.to_lists()]
     assert sorted(turned) == sorted(f[np.argmin(f) :] + f[: np.argmin(f)] for f in expected)
 

@@ -70,7 +70,7 @@ def test_the_script_makes_what_is_bundled(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", FIGURES)
 def test_the_rhino_file_holds_the_same_surface(name: str) -> None:
     path = samples.path_3dm(name)
-    read, sent = read_surface(path.read_bytes(), path.name), surface_of(name)
+    read, sent = read_surface(path.read_bytes(), path.name).geometry, surface_of(name)
     assert isinstance(read, NurbsSurface)
     assert read.closed == sent.closed
     np.testing.assert_allclose(rings(read, 20, 50), rings(sent, 20, 50), atol=1e-9)

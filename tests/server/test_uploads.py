@@ -46,9 +46,11 @@ def test_file_in_a_form_is_the_surface_sent_as_json(client: Live) -> None:
     for name, data in (("tube.obj", obj()), ("TUBE.NPZ", npz())):
         answer = client.post("/v1/surfaces", files={"file": (name, data)})
         assert answer.status_code == 201, answer.text
-        assert answer.json() == as_json
+        (listed,) = answer.json()["objects"]
+        assert listed["used"]
+        assert answer.json() | {"objects": []} == as_json
         raw = client.post("/v1/surfaces", params={"name": name}, content=data)
-        assert raw.json() == as_json
+        assert raw.json() == answer.json()
 
 
 @pytest.mark.parametrize(
@@ -177,14 +179,17 @@ def test_surface_that_a_job_asks_for_while_it_is_pruned_stays(tmp_path: Path) ->
     store.close()
 
 
-OPEN_DISK = {"vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "faces": [[0, 1, 2]]}
+FIN = {
+    "vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1]],
+    "faces": [[0, 1, 2], [1, 0, 3], [0, 1, 4]],
+}
 
 
 @pytest.mark.parametrize(
     ("surface", "pointer"),
     [
-        (OPEN_DISK, ""),
-        (OPEN_DISK | {"faces": [[0, 1, 1.5]]}, "/faces/0/2"),
+        (FIN, ""),
+        (FIN | {"faces": [[0, 1, 1.5]]}, "/faces/0/2"),
         (
             {
                 "nurbs": {
@@ -209,8 +214,8 @@ def test_pointers_lead_into_the_body_as_it_was_sent(
 
 
 def test_of_a_file_the_whole_is_at_fault(client: Live) -> None:
-    data = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
-    answer = client.post("/v1/surfaces", params={"name": "disk.obj"}, content=data)
+    data = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 -1 0\nv 0 0 1\nf 1 2 3\nf 2 1 4\nf 1 2 5\n"
+    answer = client.post("/v1/surfaces", params={"name": "fin.obj"}, content=data)
     assert answer.status_code == 422
     assert [error["pointer"] for error in answer.json()["errors"]] == [""]
 

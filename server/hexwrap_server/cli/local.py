@@ -10,14 +10,14 @@ from typing import Any
 from hexwrap_server import samples
 from hexwrap_server.cli.options import asked_body
 from hexwrap_server.input.json_text import loads
+from hexwrap_server.input.readers.text import as_utf8
 from hexwrap_server.input.requests import SentSurface, Wanted
 from hexwrap_server.input.schemas import parse_request
-from hexwrap_server.input.surface_files import read_surface
+from hexwrap_server.input.surface_files import sent_surface
 from hexwrap_server.jobs.cache import CachingRunner, StageCache
 from hexwrap_server.jobs.work import run_stages
 from hexwrap_server.jobs.worker import Report
 from hexwrap_solver.pipeline import Solution
-from hexwrap_solver.surface import MeshSettings, NurbsSurface, SentMesh
 from hexwrap_solver.surface.types import SurfaceSettings
 
 #: Nobody but the user waits here, so only what no memory would hold is refused.
@@ -38,8 +38,8 @@ class Task:
     wanted: Wanted
 
 
-def read_body(given: str) -> tuple[dict[str, Any], SentMesh | NurbsSurface | None]:
-    """The request body in a request file or sample, or the surface in any other file.
+def read_body(given: str) -> tuple[dict[str, Any], bytes | None]:
+    """The request body in a request file or sample, or the contents of any other file.
 
     given: a path or ``sample:NAME``. Raises UsageError, HexwrapError.
     """
@@ -51,8 +51,8 @@ def read_body(given: str) -> tuple[dict[str, Any], SentMesh | NurbsSurface | Non
     except OSError as error:
         raise UsageError(f"{given} cannot be read: {error.strerror or error}.") from None
     if path.suffix.lower() != ".json":
-        return {"name": path.stem[:200]}, read_surface(data, path.name)
-    body = loads(data)
+        return {"name": path.stem[:200]}, data
+    body = loads(as_utf8(data))
     if not isinstance(body, dict):
         raise UsageError(f"{given} holds no JSON object; a request or a surface is one.")
     body = body if "surface" in body else {"surface": body}
@@ -68,22 +68,17 @@ def sample_body(name: str) -> dict[str, Any]:
 
 def task(given: str, arguments: argparse.Namespace) -> Task:
     """What an input and the options ask for. Raises UsageError, HexwrapError."""
-    body, surface = read_body(given)
-    if surface is not None:
+    body, data = read_body(given)
+    if data is not None:
         body["surface"] = {"id": ""}  # stands for the file's surface while the rest is checked
     request = parse_request(asked_body(arguments, body), MAX_VERTICES, MAX_PANELS)
     sent = request.surface
-    if surface is not None:
-        sent = _sent(surface)
+    if data is not None:
+        settings = request.wanted.surface or SurfaceSettings()
+        sent = sent_surface(data, Path(given).name, settings, MAX_VERTICES).sent
     if not isinstance(sent, SentSurface):
         raise UsageError(f"{given} names a surface that only a server knows; give the surface itself.")
     return Task(request.name, sent, request.wanted)
-
-
-def _sent(surface: SentMesh | NurbsSurface) -> SentSurface:
-    if isinstance(surface, SentMesh):
-        return SentSurface(mesh=surface)
-    return SentSurface(nurbs=surface, settings=SurfaceSettings(MeshSettings(max_vertices=MAX_VERTICES)))
 
 
 def solve_here(asked: Task, report: Report) -> tuple[Solution, dict[str, float]]:

@@ -1,4 +1,4 @@
-"""The one program, ``hexwrap``: serve, solve, lift, demo.
+"""The one program, ``hexwrap``: serve, solve, inspect, lift, demo.
 
 Exit status 0; 1 where the surface or the request cannot be solved (the problem's detail on stderr); 2 usage.
 """
@@ -20,9 +20,11 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from hexwrap_server import __version__, samples
 from hexwrap_server.cli.demo import ALL, DemoError, run_demo
+from hexwrap_server.cli.inspect import print_content
 from hexwrap_server.cli.local import Task, UsageError, only_map, solve_here, task
 from hexwrap_server.cli.options import add_request_options, as_options, is_option_at_fault
 from hexwrap_server.cli.summary import print_summary
+from hexwrap_server.input import form
 from hexwrap_server.input.curves import READERS, read_drawing, write_curves
 from hexwrap_server.input.curves import WRITERS as CURVE_WRITERS
 from hexwrap_server.input.finished_map import map_in_result
@@ -36,6 +38,7 @@ from hexwrap_server.problems import FormError
 from hexwrap_server.settings import Settings, add_arguments
 from hexwrap_solver.errors import HexwrapError
 from hexwrap_solver.pipeline import Solution
+from hexwrap_solver.surface.types import SurfaceSettings
 
 #: What an ending stands for where the name of the file says no more.
 ENDINGS = {
@@ -43,6 +46,8 @@ ENDINGS = {
     ".ifc": "panels.ifc", ".glb": "panels.glb", ".svg": "domain.svg",
     ".png": "panels.png", ".json": "result.json", ".npz": "result.npz",
 }  # fmt: skip
+#: Settings of a surface that choose among what a file holds.
+INSPECTED = ("object", "layer", "unit")
 INPUT = "a mesh (OBJ, PLY, STL, OFF, NPZ), a Rhino file (3DM), a request (JSON), or sample:NAME"
 
 
@@ -114,6 +119,13 @@ def make_parser() -> argparse.ArgumentParser:
     solve.add_argument("-q", "--quiet", action="store_true", help="print nothing but errors")
     add_request_options(solve)
     solve.set_defaults(command=_solve)
+    inspect = commands.add_parser("inspect", help="print what a file holds and what would be done with it")
+    inspect.add_argument(
+        "input", metavar="FILE", help="a mesh (OBJ, PLY, STL, OFF, NPZ) or a Rhino file (3DM)"
+    )
+    for name in INSPECTED:
+        inspect.add_argument(f"--{name}", metavar=name.upper(), help=f"as for solve --{name}")
+    inspect.set_defaults(command=_inspect)
     lift = commands.add_parser("lift", help="carry own points and curves from the domain onto the surface")
     lift.add_argument(
         "input",
@@ -197,6 +209,18 @@ def _solve(asked: argparse.Namespace) -> int:
         save(out, write(kind, solution, meta))
         console.print(f"wrote {out}", highlight=False)
     return 0
+
+
+def _inspect(asked: argparse.Namespace) -> int:
+    given = {name: getattr(asked, name) for name in INSPECTED if getattr(asked, name) is not None}
+    settings = form.read(SurfaceSettings, given)
+    try:
+        data = Path(asked.input).read_bytes()
+    except OSError as error:
+        raise UsageError(f"{asked.input} cannot be read: {error.strerror or error}.") from None
+    return print_content(
+        Console(soft_wrap=True, highlight=False, markup=False), data, Path(asked.input).name, settings
+    )
 
 
 def _lift(asked: argparse.Namespace) -> int:

@@ -50,7 +50,11 @@ def _domain(found: dict[str, Any]) -> Rows:
     yield "", found["kind"]
     if found["kind"] == "cone":
         yield "angle", angle(found["cone_angle"])
-    yield "circumference", length(found["circumference"])
+    if found["kind"] == "net":
+        yield "loops", str(len(found["boundary_angles"]))
+        yield "singularities", str(len(found["cones"]))
+    else:
+        yield "circumference", length(found["circumference"])
     yield "steps", str(found["iterations"])
     yield "residual", f"{found['residual']:.1e} rad"
     if found["flips"]:

@@ -25,19 +25,19 @@ _MESH = _all(
     faces=listed(listed(_INDEX, 3)),
     input_vertex=listed({"type": "integer", "minimum": -1}),
     vertex_of_input=listed({"type": "integer", "minimum": -1}),
-    loops=listed(listed(_INDEX), 2),
+    loops=listed(listed(_INDEX)),
     repairs=listed(_TEXT),
 )
 _MAP = _all(
-    kind={"enum": ["cylinder", "cone"]},
-    cone_angle=NUMBER,
+    kind={"enum": ["cylinder", "cone", "net"]},
+    cone_angle=nullable(NUMBER),
     log_scale=listed(NUMBER),
-    uv=listed(PLANE),
-    sheet=listed(listed(_INTEGER, 3)),
-    deck=_all(angle=NUMBER, translation=PLANE),
-    circumference=NUMBER,
+    uv=nullable(listed(PLANE)),
+    sheet=nullable(listed(listed(_INTEGER, 3))),
+    deck=nullable(_all(angle=NUMBER, translation=PLANE)),
+    circumference=nullable(NUMBER),
     apex=nullable(PLANE),
-    boundary_angles=listed(listed(NUMBER), 2),
+    boundary_angles=listed(listed(NUMBER)),
     iterations=_COUNT,
     residual=NUMBER,
     flips=_COUNT,
@@ -49,6 +49,7 @@ _PATTERN = _all(
     uv=listed(PLANE),
     faces=listed(listed(_INDEX)),
     whole=listed(_TRUTH),
+    index=listed(_INTEGER),
     neighbours=listed(listed({"type": "integer", "minimum": -1})),
     rings=_COUNT,
     around=_COUNT,
@@ -65,7 +66,13 @@ _PANELS = _all(
     normal=listed(POINT),
     whole=listed(_TRUTH),
 )
-_SIZE = _all(size=_INDEX, edge_length=NUMBER, count=_COUNT, color=_TEXT | {"pattern": "^#[0-9a-fA-F]{6}$"})
+_SIZE = _all(
+    size=_INDEX,
+    edge_length=NUMBER,
+    count=_COUNT,
+    sides=_COUNT,
+    color=_TEXT | {"pattern": "^#[0-9a-fA-F]{6}$"},
+)
 _QUALITY = _all(
     scale_ratio=NUMBER,
     quasi_conformal=_all(mean=NUMBER, max=NUMBER),

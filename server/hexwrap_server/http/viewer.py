@@ -20,11 +20,10 @@ from hexwrap_server.http.bodies import read_body
 from hexwrap_server.http.routes import JobId, service_of
 from hexwrap_server.input.form import Body, document, schema
 from hexwrap_server.input.uploads import sent_file
+from hexwrap_server.jobs.work import take_in
 from hexwrap_server.jobs.worker import Report
 from hexwrap_server.problems import body_is_the_surface, not_found
 from hexwrap_server.settings import MIB
-from hexwrap_solver.surface import surface_from_nurbs
-from hexwrap_solver.surface.types import MeshSettings, NurbsSurface
 
 STATIC = Path(__file__).parents[1] / "static"
 #: The page loads nothing from elsewhere, and says so to the browser.
@@ -103,10 +102,10 @@ def read_preview(
     report: Report, body: bytes, content_type: str, name: str, max_vertices: int, max_bytes: int
 ) -> bytes:
     """Vertices and faces of a file as JSON; runs in a worker. Raises UploadError, SurfaceError."""
-    read = sent_file(body, content_type, name, max_vertices, max_bytes)
-    if isinstance(read, NurbsSurface):
-        meshed = surface_from_nurbs(read, MeshSettings(max_vertices=max_vertices))
+    read = sent_file(body, content_type, name, max_vertices, max_bytes).sent
+    if read.mesh is None:
+        meshed = take_in(read)
         vertices, faces = meshed.vertices, meshed.faces.tolist()
     else:
-        vertices, faces = read.vertices, read.faces.to_lists()
+        vertices, faces = read.mesh.vertices, read.mesh.faces.to_lists()
     return orjson.dumps({"vertices": vertices, "faces": faces}, option=orjson.OPT_SERIALIZE_NUMPY)

@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 
 from hexwrap_server.cli.local import UsageError
+from hexwrap_solver.arrays import Floats, Ints
+from hexwrap_solver.conformal.net import Net
 from hexwrap_solver.conformal.types import ConformalMap, Deck, Unrolled
 from hexwrap_solver.surface import Surface
 from hexwrap_solver.surface.topology import vertex_normals
@@ -34,7 +36,7 @@ def _getter(path: Path) -> Getter | None:
     try:
         if path.suffix.lower() == ".npz":
             arrays = np.load(io.BytesIO(path.read_bytes()), allow_pickle=False)
-            return arrays.__getitem__ if "map.uv" in arrays else None
+            return arrays.__getitem__ if "map.log_scale" in arrays else None
         if path.suffix.lower() != ".json":
             return None
         result = json.loads(path.read_bytes())
@@ -43,6 +45,10 @@ def _getter(path: Path) -> Getter | None:
     if not isinstance(result, dict) or not isinstance(result.get("map"), dict):
         return None
 
+    return _in_dictionary(result)
+
+
+def _in_dictionary(result: dict[str, Any]) -> Getter:
     def get(name: str) -> Any:
         value: Any = result
         for step in name.split("."):
@@ -52,27 +58,54 @@ def _getter(path: Path) -> Getter | None:
     return get
 
 
+def with_corners(mesh: dict[str, Any], found: dict[str, Any]) -> dict[str, Any]:
+    """The ``map`` of a Result with ``corners``: (m, 3, 2) where the corners of each face stand."""
+    if found.get("corners") is None:
+        corners = _map(_in_dictionary({"mesh": mesh, "map": found})).corners()
+        found = found | {"corners": np.stack([corners.real, corners.imag], axis=-1)}
+    return found
+
+
+def _known(get: Getter, name: str) -> Any:
+    """None where there is no such value."""
+    try:
+        return get(name)
+    except (KeyError, IndexError):
+        return None
+
+
+def _domain(get: Getter, surface: Surface) -> Unrolled | Net:
+    uv = _known(get, "map.uv")
+    if uv is None:
+        corners = np.asarray(get("map.corners"), dtype=float)
+        return Net.of_corners(corners[..., 0] + 1j * corners[..., 1], surface.twin)
+    uv, translation = np.asarray(uv, dtype=float), np.asarray(get("map.deck.translation"), dtype=float)
+    return Unrolled(
+        uv[:, 0] + 1j * uv[:, 1],
+        np.asarray(get("map.sheet"), dtype=np.int64).reshape(-1, 3),
+        Deck(float(get("map.deck.angle")), complex(*translation.tolist())),
+        float(get("map.circumference")),
+    )
+
+
 def _map(get: Getter) -> ConformalMap:
     vertices = np.asarray(get("mesh.vertices"), dtype=float).reshape(-1, 3)
     faces = np.asarray(get("mesh.faces"), dtype=np.int64).reshape(-1, 3)
     stands_at = np.asarray(get("mesh.input_vertex"), dtype=np.int64)
     of_input = np.full(int(stands_at.max(initial=-1)) + 1, -1)
     of_input[stands_at[stands_at >= 0]] = np.flatnonzero(stands_at >= 0)
-    first, second = (np.asarray(get(f"mesh.loops.{i}"), dtype=np.int64) for i in range(2))
+    loops: list[Ints] = []
+    angles: list[Floats] = []
+    while (loop := _known(get, f"mesh.loops.{len(loops)}")) is not None:
+        angles.append(np.asarray(get(f"map.boundary_angles.{len(loops)}"), dtype=np.float64))
+        loops.append(np.asarray(loop, dtype=np.int64))
     normals = vertex_normals(vertices, faces)
-    surface = Surface(vertices, faces, (first, second), stands_at, of_input, normals)
-    theta, eta = (np.asarray(get(f"map.boundary_angles.{i}"), dtype=float) for i in range(2))
-    uv, translation = (np.asarray(get(f"map.{name}"), dtype=float) for name in ("uv", "deck.translation"))
+    surface = Surface(vertices, faces, tuple(loops), stands_at, of_input, normals)
     return ConformalMap(
         surface=surface,
         log_scale=np.asarray(get("map.log_scale"), dtype=float),
-        domain=Unrolled(
-            uv[:, 0] + 1j * uv[:, 1],
-            np.asarray(get("map.sheet"), dtype=np.int64).reshape(-1, 3),
-            Deck(float(get("map.deck.angle")), complex(*translation.tolist())),
-            float(get("map.circumference")),
-        ),
-        boundary_angles=(theta, eta),
+        domain=_domain(get, surface),
+        boundary_angles=tuple(angles),
         iterations=0,
         residual=float(get("map.residual")),
         flips=int(get("map.flips")),

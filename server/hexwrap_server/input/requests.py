@@ -7,19 +7,26 @@ from typing import Annotated, Any
 
 from hexwrap_solver.pipeline import SolveSettings
 from hexwrap_solver.setting import Setting
-from hexwrap_solver.surface.types import NurbsSurface, SentMesh, SurfaceSettings
+from hexwrap_solver.surface.brep import Brep
+from hexwrap_solver.surface.types import NurbsSurface, Origin, SentMesh, SurfaceSettings
 
 
 @dataclass(frozen=True)
 class SentSurface:
-    """A surface as it was sent: a mesh or a NURBS surface.
+    """A surface as it was sent: a mesh, a NURBS surface or a Brep.
 
-    settings: how to take it in, for requests that say nothing of that beside its id.
+    settings: how to take it in, for requests that say nothing of that beside its id. unit, tolerance, origin:
+    of the file it is from. told: what was found and done when that was read, a sentence each.
     """
 
     mesh: SentMesh | None = None
     nurbs: NurbsSurface | None = None
     settings: SurfaceSettings | None = None
+    brep: Brep | None = None
+    unit: str | None = None
+    tolerance: float | None = None
+    origin: Origin = field(default_factory=Origin)
+    told: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

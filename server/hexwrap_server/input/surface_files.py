@@ -1,22 +1,31 @@
-"""Bytes of an uploaded or local file, and its name → a mesh or a NURBS surface, nothing checked yet."""
+"""Bytes of an uploaded or local file, and its name → the surface that is meant, nothing of it checked yet."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import PurePath
+from typing import Any, TypeVar
 
+from hexwrap_server.input.choose import Chosen, choose, rows
 from hexwrap_server.input.readers.errors import FileTypeError, UnreadableFileError
+from hexwrap_server.input.readers.found import FileContent
 from hexwrap_server.input.readers.npz import read_npz
 from hexwrap_server.input.readers.obj import read_obj
 from hexwrap_server.input.readers.off import read_off
 from hexwrap_server.input.readers.ply import read_ply
 from hexwrap_server.input.readers.rhino import read_3dm
 from hexwrap_server.input.readers.stl import read_stl
+from hexwrap_server.input.requests import SentSurface
 from hexwrap_solver.errors import SurfaceError
 from hexwrap_solver.surface import NurbsSurface, SentMesh
+from hexwrap_solver.surface.brep import Brep
+from hexwrap_solver.surface.types import MeshSettings, Origin, SurfaceSettings
+
+T = TypeVar("T")
 
 #: Suffix → reader.
-READERS: dict[str, Callable[[bytes], SentMesh | NurbsSurface]] = {
+READERS: dict[str, Callable[[bytes], FileContent]] = {
     ".3dm": read_3dm,
     ".npz": read_npz,
     ".obj": read_obj,
@@ -26,19 +35,61 @@ READERS: dict[str, Callable[[bytes], SentMesh | NurbsSurface]] = {
 }
 
 
-def read_surface(data: bytes, filename: str) -> SentMesh | NurbsSurface:
-    """The surface in a file; only the suffix of filename counts.
+@dataclass(frozen=True)
+class FromFile:
+    """sent: what the file stands for. objects: all that it holds, as POST /v1/surfaces answers them."""
 
-    Raises FileTypeError for other suffixes, UnreadableFileError for files that are broken or hold no
-    surface, SeveralObjectsError for Rhino files with more than one.
+    sent: SentSurface
+    objects: list[dict[str, Any]]
+
+
+def read_file(data: bytes, filename: str) -> FileContent:
+    """What is in a file; only the suffix of filename counts.
+
+    Raises FileTypeError for other suffixes, UnreadableFileError for files that are broken.
     """
+    return _guarded(data, filename, lambda suffix: READERS[suffix](data))
+
+
+def read_surface(data: bytes, filename: str, settings: SurfaceSettings | None = None) -> Chosen:
+    """The surface that is meant. Raises as read_file does, and NoObjectError, SeveralObjectsError."""
+    asked = settings or SurfaceSettings()
+    content = read_file(data, filename)
+    return _guarded(data, filename, lambda _: choose(content, asked.object, asked.layer, asked.unit))
+
+
+def sent_surface(
+    data: bytes, filename: str, settings: SurfaceSettings, max_vertices: int = MeshSettings.max_vertices
+) -> FromFile:
+    """The surface that is meant, and how it is to be taken in. Raises as read_surface does."""
+    content = read_file(data, filename)
+    chosen = _guarded(
+        data, filename, lambda _: choose(content, settings.object, settings.layer, settings.unit)
+    )
+    first = chosen.used[0]
+    geometry = chosen.geometry
+    meshing = replace(settings.mesh or MeshSettings(), max_vertices=max_vertices)
+    sent = SentSurface(
+        mesh=geometry if isinstance(geometry, SentMesh) else None,
+        nurbs=geometry if isinstance(geometry, NurbsSurface) else None,
+        brep=geometry if isinstance(geometry, Brep) else None,
+        settings=None if isinstance(geometry, SentMesh) else replace(settings, mesh=meshing),
+        unit=settings.unit or content.unit,
+        tolerance=content.tolerance,
+        origin=Origin(first.name, first.layer, tuple(sorted(first.attributes.items()))),
+        told=chosen.told,
+    )
+    return FromFile(sent, rows(content.objects, chosen.used))
+
+
+def _guarded(data: bytes, filename: str, read: Callable[[str], T]) -> T:
     suffix = PurePath(filename).suffix.lower()
     if suffix not in READERS:
         raise FileTypeError(
             f"Files of type {suffix or 'without a suffix'} cannot be read: send one of {', '.join(READERS)}."
         )
     try:
-        return READERS[suffix](data)
+        return read(suffix)
     except SurfaceError:
         raise
     except (Exception, MemoryError) as error:  # foreign readers fail in every way on broken files

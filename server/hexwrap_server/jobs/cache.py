@@ -29,6 +29,7 @@ log = logging.getLogger("hexwrap.cache")
 #: Share of the whole work that each stage usually takes, for the progress bar.
 SHARES = {
     "surface": 0.1,
+    "singularities": 0.0,
     "map": 0.35,
     "pattern": 0.1,
     "fit": 0.2,

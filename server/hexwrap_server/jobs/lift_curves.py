@@ -9,7 +9,9 @@ import numpy as np
 from hexwrap_server.cli.local import UsageError
 from hexwrap_server.input.curves import refined
 from hexwrap_server.input.readers.drawing import Curve
+from hexwrap_server.output.unrolled import plane
 from hexwrap_solver.arrays import Complexes, Floats
+from hexwrap_solver.conformal.net import Net
 from hexwrap_solver.conformal.types import ConformalMap, Deck
 from hexwrap_solver.domain import flatten, lift
 
@@ -33,7 +35,7 @@ def lift_curves(cmap: ConformalMap, curves: list[Curve], step: float | None) -> 
     step: how closely lines are followed, in units of the domain; None: a 400th of the circumference.
     """
     fine = [
-        refined(Curve(c.points[:, :2], c.closed), step or cmap.circumference / STEPS_AROUND) for c in curves
+        refined(Curve(c.points[:, :2], c.closed), step or _once_around(cmap) / STEPS_AROUND) for c in curves
     ]
     at = np.vstack([curve.points for curve in fine])
     there = lift(cmap, at[:, 0] + 1j * at[:, 1])
@@ -55,19 +57,46 @@ def flatten_curves(cmap: ConformalMap, curves: list[Curve], step: float | None) 
     carried = []
     start = 0
     for curve in fine:
-        z = one_piece(cmap.deck, found.uv[start : start + len(curve.points)])
+        z = found.uv[start : start + len(curve.points)]
         start += len(curve.points)
+        if cmap.kind == "net":
+            carried.append(Curve(plane(over_cuts(cmap.net, z)), curve.closed))
+            continue
+        z = one_piece(cmap.deck, z)
         # A closed curve that goes around the surface ends on another sheet than it started on.
         closed = curve.closed and bool(_turns(cmap.deck, z[[-1, 0]])[1] == 0)
         if curve.closed and not closed:
             z = np.append(z, cmap.deck.apply(z[:1], _turns(cmap.deck, z[[-1, 0]])[1:]))
-        carried.append(Curve(np.stack([z.real, z.imag], axis=1), closed))
+        carried.append(Curve(plane(z), closed))
     return Carried(carried, farthest=float(found.distance.max(initial=0.0)))
 
 
 def one_piece(deck: Deck, z: Complexes) -> Complexes:
     """Each place moved to the sheet in which it is nearest to the place before it."""
     return deck.apply(z, np.cumsum(_turns(deck, z)))
+
+
+def over_cuts(net: Net, z: Complexes) -> Complexes:
+    """The same on a net: where a place lies nearer to the one before it after one of the net's motions, that
+    motion holds from there on."""
+    z, used = z.copy(), np.unique(net.crossing)
+    while True:
+        images = net.apply(used[:, None], z[None, 1:])
+        near = np.abs(images - z[:-1])
+        best = near.argmin(axis=0)
+        jumps = np.flatnonzero(near[best, np.arange(len(best))] < 0.5 * np.abs(z[1:] - z[:-1]))
+        if not len(jumps):
+            return z
+        at = int(jumps[0])  # what lies before it stands in one piece
+        z[at + 1 :] = net.apply(used[best[at]], z[at + 1 :])
+
+
+def _once_around(cmap: ConformalMap) -> float:
+    """Length that drawings are measured by, in the domain."""
+    if cmap.kind != "net":
+        return cmap.circumference
+    corners = cmap.corners()
+    return float(np.ptp(corners.real) + np.ptp(corners.imag))
 
 
 def _turns(deck: Deck, z: Complexes) -> np.ndarray[tuple[int], np.dtype[np.int64]]:

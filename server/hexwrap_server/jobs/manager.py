@@ -12,16 +12,18 @@ from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import orjson
 from isal import isal_zlib
 
 from hexwrap_server.http.answers import GZIP_WINDOW
 from hexwrap_server.http.metrics import Metrics
+from hexwrap_server.input.finished_map import with_corners
 from hexwrap_server.input.requests import CacheSettings, Order, Outcome, ParsedRequest
 from hexwrap_server.jobs.codec import digest
 from hexwrap_server.jobs.disk import BusyError, StorageError
 from hexwrap_server.jobs.endings import Ledger
 from hexwrap_server.jobs.engine import Engine
-from hexwrap_server.jobs.parts import chosen
+from hexwrap_server.jobs.parts import CORNERS, chosen, join_parts
 from hexwrap_server.jobs.store import Job, Store, Work
 from hexwrap_server.jobs.worker import InternalError, WorkerDiedError, WorkError
 from hexwrap_server.problems import FormError, HttpError, not_found, plain, problem
@@ -427,7 +429,15 @@ async def _patiently(write: Callable[[], None]) -> None:
 def unpacked(packed: bytes, work: Work, include: list[str] | None) -> bytes:
     """The Result as JSON, or some of its parts."""
     text = isal_zlib.decompress(packed, GZIP_WINDOW)
-    return text if include is None else chosen(text, work.parts or {}, include)
+    if include is None:
+        return text
+    where = work.parts or {}
+    if CORNERS not in include:
+        return chosen(text, where, include)
+    mesh, found = (orjson.loads(text[slice(*where[name])]) for name in ("mesh", "map"))
+    parts = {name: text[slice(*where[name])] for name in include if name in where}
+    corners = orjson.dumps(with_corners(mesh, found), option=orjson.OPT_SERIALIZE_NUMPY)
+    return join_parts(parts | {"map": corners})
 
 
 def _gone() -> HttpError:

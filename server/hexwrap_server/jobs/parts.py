@@ -5,6 +5,9 @@ from __future__ import annotations
 #: Names that ``?include=`` takes, in the order of the Result.
 PARTS = ("mesh", "map", "pattern", "panels", "sizes", "quality", "components", "support", "timings")
 
+#: Asked for beside parts: ``map`` then has ``corners``, whatever its kind.
+CORNERS = "corners"
+
 #: Where each part stands in the text of a Result.
 Places = dict[str, tuple[int, int]]
 
@@ -12,7 +15,8 @@ Places = dict[str, tuple[int, int]]
 def names(include: str) -> tuple[list[str], list[str]]:
     """The parts named in ``a,b,c``, and the words that name none."""
     wanted = [name.strip() for name in include.split(",") if name.strip()]
-    return [name for name in PARTS if name in wanted], [name for name in wanted if name not in PARTS]
+    known = (*PARTS, CORNERS)
+    return [name for name in known if name in wanted], [name for name in wanted if name not in known]
 
 
 def join_parts(parts: dict[str, bytes]) -> bytes:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections import OrderedDict
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -22,9 +23,11 @@ from hexwrap_server.jobs.writing import Here, Writer
 from hexwrap_server.output.writers import WRITERS, Meta
 from hexwrap_server.problems import FormError, body_is_the_surface
 from hexwrap_solver import pipeline
+from hexwrap_solver.arrays import Ragged
 from hexwrap_solver.errors import HexwrapError
-from hexwrap_solver.surface import surface_from_mesh, surface_from_nurbs, with_openings
-from hexwrap_solver.surface.types import Surface, SurfaceSettings
+from hexwrap_solver.surface import SentMesh, surface_from_mesh, surface_from_nurbs, with_openings
+from hexwrap_solver.surface.brep import mesh_brep
+from hexwrap_solver.surface.types import Origin, Surface, SurfaceSettings
 
 #: Of this worker process.
 _SCRIBE = Scribe()
@@ -95,9 +98,19 @@ def take_in(sent: SentSurface, asked: SurfaceSettings | None = None) -> Surface:
     """asked: instead of the settings that were sent along. Raises SurfaceError."""
     settings = asked or sent.settings or SurfaceSettings()
     if sent.mesh is not None:
-        return with_openings(surface_from_mesh(sent.mesh), settings.openings)
-    assert sent.nurbs is not None
-    return surface_from_nurbs(sent.nurbs, settings.mesh)
+        surface = with_openings(surface_from_mesh(sent.mesh), settings.openings)
+    elif sent.brep is not None:
+        meshed = mesh_brep(sent.brep, settings.mesh)
+        mesh = SentMesh(meshed.vertices, Ragged.from_table(meshed.faces), meshed.normals)
+        surface = with_openings(surface_from_mesh(mesh), settings.openings)
+    else:
+        assert sent.nurbs is not None
+        surface = surface_from_nurbs(sent.nurbs, settings.mesh)
+    unit = settings.unit or sent.unit
+    if (unit, sent.origin, sent.told) == (None, Origin(), ()):
+        return surface
+    repairs = (*sent.told, *surface.repairs)
+    return replace(surface, unit=unit, origin=sent.origin, repairs=repairs).knowing(surface)
 
 
 @body_is_the_surface()
@@ -116,6 +129,8 @@ def checked(report: Report, sent: SentSurface, caching: CacheSettings) -> Intake
         "faces": len(surface.faces),
         "loops": loops,
         "repairs": list(surface.repairs),
+        "unit": surface.unit,
+        "objects": [],
     }
     return Intake(id, codec.encode(sent), answer)
 

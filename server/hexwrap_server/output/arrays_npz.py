@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from hexwrap_server.output.meta import Meta
 from hexwrap_solver.arrays import Complexes, Floats, Ragged
+from hexwrap_solver.conformal.net import Net
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.panels.types import Components, Panels, Support
 from hexwrap_solver.pattern.types import Pattern
@@ -57,14 +58,20 @@ def _map(cmap: ConformalMap) -> Arrays:
         "mesh.input_vertex": surface.input_vertex,
         "mesh.vertex_of_input": surface.vertex_of_input,
         "map.log_scale": cmap.log_scale,
-        "map.uv": _plane(cmap.uv),
-        "map.sheet": cmap.sheet,
-        "map.deck.angle": np.array(cmap.deck.angle),
-        "map.deck.translation": _plane(np.array(cmap.deck.translation)),
-        "map.circumference": np.array(cmap.circumference),
         "map.residual": np.array(cmap.residual),
         "map.flips": np.array(cmap.flips),
     }
+    if isinstance(cmap.domain, Net):
+        arrays["map.corners"] = _plane(cmap.domain.corners)
+        arrays |= {"map.cones.vertex": cmap.cones.vertex, "map.cones.index": cmap.cones.index}
+    else:
+        arrays |= {
+            "map.uv": _plane(cmap.uv),
+            "map.sheet": cmap.sheet,
+            "map.deck.angle": np.array(cmap.deck.angle),
+            "map.deck.translation": _plane(np.array(cmap.deck.translation)),
+            "map.circumference": np.array(cmap.circumference),
+        }
     for number, (loop, angles) in enumerate(zip(surface.loops, cmap.boundary_angles, strict=True)):
         arrays |= {f"mesh.loops.{number}": loop, f"map.boundary_angles.{number}": angles}
     return arrays
@@ -73,9 +80,12 @@ def _map(cmap: ConformalMap) -> Arrays:
 def _pattern(pattern: Pattern) -> Arrays:
     arrays: Arrays = {
         f"pattern.{key}": getattr(pattern, key)
-        for key in ("vertices", "normals", "sheet", "triangle", "barycentric", "whole", "ring", "place")
+        for key in ("vertices", "normals", "triangle", "barycentric", "whole", "index", "ring", "place")
     }
     arrays |= {"pattern.kind": np.array(pattern.kind), "pattern.uv": _plane(pattern.uv)}
+    arrays["pattern.corners"] = _plane(pattern.corners)
+    if pattern.sheet is not None:
+        arrays["pattern.sheet"] = pattern.sheet
     for key in ("rings", "around", "rotation", "edge_length", "distortion"):
         arrays[f"pattern.{key}"] = np.array(getattr(pattern, key))
     return (

@@ -5,11 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from hexwrap_solver.arrays import Floats, Ints
+from hexwrap_solver.panels.types import Panels
 
 #: From the shortest edge to the longest: cold and dark to warm, lightest in the middle.
 ANCHORS = ("#34489c", "#3382c0", "#5dbcc0", "#b4dfb0", "#f6e6a2", "#f5b968", "#e6774d", "#b5304a")
 #: Panels without a size class (cut at the boundary).
 UNSIZED = "#b4b7bc"
+#: Panels with another number of sides than all others, a class each.
+SPECIAL = "#3a3550"
 
 # Björn Ottosson's OKLab (2020), in which straight lines look like even steps.
 _TO_CONE = np.array(
@@ -66,7 +69,13 @@ def size_colours(n: int) -> list[str]:
     return to_hex(gradient(np.linspace(0.0, 1.0, n)))
 
 
-def panel_colours(size: Ints, n: int) -> Floats:
-    """(q, 3) sRGB of panels by their class (−1: none) among n."""
-    table = np.vstack([from_hex(size_colours(n)), from_hex([UNSIZED])])
+def class_colours(panels: Panels) -> list[str]:
+    """One colour per size class, and one for all special panels after them."""
+    n = panels.n_sizes
+    return size_colours(n) + [SPECIAL] * (len(panels.class_length) - n)
+
+
+def panel_colours(size: Ints, classes: list[str]) -> Floats:
+    """(q, 3) sRGB of panels by their class (−1: none), whose colours are given."""
+    table = np.vstack([from_hex(classes), from_hex([UNSIZED])])
     return table[size]

@@ -14,10 +14,11 @@ from hexwrap_solver.pipeline import Solution
 def domain_dxf(solution: Solution, meta: Meta) -> bytes:
     """Boundary loops, the cut, corners (points) and the pattern's cells, each on a layer of its own."""
     cmap, pattern = solution.map, solution.pattern
-    document = grey_drawing(meta, "loop-0", "loop-1", "cut", "corners", "pattern")
+    names = [f"loop-{number}" for number in range(len(cmap.surface.loops))]
+    document = grey_drawing(meta, *names, "cut", "corners", "pattern")
     space = document.modelspace()
     unrolled = Unrolled.of(cmap)
-    for layer, sides in (*zip(("loop-0", "loop-1"), unrolled.loops, strict=True), ("cut", unrolled.cut)):
+    for layer, sides in (*zip(names, unrolled.loops, strict=True), ("cut", unrolled.cut)):
         for line in unrolled.lines(sides):
             space.add_lwpolyline(plane(line).tolist(), dxfattribs={"layer": layer})
     marked = [vertex for vertex, _ in corners(cmap)]
@@ -25,6 +26,6 @@ def domain_dxf(solution: Solution, meta: Meta) -> bytes:
         for place in plane(unrolled.start[sides[np.isin(loop, marked)]]).tolist():
             space.add_point(place, dxfattribs={"layer": "corners"})
     if pattern is not None:
-        for outline in cells(cmap, pattern).to_lists():
+        for outline in cells(pattern).to_lists():
             space.add_lwpolyline(outline, close=True, dxfattribs={"layer": "pattern"})
     return encode(document)

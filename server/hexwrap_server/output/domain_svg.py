@@ -8,7 +8,7 @@ from xml.sax.saxutils import escape
 
 import numpy as np
 
-from hexwrap_server.output.colours import size_colours
+from hexwrap_server.output.colours import class_colours
 from hexwrap_server.output.layers import size_name
 from hexwrap_server.output.meta import Meta
 from hexwrap_server.output.text import angle, length, one_line
@@ -34,8 +34,8 @@ text { font-family: "DejaVu Sans", "Segoe UI", Helvetica, Arial, sans-serif; fil
 .mesh { fill: none; stroke: #c3c7cd; stroke-width: 0.5; }
 .cells { stroke: #23262b; stroke-linejoin: round; }
 .cut { fill: none; stroke: #e8781e; stroke-width: 2.2; stroke-dasharray: 9 6; }
-.loop0, .loop1 { fill: none; stroke-width: 3.2; stroke-linecap: round; }
-.loop0 { stroke: #16202e; } .loop1 { stroke: #16202e; }
+.loop { fill: none; stroke: #16202e; stroke-width: 3.2; stroke-linecap: round; }
+.cone { fill: #6a3fa0; stroke: #ffffff; stroke-width: 2; }
 .corner { fill: #c8202f; stroke: #ffffff; stroke-width: 2; } .angle { font-size: 20px; fill: #c8202f; }
 .halo { paint-order: stroke; stroke: #ffffff; stroke-width: 5; stroke-linejoin: round; }
 .apex { fill: none; stroke: #6a3fa0; stroke-width: 2.5; } .named { font-size: 20px; }
@@ -74,7 +74,7 @@ def domain_svg(solution: Solution, meta: Meta) -> bytes:
     """SVG 1.1, complete in itself. Cells across the cut are drawn in one piece, in a sheet of their own."""
     cmap, pattern = solution.map, solution.pattern
     unrolled = Unrolled.of(cmap)
-    outlines = None if pattern is None else cells(cmap, pattern)
+    outlines = None if pattern is None else cells(pattern)
     points = [plane(unrolled.start)] if outlines is None else [plane(unrolled.start), outlines.values]
     frame = Frame.around(np.vstack([*points, *_apex(cmap)]))
     parts = []
@@ -87,6 +87,7 @@ def domain_svg(solution: Solution, meta: Meta) -> bytes:
     parts += _loops(cmap, frame, unrolled)
     parts += _corner_marks(cmap, frame, unrolled)
     parts += _apex_mark(cmap, frame)
+    parts += _cone_marks(cmap, frame)
     return _page(frame, parts, solution, meta).encode()
 
 
@@ -112,8 +113,14 @@ def _page(frame: Frame, parts: list[str], solution: Solution, meta: Meta) -> str
 
 def _caption(solution: Solution) -> str:
     cmap, pattern = solution.map, solution.pattern
-    turned = "" if cmap.kind == "cylinder" else f", cone angle {angle(cmap.deck.angle)}"
-    words = f"{cmap.kind}{turned}, circumference {length(cmap.circumference)}"
+    if cmap.kind == "net":
+        loops = len(cmap.surface.loops)
+        words = f"net with {loops} loop{'s' * (loops != 1)}"
+        if len(cmap.cones):
+            words += f" and {len(cmap.cones)} singularit{'ies' if len(cmap.cones) > 1 else 'y'}"
+    else:
+        turned = "" if cmap.kind == "cylinder" else f", cone angle {angle(cmap.deck.angle)}"
+        words = f"{cmap.kind}{turned}, circumference {length(cmap.circumference)}"
     if pattern is not None:
         words += f"; {pattern.n_cells} cells"
     return words
@@ -121,6 +128,8 @@ def _caption(solution: Solution) -> str:
 
 def _apex(cmap: ConformalMap) -> Floats:
     """(1, 2) where it is near enough to be shown, else (0, 2)."""
+    if cmap.kind == "net":
+        return np.zeros((0, 2))
     apex, uv = cmap.deck.apex, cmap.uv
     if apex is None:
         return np.zeros((0, 2))
@@ -135,7 +144,7 @@ def _cells(solution: Solution, pattern: Pattern, rows: Ragged) -> list[str]:
     colours: list[str] = []
     if solution.panels is not None:
         size[solution.panels.face] = solution.panels.size
-        colours = size_colours(len(solution.panels.class_length))
+        colours = class_colours(solution.panels)
     outlines = _outlines(rows)
     members: dict[int, list[str]] = {}
     for outline, group in zip(outlines, size.tolist(), strict=True):
@@ -179,7 +188,7 @@ def _loops(cmap: ConformalMap, frame: Frame, unrolled: Unrolled) -> list[str]:
     parts = []
     marked = [vertex for vertex, _ in corners(cmap)]
     for number, (loop, sides) in enumerate(zip(cmap.surface.loops, unrolled.loops, strict=True)):
-        parts.append(_path(_polylines(frame, unrolled.lines(sides)), f"loop{number}"))
+        parts.append(_path(_polylines(frame, unrolled.lines(sides)), f"loop loop{number}"))
         places = unrolled.start[sides]
         # The name stands where no corner's angle does, and away from the cut.
         taken = np.append(places[np.isin(loop, marked)], unrolled.end[unrolled.cut])
@@ -219,6 +228,18 @@ def _corner_marks(cmap: ConformalMap, frame: Frame, unrolled: Unrolled) -> list[
                 f'<text class="angle halo" text-anchor="middle" dominant-baseline="central" '
                 f'x="{x:.2f}" y="{y:.2f}">{angle(marked[vertex])}</text>'
             )
+    return parts
+
+
+def _cone_marks(cmap: ConformalMap, frame: Frame) -> list[str]:
+    """A dot with its index wherever a singularity stands in the net, at each of its images."""
+    faces, corners_at = cmap.surface.faces.ravel(), cmap.corners().ravel()
+    parts = []
+    for vertex, index in zip(cmap.cones.vertex.tolist(), cmap.cones.index.tolist(), strict=True):
+        images = frame.place(plane(corners_at[faces == vertex]))
+        for x, y in np.unique(np.round(images, 1), axis=0).tolist():
+            parts.append(f'<circle class="cone" cx="{x:.2f}" cy="{y:.2f}" r="8"/>')
+            parts.append(f'<text class="named halo" x="{x + 14:.2f}" y="{y - 10:.2f}">{index:+d}</text>')
     return parts
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from hexwrap_server.output.colours import UNSIZED, size_colours
+from hexwrap_server.output.colours import UNSIZED, class_colours
 from hexwrap_server.output.text import lengths
 from hexwrap_solver.panels.types import Panels
 
@@ -25,7 +25,7 @@ def size_name(size: int) -> str:
 def size_layers(panels: Panels) -> dict[int, Layer]:
     """The layer of each size that has panels, and of panels without a size (−1)."""
     words = lengths(panels.class_length.tolist())
-    colours = size_colours(len(words))
+    colours = class_colours(panels)
     used = set(panels.size.tolist())
     layers = {
         i: Layer(f"{size_name(i)} ({word})", _bytes(colour))

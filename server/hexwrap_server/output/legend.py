@@ -76,7 +76,8 @@ def _legend(axes: Axes, height: int, panels: Panels, meta: Meta) -> None:
     cut = int(np.sum(panels.size < 0))
     top = (height - ROW * (rows + (cut > 0))) / 2
     _title(axes, top - 96, text.one_line(meta.name))
-    sizes = {0: "", 1: ", 1 size"}.get(n_sizes, f", {n_sizes:,} sizes")
+    named = panels.n_sizes
+    sizes = {0: "", 1: ", 1 size"}.get(named, f", {named:,} sizes")
     unit = f", edges in {meta.unit}" if meta.unit else ""
     axes.text(0, top - 48, f"{panels.n_panels:,} panels{sizes}{unit}", size=15, color=GREY, va="center")
     if n_sizes <= ROWS:
@@ -93,18 +94,18 @@ def _legend(axes: Axes, height: int, panels: Panels, meta: Meta) -> None:
 def _swatches(axes: Axes, top: float, panels: Panels) -> None:
     """One row per size: colour, edge length, how many."""
     counts, words = panels.class_count.tolist(), text.lengths(panels.class_length.tolist())
-    for i, colour in enumerate(colours.size_colours(len(words))):
+    for i, colour in enumerate(colours.class_colours(panels)):
         y = top + ROW * (i + 0.5)
-        _swatch(axes, y, panels, colour)
+        _swatch(axes, y, panels, colour, int(panels.class_sides[i]))
         axes.text(64, y, words[i], size=17, color=INK, va="center")
         axes.text(WIDTH - 60, y, f"{counts[i]:,}", size=17, color=GREY, va="center", ha="right")
 
 
-def _swatch(axes: Axes, y: float, panels: Panels, colour: str) -> None:
-    """A polygon of as many corners as most panels have, standing on a side."""
+def _swatch(axes: Axes, y: float, panels: Panels, colour: str, sides: int = 0) -> None:
+    """A polygon of so many corners, or as many as most panels have, standing on a side."""
     from matplotlib.patches import RegularPolygon
 
-    p = int(np.bincount(panels.polygons.lengths, minlength=7)[3:7].argmax()) + 3
+    p = sides or int(np.bincount(panels.polygons.lengths, minlength=7)[3:7].argmax()) + 3
     axes.add_patch(RegularPolygon((22, y), p, radius=20, orientation=np.pi / p, color=colour))
 
 
@@ -113,7 +114,7 @@ def _bar(axes: Axes, top: float, length: float, panels: Panels) -> None:
     steps = colours.gradient(np.linspace(0, 1, 256))[:, None]
     axes.imshow(steps, extent=(2, 42, top + length, top), aspect="auto", interpolation="bilinear")
     axes.set(xlim=(0, WIDTH), ylim=axes.get_ylim())
-    at = np.linspace(0, len(panels.class_length) - 1, 5).round().astype(int)
+    at = np.linspace(0, panels.n_sizes - 1, 5).round().astype(int)
     words = text.lengths(panels.class_length[at].tolist())
     for share, word in zip(np.linspace(0, 1, 5).tolist(), words, strict=True):
         axes.text(64, top + share * length, word, size=17, color=INK, va="center")

@@ -33,7 +33,7 @@ def panels_scene(solution: Solution) -> Scene:
     faces = surface.faces if panels.mode == "split" else surface.faces[:0]
     return Scene(
         Polygons.of(outline),
-        colours.panel_colours(panels.size, len(panels.class_length)),
+        colours.panel_colours(panels.size, colours.class_colours(panels)),
         Polygons.of(Ragged.from_table(sunk[faces])),
         viewpoint(solution.map),
     )

@@ -10,7 +10,7 @@ from hexwrap_solver.arrays import Complexes, Floats, Ints, Ragged
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.pattern.types import Pattern
 
-#: Two places are one where they are nearer than this part of the circumference.
+#: Two places are one where they are nearer than this part of the domain's size.
 SAME = 1e-6
 
 
@@ -24,7 +24,7 @@ class Unrolled:
 
     start: Complexes
     end: Complexes
-    loops: tuple[Ints, Ints]
+    loops: tuple[Ints, ...]
     cut: Ints
 
     @classmethod
@@ -32,19 +32,13 @@ class Unrolled:
         faces, at = cmap.surface.faces, cmap.corners()
         tail, head = faces.ravel(), faces[:, [1, 2, 0]].ravel()
         start, end = at.ravel(), at[:, [1, 2, 0]].ravel()
-        key = np.minimum(tail, head) * (int(faces.max()) + 1) + np.maximum(tail, head)
-        order = np.argsort(key, kind="stable")
-        paired = np.flatnonzero(key[order][1:] == key[order][:-1])
-        one, two = order[paired], order[paired + 1]
-        apart = np.abs(start[one] - end[two]) + np.abs(end[one] - start[two]) > SAME * cmap.circumference
-        rim = np.ones(len(key), dtype=bool)
-        rim[one] = rim[two] = False
+        boundary = np.flatnonzero(cmap.net.across.ravel() < 0)
         side = np.full(len(cmap.surface.vertices), -1)
-        side[tail[rim]] = np.flatnonzero(rim)
-        first, second = cmap.surface.loops
-        banks = np.concatenate([one[apart], two[apart]])
-        near = SAME * cmap.circumference
-        return cls(start, end, (side[first], side[second]), _chained(banks, tail, head, start, end, near))
+        side[tail[boundary]] = boundary
+        banks = np.flatnonzero(cmap.net.crossing.ravel())
+        near = SAME * float(np.ptp(at.real) + np.ptp(at.imag))
+        loops = tuple(side[loop] for loop in cmap.surface.loops)
+        return cls(start, end, loops, _chained(banks, tail, head, start, end, near))
 
     def lines(self, sides: Ints) -> list[Complexes]:
         """The sides in the given order as polylines: a new one wherever a side starts elsewhere."""
@@ -78,10 +72,9 @@ def _chained(sides: Ints, tail: Ints, head: Ints, start: Complexes, end: Complex
     return np.array(list(ordered), dtype=np.int64)
 
 
-def cells(cmap: ConformalMap, pattern: Pattern) -> Ragged:
-    """(·, 2) outlines of the cells, each in one piece in a sheet of its own."""
-    z = cmap.deck.apply(pattern.uv[np.asarray(pattern.faces.values)], pattern.sheet)
-    return Ragged(plane(z), pattern.faces.offsets)
+def cells(pattern: Pattern) -> Ragged:
+    """(·, 2) outlines of the cells, each in one piece."""
+    return Ragged(plane(pattern.corners), pattern.faces.offsets)
 
 
 def plane(z: Complexes) -> Floats:

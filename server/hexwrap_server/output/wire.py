@@ -11,7 +11,7 @@ import orjson
 from numpy.typing import NDArray
 
 from hexwrap_server.jobs.parts import PARTS, join_parts
-from hexwrap_server.output.colours import size_colours
+from hexwrap_server.output.colours import class_colours
 from hexwrap_solver.arrays import Complexes, Floats, Ints, Ragged
 from hexwrap_solver.conformal.net import Net
 from hexwrap_solver.conformal.types import ConformalMap
@@ -115,8 +115,10 @@ def pattern(laid: Pattern) -> dict[str, Any]:
         "normals": flat(laid.normals),
         "uv": plane(laid.uv),
         "faces": rows(laid.faces),
-        "sheet": rows(Ragged(laid.sheet, laid.faces.offsets)),
+        "sheet": None if laid.sheet is None else rows(Ragged(laid.sheet, laid.faces.offsets)),
+        "corners": rows(Ragged(plane(laid.corners), laid.faces.offsets)) if laid.sheet is None else None,
         "whole": flat(laid.whole),
+        "index": flat(laid.index),
         "neighbours": rows(laid.neighbours),
         "ring": flat(laid.ring),
         "place": flat(laid.place),
@@ -174,12 +176,13 @@ def sizes(made: Panels | None) -> list[dict[str, Any]]:
     listed = zip(
         made.class_length.tolist(),
         made.class_count.tolist(),
-        size_colours(len(made.class_length)) if len(made.class_length) else [],
+        made.class_sides.tolist(),
+        class_colours(made) if len(made.class_length) else [],
         strict=True,
     )
     return [
-        {"size": i, "edge_length": length, "count": count, "color": colour}
-        for i, (length, count, colour) in enumerate(listed)
+        {"size": i, "edge_length": length, "count": count, "sides": sides, "color": colour}
+        for i, (length, count, sides, colour) in enumerate(listed)
     ]
 
 

@@ -50,22 +50,33 @@ def boundary_angles(
     any loop is isometric, its angles make up for the rest.
     Raises BoundaryError (vertices or angles that cannot be used), GaussBonnetError (the sums fail).
     """
+    listed, target, given, asked = _asked(surface, condition)
+    if any(angles is None for angles in asked):
+        return asked
+    sums = [float((np.pi - target[loop]).sum()) for loop in surface.loops]
+    total = gauss_bonnet(surface) - (0.0 if cones is None else float(cones.curvature.sum()))
+    if abs(sum(sums) - total) > GAUSS_BONNET_TOLERANCE:
+        raise _gauss_bonnet_error(surface, listed, sums, total, cones, condition)
+    return _close(surface, target, given, sums, total, QUANTA.get(condition.quantum))
+
+
+def asked_angles(surface: Surface, condition: BoundaryCondition) -> tuple[Floats | None, ...]:
+    """The same whether they add up or not: singularities may make up for it. Raises BoundaryError."""
+    return _asked(surface, condition)[-1]
+
+
+def _asked(
+    surface: Surface, condition: BoundaryCondition
+) -> tuple[_Listed, Floats, Bools, tuple[Floats | None, ...]]:
+    """The list; (n,) target angles and where they are listed; and per loop its angles, None if isometric."""
     listed = _listed(surface, condition)
     target = np.full(len(surface.vertices), np.pi)
     target[listed.vertex] = listed.angle
     given = np.zeros(len(surface.vertices), dtype=bool)
     given[listed.vertex] = True
     modes = _modes(surface, condition, given)
-    sums = [float((np.pi - target[loop]).sum()) for loop in surface.loops]
-    if "isometric" in modes:
-        return tuple(
-            None if mode == "isometric" else target[loop]
-            for mode, loop in zip(modes, surface.loops, strict=True)
-        )
-    total = gauss_bonnet(surface) - (0.0 if cones is None else float(cones.curvature.sum()))
-    if abs(sum(sums) - total) > GAUSS_BONNET_TOLERANCE:
-        raise _gauss_bonnet_error(surface, listed, sums, total, cones, condition)
-    return _close(surface, target, given, sums, total, QUANTA.get(condition.quantum))
+    pairs = zip(modes, surface.loops, strict=True)
+    return listed, target, given, tuple(None if mode == "isometric" else target[loop] for mode, loop in pairs)
 
 
 def _listed(surface: Surface, condition: BoundaryCondition) -> _Listed:

@@ -15,6 +15,9 @@ import numpy as np
 
 from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints
 
+#: Two images of an edge are one where they differ by less, relative to the domain's size.
+SAME = 1e-7
+
 
 @dataclass(frozen=True)
 class Net:
@@ -36,6 +39,27 @@ class Net:
     translation: Complexes
     inverse: Ints
     winding: Ints | None = None
+
+    @classmethod
+    def of_corners(cls, corners: Complexes, twin: Ints) -> Net:
+        """Where only the corners are known: a motion for each edge whose two images differ. twin: (3m,)."""
+        start, end = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
+        inner = np.flatnonzero(twin >= 0)
+        there = twin[inner]
+        turn = (end[inner] - start[inner]) / (start[there] - end[there])
+        shift = start[inner] - turn * end[there]
+        apart = np.abs(turn - 1) + np.abs(shift) / float(np.ptp(corners.real) + np.ptp(corners.imag)) > SAME
+        glued = inner[apart]
+        crossing = np.zeros(len(twin), dtype=np.int64)
+        crossing[glued] = np.arange(1, len(glued) + 1)
+        return cls(
+            corners,
+            np.where(twin >= 0, twin // 3, -1).reshape(-1, 3),
+            crossing.reshape(-1, 3),
+            np.append(0.0, np.angle(turn[apart])),
+            np.append(0.0, shift[apart]),
+            np.append(0, crossing[twin[glued]]),
+        )
 
     def apply(self, motion: Ints, z: Complexes) -> Complexes:
         """M(z) for arrays of motions and places."""

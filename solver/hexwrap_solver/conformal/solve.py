@@ -115,7 +115,7 @@ def _isometric(
         found = map_to(surface, targets, cones, None, progress)
         return found if quantum is None else scaled(found, -_mean_on(found, free))
     plain = _plain(surface, targets, None, _part(progress, 0.0))
-    first = plain.metric if plain.holds else metric_with_flips(surface, targets, progress, plain.start)
+    first = plain.metric if plain.holds else metric_with_flips(surface, targets, progress, plain.start, cones)
     inserted = len(first.surface.vertices) - len(surface.vertices)
     surface = first.surface
     sums = [first.sums[loop] for loop in surface.loops]

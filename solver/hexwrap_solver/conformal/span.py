@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from hexwrap_solver.arrays import Floats
+from hexwrap_solver.conformal.types import Cones
 from hexwrap_solver.errors import ConvergenceError
 from hexwrap_solver.surface.types import Surface
 
@@ -21,6 +22,11 @@ MAX_REACH = 300.0
 WIDE = 11.5
 #: Cone angles nearer than this to a multiple of 2π have an apex, but one that is not known to all digits.
 CLEAR = 1e-3
+
+
+def is_annulus(surface: Surface, cones: Cones) -> bool:
+    """Whether the domain is unrolled into sheets: two loops and no cones."""
+    return len(surface.loops) == 2 and not len(cones)
 
 
 def cone_angle_of(surface: Surface, curvature: Floats) -> float | None:

@@ -251,6 +251,16 @@ class Unrolled:
 
 
 @dataclass(frozen=True)
+class Fitted:
+    """z ↦ factor·z + shift carries every motion of the net to a symmetry of the lattice of cell centres ℤ[ζ],
+    ζ = e^{2πi/order}, one cell being 1 wide."""
+
+    order: int
+    factor: complex
+    shift: complex
+
+
+@dataclass(frozen=True)
 class ConformalMap:
     """A discrete conformal map onto a plane domain whose edges are glued by motions (paper, definition 1).
 
@@ -261,7 +271,8 @@ class ConformalMap:
     boundary_angles: per loop, angle sums in the domain, aligned with surface.loops.
     residual: max |angle sum − target|. flips: number of edges flipped; inserted: number of vertices inserted.
     closing_error: largest disagreement of the layout where it closes, relative to its size.
-    cones: singularities. notes: sentences for the user.
+    cones: singularities. fitted: where they were moved until a lattice closes up exactly, that lattice.
+    notes: sentences for the user.
     """
 
     surface: Surface
@@ -274,6 +285,7 @@ class ConformalMap:
     inserted: int = 0
     closing_error: float = 0.0
     cones: Cones = field(default_factory=Cones.none)
+    fitted: Fitted | None = None
     notes: tuple[str, ...] = ()
 
     @property

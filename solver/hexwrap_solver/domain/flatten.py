@@ -13,8 +13,9 @@ from hexwrap_solver.domain.interpolate import domain_weights
 
 @dataclass(frozen=True)
 class Flattened:
-    """uv: (k,) complex places in the unrolled domain, in one sheet. distance: (k,) of each point from the
-    surface, model units. face: (k,) triangle with the nearest point; barycentric: (k, 3) there."""
+    """uv: (k,) complex places in the unrolled domain, in one sheet, or of the net. distance: (k,) of each
+    point from the surface, model units. face: (k,) triangle with the nearest point; barycentric: (k, 3)
+    there."""
 
     uv: Complexes
     distance: Floats
@@ -28,5 +29,5 @@ def flatten(cmap: ConformalMap, points: Floats) -> Flattened:
     surface = cmap.surface
     near = surface.tree.nearest(points)
     weights = domain_weights(cmap, near.face, near.barycentric)
-    corners = cmap.deck.apply(cmap.uv[surface.faces[near.face]], cmap.sheet[near.face])
+    corners = cmap.corners()[near.face]
     return Flattened((weights * corners).sum(axis=1), near.distance, near.face, near.barycentric)

@@ -31,7 +31,8 @@ def lift(cmap: ConformalMap, places: Complexes) -> Lifted:
     """Carry (k,) complex places of the unrolled domain, on any sheet, onto the surface.
 
     z and g(z) go to the same point. Where the unrolled domain overlaps itself, the sheet nearest to 0 is
-    meant. Never raises: what lies outside is told in ``inside``.
+    meant; a net has one image, and where that overlaps itself the deepest place counts. Never raises: what
+    lies outside is told in ``inside``.
     """
     places = np.asarray(places, dtype=complex).ravel()
     known = (np.abs(places.real) <= BEYOND) & (np.abs(places.imag) <= BEYOND)  # NaN is not

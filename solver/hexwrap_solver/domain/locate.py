@@ -105,8 +105,11 @@ def _pack(x: Ints, y: Ints) -> Ints:
 def find_places(cmap: ConformalMap, places: Complexes) -> tuple[Ints, Floats]:
     """The triangle of each place of the unrolled domain, on whatever sheet it lies; as TriangleIndex.find.
 
-    Where the domain overlaps itself, the sheet nearest to 0 is meant.
+    Where the domain overlaps itself, the sheet nearest to 0 is meant; of a net, the triangle in which the
+    place lies deepest.
     """
+    if cmap.kind == "net":
+        return TriangleIndex(cmap.corners()).find(places)
     if cmap.kind == "cylinder" and len(places):  # straight to the right turn, however far away
         turn = cmap.deck.translation
         places = places - np.floor(((places - cmap.uv[0]) / turn).real) * turn

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -100,9 +100,16 @@ def _fit_split(
     regular: Bools = pattern.whole & (pattern.faces.lengths == p)
     points = _table(cells, regular, p)
     poses, energy, notes = fit_poses(surface, points, settings, progress)
+    special: Bools = pattern.whole & (pattern.index != 0)
+    others = [
+        _Special.of(surface, cells, special & (pattern.faces.lengths == sides), settings)
+        for sides in np.unique(pattern.faces.lengths[special])
+    ]
     edges = half_edges(pattern)
     normal = plane_normals(cells)
     normal[regular] = poses.normal
+    for group in others:
+        normal[group.face] = group.poses.normal
     planes = separating_planes(pattern, edges, normal, settings.joint)
     progress(0.4, "limiting sizes")
     length, center, said = _limits(poses, points, planes, regular, pattern, edges, settings, progress)
@@ -111,7 +118,9 @@ def _fit_split(
     kept = np.zeros(pattern.n_cells, dtype=bool)
     kept[regular] = roomy
     notes += _room_note(np.flatnonzero(regular & ~kept), int(kept.sum()), settings.joint)
-    shapes, shape_center, cut = _trimmed(cells, normal, planes, edges, ~regular)
+    parts = [_trimmed(cells, normal, planes, edges, ~regular & ~special)]
+    parts += [group.inscribed(pattern, planes) for group in others]
+    shapes, shape_center, cut = _joined(parts)
     face = np.flatnonzero(kept | cut)
     spare = _spare(poses, planes, regular, pattern, settings)
     return FittedPanels(
@@ -130,7 +139,47 @@ def _fit_split(
         spare_limit=spare and _merge(kept, spare[0][roomy], cut, mean_edges(shapes))[face],
         spare_center=spare and _merge(kept, spare[1][roomy], cut, shape_center)[face],
         facing=facing_edges(edges, pattern.faces.offsets[:-1], face),
+        special=special[face],
     )
+
+
+@dataclass(frozen=True)
+class _Special:
+    """Regular panels of cells with another number of sides, all with the same one. face: (k,) cells."""
+
+    face: Ints
+    sides: int
+    poses: Poses
+    cells: int
+
+    @classmethod
+    def of(cls, surface: Surface, cells: Ragged, chosen: Bools, settings: PanelSettings) -> _Special:
+        face = np.flatnonzero(chosen)
+        sides = int(cells.lengths[face[0]])
+        points = _table(cells, chosen, sides)
+        poses, _, _ = fit_poses(surface, points, replace(settings, method="exact"), no_progress)
+        return cls(face, sides, poses, len(chosen))
+
+    def inscribed(self, pattern: Pattern, planes: Separation) -> tuple[Ragged, Floats, Bools]:
+        """As ``_trimmed``: the largest that fit, whatever the target, since they belong to no size class."""
+        at = pattern.faces.offsets[:-1][self.face][:, None] + np.arange(self.sides)
+        length, center = limits.inscribed(self.poses, planes.direction[at], planes.offset[at])
+        kept = np.zeros(self.cells, dtype=bool)
+        kept[self.face[length > 0]] = True
+        corner = center[:, None] + length[:, None, None] * self.poses.spokes(self.sides)
+        return Ragged.from_table(corner[length > 0]), center[length > 0], kept
+
+
+def _joined(parts: list[tuple[Ragged, Floats, Bools]]) -> tuple[Ragged, Floats, Bools]:
+    """Polygons, centres and cells of several kinds, in the order of the cells."""
+    if len(parts) == 1:
+        return parts[0]
+    order = np.argsort(np.concatenate([np.flatnonzero(kept) for _, _, kept in parts]), kind="stable")
+    count = np.concatenate([shapes.lengths for shapes, _, _ in parts])
+    values = np.concatenate([shapes.values.reshape(-1, 3) for shapes, _, _ in parts])
+    whole = Ragged(values, np.concatenate([[0], np.cumsum(count)]).astype(np.int64))
+    center = np.concatenate([center for _, center, _ in parts])[order]
+    return take_rows(whole, order)[0], center, np.logical_or.reduce([kept for _, _, kept in parts])
 
 
 def _fit_watertight(

@@ -75,10 +75,13 @@ def quantize(fitted: FittedPanels, settings: PanelSettings) -> Panels:
     edge_length[regular] = length
     size = np.full(len(fitted.face), -1, dtype=np.int64)
     size[regular] = member
+    polygons = _polygons(fitted, length)
+    alone = np.zeros(0, dtype=np.int64) if fitted.special is None else np.flatnonzero(fitted.special)
+    size[alone] = len(class_length) + np.arange(len(alone))
     outside = np.flatnonzero(regular)[length < smallest]
     return Panels(
         mode=fitted.mode,
-        polygons=_polygons(fitted, length),
+        polygons=polygons,
         face=fitted.face,
         size=size,
         edge_length=edge_length,
@@ -86,8 +89,11 @@ def quantize(fitted: FittedPanels, settings: PanelSettings) -> Panels:
         center=fitted.center,
         normal=fitted.normal,
         whole=fitted.whole,
-        class_length=class_length,
-        class_count=class_count.astype(np.int64),
+        class_length=np.concatenate([class_length, edge_length[alone]]),
+        class_count=np.concatenate([class_count, np.ones(len(alone), dtype=np.int64)]).astype(np.int64),
+        class_sides=np.concatenate(
+            [np.full(len(class_length), fitted.spokes.shape[1]), polygons.lengths[alone]]
+        ).astype(np.int64),
         trade_off=_trade_off(fitted, limits, settings) if len(length) else None,
         energy=fitted.energy,
         notes=(

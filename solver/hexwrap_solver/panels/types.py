@@ -114,7 +114,8 @@ class FittedPanels:
     order. center, normal: (q, 3). limit: (q,) greatest edge length (mean edge of the others). whole: (q,).
     cell_area: (q,) of the panels' cells. energy, notes: as in ``Panels``. spare_limit, spare_center: another
     choice of limit and center without overlap, which few classes may suit better. facing: edges of
-    neighbouring panels, None for watertight ones.
+    neighbouring panels, None for watertight ones. special: (q,) those in ``shapes`` that are regular polygons
+    with another number of sides, around a singularity.
     """
 
     mode: Literal["split", "watertight"]
@@ -132,19 +133,21 @@ class FittedPanels:
     spare_limit: Floats | None = None
     spare_center: Floats | None = None
     facing: Facing | None = None
+    special: Bools | None = None
 
 
 @dataclass(frozen=True)
 class Panels:
     """Finished panels.
 
-    polygons: (·, 3) points per panel, counter-clockwise from outside, not repeated at the end.
-    face: (q,) cell of the pattern. size: (q,) class, −1 for panels without one (trimmed cells).
-    edge_length: (q,) ℓ_P (the mean edge for polygons that are not equilateral). limit: (q,) largest
-    length allowed before quantization. center, normal: (q, 3). whole: (q,).
-    class_length, class_count: (s,) the size classes, ascending. trade_off: None where sizes make no sense.
-    energy: (steps,) value of the weighted energy, None for method ``exact``.
-    outside: panels whose limit lies below the allowed ``edge_range``. max_gap: widest joint wanted.
+    polygons: (·, 3) points per panel, counter-clockwise from outside, not repeated at the end. face: (q,)
+    cell of the pattern. size: (q,) class, −1 for panels without one (trimmed cells). edge_length: (q,) ℓ_P
+    (the mean edge for polygons that are not equilateral). limit: (q,) largest length allowed before
+    quantization. center, normal: (q, 3). whole: (q,). class_length, class_count, class_sides: (s,) the size
+    classes, ascending, and after them the regular panels with another number of sides (around
+    singularities), a class each. trade_off: None where sizes make no sense. energy: (steps,) value of the
+    weighted energy, None for method ``exact``. outside: panels whose limit lies below the allowed
+    ``edge_range``. max_gap: widest joint wanted.
     """
 
     mode: Literal["split", "watertight"]
@@ -158,6 +161,7 @@ class Panels:
     whole: Bools
     class_length: Floats
     class_count: Ints
+    class_sides: Ints
     trade_off: TradeOff | None = None
     energy: Floats | None = None
     notes: tuple[str, ...] = ()
@@ -167,6 +171,11 @@ class Panels:
     @property
     def n_panels(self) -> int:
         return self.polygons.n_rows
+
+    @property
+    def n_sizes(self) -> int:
+        """The classes but those of special panels."""
+        return int((self.class_sides == self.class_sides[0]).sum()) if len(self.class_sides) else 0
 
 
 @dataclass(frozen=True)

@@ -149,11 +149,16 @@ class Lattice:
         return np.stack([np.real(positions) - b * self.unit.real, b], axis=-1)
 
     def translation_near(self, wanted: complex) -> Ints:
-        """The translation of the tiling nearest to a vector of the plane."""
+        """(2,) the translation of the tiling nearest to a vector of the plane."""
+        return np.asarray(self.translations_near(np.array([wanted]))[0])
+
+    def translations_near(self, wanted: Complexes) -> Ints:
+        """(k, 2) those nearest to vectors (k,)."""
         e1 = complex(self.position(self.basis[0]))
-        start = np.floor(self.coordinates(np.array(wanted / e1))).astype(np.int64)
-        corners = (start + np.array([[0, 0], [1, 0], [0, 1], [1, 1]])) @ self.basis
-        return np.asarray(corners[np.argmin(abs(self.position(corners) - wanted))])
+        start = np.floor(self.coordinates(wanted / e1)).astype(np.int64)
+        corners = (start[:, None] + np.array([[0, 0], [1, 0], [0, 1], [1, 1]])) @ self.basis
+        best = abs(self.position(corners) - wanted[:, None]).argmin(axis=1)
+        return np.asarray(corners[np.arange(len(wanted)), best])
 
     def without_translations(self, offset: complex) -> complex:
         """The same offset up to a translation of the tiling, near 0: small ones stay as they are."""

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from hexwrap_solver.arrays import Bools, Floats, Ints, Progress, Ragged, no_progress
+from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints, Progress, Ragged, no_progress
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.domain.interpolate import surface_weights
 from hexwrap_solver.domain.lift import points_at
@@ -18,22 +18,25 @@ from hexwrap_solver.errors import PatternError
 from hexwrap_solver.pattern.lattice import LATTICES, Lattice
 from hexwrap_solver.pattern.lay.cells import (
     Cells,
+    WholeCells,
     awkward_cells,
     largest_part,
     manifold_corners,
     only_whole_cells,
+    sides_by_edge,
     whole_cells,
 )
-from hexwrap_solver.pattern.lay.edges import find_edges
-from hexwrap_solver.pattern.lay.labels import places, rows_from, turns_around, winding
+from hexwrap_solver.pattern.lay.edges import PatternEdges, find_edges
+from hexwrap_solver.pattern.lay.labels import azimuth, first_on_net, places, rows_from, turns_around, winding
 from hexwrap_solver.pattern.lay.layout import Layout
-from hexwrap_solver.pattern.lay.nodes import find_nodes
+from hexwrap_solver.pattern.lay.nodes import Nodes, find_nodes
 from hexwrap_solver.pattern.place.choose import Placing
 from hexwrap_solver.pattern.place.placement import Placement, anchor_vertex, edge_angle
 from hexwrap_solver.pattern.place.rotation import with_rotation
 from hexwrap_solver.pattern.place.size import ASKED, fitting_number
 from hexwrap_solver.pattern.trim.arrangement import Points
-from hexwrap_solver.pattern.trim.boundary import boundary_of
+from hexwrap_solver.pattern.trim.boundary import Boundary, boundary_of
+from hexwrap_solver.pattern.trim.enclosed import around_enclosed, met_by_pattern
 from hexwrap_solver.pattern.trim.trim import TooCoarse, Trimmed, trim
 from hexwrap_solver.pattern.types import Pattern, PatternSettings
 from hexwrap_solver.surface.normals import with_tangents
@@ -57,15 +60,10 @@ def lay_pattern(cmap: ConformalMap, settings: PatternSettings, progress: Progres
     Raises NotAdaptedError where the cone angle does not suit the kind of pattern, PatternError where the
     cells are too many (``settings.max_cells``) or too large to close up around the surface.
     """
-    if cmap.kind == "net":
-        raise PatternError(
-            "Patterns are laid on tubes only; this surface has another number of boundary loops, or "
-            "singularities: ask for its map alone (pattern null)."
-        )
     lattice = LATTICES[settings.kind]
     settings, notes = with_rotation(cmap, lattice, settings)
     placing = Placing.of(cmap, lattice, settings)
-    pattern = _lay(placing, settings, progress)
+    pattern = _lay(cmap, placing, settings, progress)
     if settings.around is not None and pattern.around != settings.around:
         notes.append(
             f"{pattern.around} cells around instead of {settings.around}: the nearest that closes up."
@@ -73,7 +71,7 @@ def lay_pattern(cmap: ConformalMap, settings: PatternSettings, progress: Progres
     wanted = settings.edge_length
     if wanted is not None and abs(pattern.edge_length / wanted - 1) > CLOSE:
         corrected = replace(settings, edge_length=wanted**2 / pattern.edge_length)
-        again = _lay(placing, corrected, no_progress)
+        again = _lay(cmap, placing, corrected, no_progress)
         if abs(again.edge_length / wanted - 1) < abs(pattern.edge_length / wanted - 1):
             pattern = again
         if abs(pattern.edge_length / wanted - 1) > ASKED:
@@ -85,11 +83,11 @@ def lay_pattern(cmap: ConformalMap, settings: PatternSettings, progress: Progres
     return replace(pattern, notes=(*notes, *pattern.notes))
 
 
-def _lay(placing: Placing, settings: PatternSettings, progress: Progress) -> Pattern:
-    cmap, lattice = placing.cmap, placing.lattice
+def _lay(cmap: ConformalMap, placing: Placing, settings: PatternSettings, progress: Progress) -> Pattern:
+    lattice = placing.lattice
     placement = placing.at(settings)
     progress(0.1, "placing the lattice")
-    layout = layout_of(cmap, lattice, placement)
+    layout = layout_of(placing.cmap, lattice, placement)
     _check_count(cmap, layout, settings)
     nodes = find_nodes(layout)
     if not nodes.n:
@@ -98,31 +96,54 @@ def _lay(placing: Placing, settings: PatternSettings, progress: Progress) -> Pat
     edges = find_edges(layout, nodes)
     progress(0.6, "edges")
     whole = whole_cells(lattice, edges)
-    if settings.boundary == "trim":
+    boundary = boundary_of(cmap.surface, layout)
+    met = met_by_pattern(layout, nodes, edges, boundary)
+    if cmap.kind != "net":
+        met[:2] = True  # a cell that encloses an end goes around the surface
+    if settings.boundary == "trim" and len(boundary.face):
         try:
-            trimmed = trim(layout, boundary_of(cmap.surface, layout), nodes, edges, whole)
+            cut = trim(layout, boundary, met, nodes, edges, whole)
         except TooCoarse:
             raise _too_coarse(cmap, settings, placement) from None
     else:
-        cells = only_whole_cells(lattice, edges, whole)
-        own = nodes.own
-        points = Points(nodes.face[own], lattice.position(nodes.point[own]), np.zeros(nodes.n, dtype=bool))
-        trimmed = Trimmed(cells, np.ones(cells.n, dtype=bool), points)
-    progress(0.8, f"{trimmed.cells.n} cells")
-    return _finish(cmap, settings, placement, layout, trimmed)
+        cut = _uncut(layout, boundary, met, nodes, edges, whole)
+    progress(0.8, f"{cut.cells.n} cells")
+    return _finish(cmap, settings, placement, layout, cut)
+
+
+def _uncut(
+    layout: Layout,
+    boundary: Boundary,
+    met: Bools,
+    nodes: Nodes,
+    edges: PatternEdges,
+    whole: WholeCells,
+) -> Trimmed:
+    """The whole cells alone."""
+    lattice, own = layout.lattice, nodes.own
+    side = sides_by_edge(lattice, edges, whole)[around_enclosed(layout, boundary, nodes, met)]
+    keep = np.ones(whole.n, dtype=bool)
+    keep[whole.corner.row[side[side >= 0]]] = False
+    cells = only_whole_cells(lattice, edges, whole).part(keep)
+    points = Points(nodes.face[own], lattice.position(nodes.point[own]), np.zeros(nodes.n, dtype=bool))
+    return Trimmed(cells, np.ones(cells.n, dtype=bool), points, holed=int((~keep).sum()))
 
 
 def layout_of(cmap: ConformalMap, lattice: Lattice, placement: Placement) -> Layout:
     """The domain's triangles in lattice units."""
     net = cmap.net
-    corners = placement.motion.carry(placement.place[cmap.surface.faces], cmap.sheet)
-    winding = net.winding
-    assert winding is not None, "an annulus"
-    isometries = placement.motion.power(winding)
+    corners = placement.glued.corners(cmap.surface.faces, placement.place)
     extent = float(abs(corners).max())
     tolerance = max(1e-9, ROUNDING * extent, 2 * cmap.closing_error * extent)
     return Layout(
-        corners, net.across, net.crossing, isometries, net.inverse, cmap.surface.twin, lattice, tolerance
+        corners,
+        net.across,
+        net.crossing,
+        placement.isometries,
+        net.inverse,
+        cmap.surface.twin,
+        lattice,
+        tolerance,
     )
 
 
@@ -148,10 +169,10 @@ def _check_count(cmap: ConformalMap, layout: Layout, settings: PatternSettings) 
 def _finish(
     cmap: ConformalMap, settings: PatternSettings, placement: Placement, layout: Layout, cut: Trimmed
 ) -> Pattern:
-    keep, narrow = _usable(cut.cells, placement.motion.turns != 0)
+    keep, narrow = _usable(cut.cells, placement.narrows)
     if not keep.any():
         raise _too_coarse(cmap, settings, placement)
-    cells = cut.cells.part(keep)
+    cells, whole = cut.cells.part(keep), cut.whole[keep]
     corner, point = manifold_corners(cells)
     triangle, place = cut.points.face[point], cut.points.place[point]
     weights = barycentric(layout.corners[triangle], place)
@@ -159,36 +180,75 @@ def _finish(
     on_surface = surface_weights(cmap, triangle, weights)
     vertices, normals = _on_input_surface(cmap, triangle, on_surface)
     faces, neighbours = Ragged(corner, cells.corner.offsets), cells.neighbours()
-    first = _at_first_loop(cmap, layout, faces, neighbours, cells.isometry[:, 3])
+    net = cmap.kind == "net"
+    if net:
+        centers = np.add.reduceat(vertices[corner], faces.offsets[:-1], axis=0) / faces.lengths[:, None]
+        first: Bools | None = first_on_net(cmap, centers, neighbours)
+        turn_of_cell = azimuth(cmap, centers)
+    else:
+        first = _at_first_loop(cmap, layout, faces, neighbours, cells.isometry[:, 3])
+        turn_of_cell = _turn_of_cells(cmap, faces, cells, triangle, weights)
     if first is None:
         raise _too_coarse(cmap, settings, placement)
     ring = rows_from(neighbours, first)
     if settings.kind == "triangle":
         ring = ring // 2  # a row of triangles: those that stand and those that hang
-    vertex_turn = turns_around(cmap)
-    turn = (weights * (vertex_turn[cmap.surface.faces] + cmap.sheet)[triangle]).sum(axis=1)
-    turn = turn[corner] - vertex_turn[anchor_vertex(cmap)] + cells.isometry[:, 3]
-    turn_of_cell = np.add.reduceat(turn, faces.offsets[:-1]) / faces.lengths
+    lattice = layout.lattice
     return Pattern(
         kind=settings.kind,
         vertices=vertices,
         normals=normals,
         uv=uv,
         faces=faces,
-        sheet=cells.isometry[:, 3],
+        corners=_corners(cmap, layout, faces, cells.isometry, triangle, place, uv),
+        index=np.where(whole, lattice.sides - faces.lengths, 0),
+        sheet=None if net else cells.isometry[:, 3],
         neighbours=neighbours,
         triangle=triangle,
         barycentric=on_surface,
-        whole=cut.whole[keep],
+        whole=whole,
         ring=ring,
         place=places(ring, turn_of_cell),
         rings=int(ring.max()) + 1,
-        around=placement.around,
+        around=int(np.bincount(ring).max()) if net else placement.around,
         rotation=placement.rotation,
         edge_length=mean_edge(vertices, faces),
         distortion=placement.distortion,
         notes=(*placement.notes, *_told(cut, narrow, int(np.count_nonzero(~keep)) - narrow)),
     )
+
+
+def _turn_of_cells(
+    cmap: ConformalMap, faces: Ragged, cells: Cells, triangle: Ints, weights: Floats
+) -> Floats:
+    """(c,) how many turns around the surface each cell stands from the anchor."""
+    vertex_turn = turns_around(cmap)
+    turn = (weights * (vertex_turn[cmap.surface.faces] + cmap.sheet)[triangle]).sum(axis=1)
+    turn = turn[faces.values] - vertex_turn[anchor_vertex(cmap)] + cells.isometry[:, 3]
+    return np.asarray(np.add.reduceat(turn, faces.offsets[:-1]) / faces.lengths)
+
+
+def _corners(
+    cmap: ConformalMap,
+    layout: Layout,
+    faces: Ragged,
+    isometry: Ints,
+    triangle: Ints,
+    place: Complexes,
+    uv: Complexes,
+) -> Complexes:
+    """(k,) the corners of each cell beside its first one. On nets, those across a cut are found from their
+    places on the lattice, by the affine map of the first corner's triangle."""
+    corner = faces.values.astype(np.int64)
+    if cmap.kind != "net":
+        return cmap.deck.apply(uv[corner], isometry[:, 3])
+    z = uv[corner]
+    moved = np.flatnonzero(isometry.any(axis=1))
+    beside = layout.lattice.carry(isometry[moved], place[corner[moved]])
+    first = triangle[corner[faces.offsets[faces.row[moved]]]]
+    weights = barycentric(layout.corners[first], beside)
+    z[moved] = (weights * cmap.corners()[first]).sum(axis=1)
+    return z
 
 
 def _usable(cells: Cells, narrows: bool) -> tuple[Bools, int]:
@@ -224,8 +284,13 @@ def _told(cut: Trimmed, narrow: int, apart: int) -> list[str]:
             f"{narrow} cells at the narrow end were left out: so few go around it there that they touch "
             "themselves."
         )
+    if cut.holed:
+        notes.append(
+            f"{cut.holed} cells were left out because an opening lies inside them; smaller cells would go "
+            "around it."
+        )
     if apart:
-        notes.append(f"{apart} cells hung on the pattern by no edge and were left out.")
+        notes.append(f"{apart} cells share no edge with the rest of the pattern and were left out.")
     return notes
 
 
@@ -252,6 +317,11 @@ def mean_edge(vertices: Floats, faces: Ragged) -> float:
 
 
 def _too_coarse(cmap: ConformalMap, settings: PatternSettings, placement: Placement) -> PatternError:
+    if cmap.kind == "net":
+        return PatternError(
+            f"No cell of this size fits on the surface: its longest loop would take {placement.around} of "
+            "them. Ask for more cells around, or a shorter edge."
+        )
     around, step, asked = placement.around, placement.step, ""
     if settings.around not in (None, around):
         only = f" (only multiples of {step} close up at this rotation)" if step > 1 else ""
@@ -278,7 +348,8 @@ def _at_first_loop(
 ) -> Bools | None:
     """(c,) cells with an edge on the loop of the pattern that faces the surface's loop 0.
 
-    None unless the pattern is an annulus: two boundary loops, one each way around.
+    None unless the pattern goes around once: all of its boundary loops but two, one each way around, are
+    openings.
     """
     following = faces.next()
     edge = np.flatnonzero(neighbours.values < 0)
@@ -288,9 +359,9 @@ def _at_first_loop(
         coo_array((np.ones(len(edge)), (tail, head)), shape=(n, n)), directed=False
     )
     loops, which = np.unique(part[tail], return_inverse=True)
-    gained = np.bincount(which, weights=sheet[following[edge]] - sheet[edge])
+    gained = np.rint(np.bincount(which, weights=sheet[following[edge]] - sheet[edge]))
     euler = n - (len(faces.values) + len(edge)) // 2 + faces.n_rows
-    if len(loops) != 2 or sorted(np.rint(gained)) != [-1, 1] or euler != 0:
+    if sorted(gained[gained != 0]) != [-1, 1] or euler != 2 - len(loops):
         return None
     side = int(np.argmax(gained * winding(cmap, layout)))
     first = np.zeros(faces.n_rows, dtype=bool)

@@ -60,11 +60,14 @@ class Pattern:
     """A mesh of cells with shared vertices that closes around the surface.
 
     vertices, normals: (p, 3) on the surface. uv: (p,) complex positions in the map's domain, one sheet.
-    faces: vertex indices per cell, counter-clockwise from outside. sheet: aligned with faces.values;
-    corner k of a face stands at g^sheet(uv[vertex]) so that each cell is one connected polygon in the plane.
+    faces: vertex indices per cell, counter-clockwise from outside. corners: complex, aligned with
+    faces.values: every cell as one connected polygon of the plane, beside its first corner. sheet: aligned,
+    on cylinders and cones: corner k stands at g^sheet(uv[vertex]); None on nets. index: (c,) 0, or k where a
+    cell has k corners fewer, around a singularity.
     neighbours: aligned with faces.values; the cell across edge k → k+1, or −1.
     triangle: (p,) face of map.surface that holds the vertex; barycentric: (p, 3) there.
-    whole: (c,) False for cells cut at the boundary. ring, place: (c,) label numbers, from 0.
+    whole: (c,) False for cells cut at the boundary. ring, place: (c,) label numbers, from 0: rows from
+    loop 0 and place in the row; on nets around is the greatest number of cells in one.
     rotation: angle actually taken, radians, from the boundary direction (or the horizontal axis on cones).
     edge_length: mean edge length on the surface. distortion: worst singular-value ratio − 1 of the
     stretch that ``align`` needed, 0 where none.
@@ -75,7 +78,9 @@ class Pattern:
     normals: Floats
     uv: Complexes
     faces: Ragged
-    sheet: Ints
+    corners: Complexes
+    index: Ints
+    sheet: Ints | None
     neighbours: Ragged
     triangle: Ints
     barycentric: Floats

@@ -28,7 +28,7 @@ def checked(nurbs: NurbsSurface) -> tuple[NurbsSurface, list[str]]:
     check_data(nurbs)
     size = float(np.linalg.norm([np.ptp(x) for x in nurbs.control_points[..., :3].reshape(-1, 3).T]))
     check_extent(size)
-    gap = [_gap(nurbs, direction) for direction in (0, 1)]
+    gap = [end_gap(nurbs, direction) for direction in (0, 1)]
     collapsed = [_collapsed(nurbs, direction, TOLERANCE * size) for direction in (0, 1)]
     for direction in (0, 1):
         if nurbs.closed[direction] and gap[direction] > TOLERANCE * size:
@@ -124,7 +124,8 @@ def _line(nurbs: NurbsSurface, direction: int, at: float) -> Floats:
     return evaluate_points(open_surface, np.stack(pair, axis=1))
 
 
-def _gap(nurbs: NurbsSurface, direction: int) -> float:
+def end_gap(nurbs: NurbsSurface, direction: int) -> float:
+    """The greatest distance between the two ends of direction."""
     low, high = (_line(nurbs, direction, x) for x in domain(nurbs, direction))
     return float(np.linalg.norm(low - high, axis=1).max())
 

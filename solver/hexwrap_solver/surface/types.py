@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Annotated, Literal
 
@@ -59,6 +59,31 @@ class SurfaceSettings:
     openings: Annotated[
         Openings, Setting("what loops beyond the two longest are: holes to cut out, or boundaries")
     ] = "cut"
+    unit: Annotated[
+        Literal["m", "cm", "mm", "ft", "in"] | None,
+        Setting("unit of lengths; a file's own, where it has one, if it is not given"),
+    ] = None
+    object: Annotated[
+        str | None,
+        Setting(
+            "which object of a file is meant: name, id or number; * and ? stand for any letters", most=400
+        ),
+    ] = None
+    layer: Annotated[
+        str | None,
+        Setting(
+            "which layer of a file is meant, with those below it: path or name, also with * and ?", most=400
+        ),
+    ] = None
+
+
+@dataclass(frozen=True)
+class Origin:
+    """What the surface was called where it comes from. attributes: further (key, value) pairs."""
+
+    name: str = ""
+    layer: str = ""
+    attributes: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -127,6 +152,7 @@ class Surface(Triangles):
     are none.
     nurbs, parameters: the NURBS surface the mesh was made from, and (n, 2) its parameters at the
     vertices (in the closed direction, parameters are in the base period); None for sent meshes.
+    unit: of lengths, None where it is not known. origin: names it came with.
     """
 
     loops: tuple[Ints, ...]
@@ -138,12 +164,19 @@ class Surface(Triangles):
     parameters: Floats | None = None
     openings: int = 0
     patch: Bools | None = None
+    unit: str | None = None
+    origin: Origin = field(default_factory=Origin)
 
     def knowing(self, mesh: Triangles) -> Surface:
         """The surface itself, told what is known of the same triangles by other names of their vertices."""
         known = ("edge_groups", "twin", "lengths")
         self.__dict__.update({name: mesh.__dict__[name] for name in known if name in mesh.__dict__})
         return self
+
+    @property
+    def boundary(self) -> Ints:
+        """(b,) the vertices of all loops."""
+        return np.concatenate([np.zeros(0, dtype=np.int64), *self.loops])
 
     @cached_property
     def tree(self) -> TriangleTree:

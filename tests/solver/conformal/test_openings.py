@@ -14,7 +14,7 @@ from hexwrap_solver.surface import with_openings
 from hexwrap_solver.surface.holes import fill_openings
 from hexwrap_solver.surface.types import Surface
 from tests.solver.conformal.annuli import bump
-from tests.solver.conformal.test_net import CENTRES, SPHERE, check, holed, sent
+from tests.solver.conformal.nets import CENTRES, SPHERE, check, holed, sent
 
 TOWER = bump(48, 20)
 

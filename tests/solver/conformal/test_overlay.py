@@ -14,7 +14,7 @@ from hexwrap_solver.conformal.robust.delaunay import make_delaunay
 from hexwrap_solver.conformal.robust.mirror import MirrorMesh, mirror_mesh
 from hexwrap_solver.conformal.robust.overlay import Overlay, insert
 from hexwrap_solver.conformal.robust.trail import Places, Trail
-from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap, Targets
+from hexwrap_solver.conformal.types import BoundaryCondition, Cones, ConformalMap, Targets
 from hexwrap_solver.surface.types import Surface
 from tests.solver.conformal.annuli import bump
 from tests.solver.conformal.checks import faults
@@ -101,8 +101,8 @@ def _by_vertex(mesh: MirrorMesh, at: Places) -> Floats:
 
 
 def _overlay(surface: Surface) -> tuple[Overlay, ConformalMap, Targets]:
-    problem, cut = robust._uncollapse(robust._problem(surface, boundary.straight(surface), None))
-    flat = robust._flatten(problem, cut, no_progress)
+    problem, cut = robust._uncollapse(robust._problem(surface, boundary.straight(surface), None), True)
+    flat = robust._flatten(problem, cut, Cones.none(), no_progress)
     found, lift, _ = robust._draw(problem, flat)
     return Overlay(found, flat.log_length, flat.turn, flat.descent.u, lift), found, problem.targets
 

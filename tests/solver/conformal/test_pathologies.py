@@ -83,7 +83,7 @@ def test_corners_wherever_they_are(name: str, kind: str) -> None:
     found = conformal_map(surface, condition)
     assert faults(found) == []
     wanted = np.full(len(surface.vertices), np.pi)
-    wanted[condition.vertices] = condition.angles
+    wanted[[corner.vertex for corner in condition.angles]] = [corner.angle for corner in condition.angles]
     for loop, angles in zip(found.surface.loops, found.boundary_angles, strict=True):
         sent = loop < len(wanted)  # the rest was inserted on straight sides
         np.testing.assert_allclose(angles[sent], wanted[loop[sent]], atol=1e-9)

@@ -48,7 +48,7 @@ def test_random_graphs(n: int, seed: int, tied: bool) -> None:
 @pytest.mark.parametrize("tied", [False, True])
 def test_hessians(tied: bool) -> None:
     surface = bump(60, 30)
-    energy = Energy(surface, constant_on_loops(surface, -np.pi / 3) if tied else straight(surface))
+    energy = Energy(surface, constant_on_loops(surface, [0.0, -np.pi / 3]) if tied else straight(surface))
     diagonal, off_diagonal = energy.hessian(energy.corners(np.zeros(energy.n)))
     factorisation = Factorisation(energy.points, energy.rows, energy.columns)
     factorisation.factorise(diagonal, off_diagonal)

@@ -136,6 +136,8 @@ def assemble(chart: Chart, grid: Floats, faces: np.ndarray, kind: str, around: i
         normals=normals(chart, grid[:, 0], grid[:, 1]),
         uv=grid[:, 0] + 1j * grid[:, 1],
         faces=cells,
+        corners=(grid[:, 0] + 1j * grid[:, 1])[start],
+        index=np.zeros(len(faces), dtype=np.int64),
         sheet=np.zeros(len(start), dtype=np.int64),
         neighbours=Ragged(across, cells.offsets),
         triangle=np.zeros(n, dtype=np.int64),

@@ -58,13 +58,8 @@ def renumbered(cmap: ConformalMap, seed: int) -> ConformalMap:
     )
     ones = tuple(np.full(len(loop), np.pi) for loop in loops)
     angles = ones if cmap.kind == "cylinder" else tuple(np.full(len(x), np.pi + 0.1) for x in loops)
-    return replace(
-        made,
-        surface=replace(made.surface, loops=loops),
-        boundary_angles=angles,
-        circumference=cmap.circumference,
-        deck=cmap.deck,
-    )
+    moved = replace(made, surface=replace(made.surface, loops=loops), boundary_angles=angles)
+    return moved.with_domain(circumference=cmap.circumference, deck=cmap.deck)
 
 
 @pytest.mark.parametrize("kind", ["hex", "triangle", "quad"])

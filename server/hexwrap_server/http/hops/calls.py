@@ -24,6 +24,7 @@ from hexwrap_server.jobs.work import solution_at
 from hexwrap_server.jobs.worker import Report
 from hexwrap_server.output import wire
 from hexwrap_solver.pipeline import Solution
+from hexwrap_solver.surface.brep import Brep
 from hexwrap_solver.surface.types import MeshSettings, SentMesh, SurfaceSettings
 
 
@@ -79,11 +80,14 @@ def _wanted(values: dict[str, Any], max_vertices: int, max_panels: int) -> Wante
 
 def _surface(geometry: Any, max_vertices: int) -> SentSurface:
     read = convert(geometry)
-    if not isinstance(read, SentMesh):
-        return SentSurface(nurbs=read, settings=SurfaceSettings(MeshSettings(max_vertices=max_vertices)))
-    if len(read.vertices) > max_vertices:
-        raise HopsError(f"The mesh has {len(read.vertices)} vertices, this server takes {max_vertices}.")
-    return SentSurface(mesh=read)
+    if isinstance(read, SentMesh):
+        if len(read.vertices) > max_vertices:
+            raise HopsError(f"The mesh has {len(read.vertices)} vertices, this server takes {max_vertices}.")
+        return SentSurface(mesh=read)
+    settings = SurfaceSettings(MeshSettings(max_vertices=max_vertices))
+    if isinstance(read, Brep):
+        return SentSurface(brep=read, settings=settings)
+    return SentSurface(nurbs=read, settings=settings)
 
 
 def panels_answer(report: Report, path: str, branch: tuple[int, ...], job: str) -> dict[str, Any]:
@@ -141,7 +145,7 @@ def _flat_cells(solution: Solution) -> list[list[list[float]]]:
     """Closed outlines of the cells in the unrolled domain, each in one piece, at z = 0."""
     laid = solution.pattern
     assert laid is not None
-    z = solution.map.deck.apply(laid.uv[laid.faces.values], laid.sheet)
+    z = laid.corners
     points = np.stack([z.real, z.imag, np.zeros(len(z))], axis=1).tolist()
     ends = laid.faces.offsets.tolist()
     return [_closed(points[a:b]) for a, b in pairwise(ends)]

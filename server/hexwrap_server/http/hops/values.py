@@ -122,7 +122,7 @@ def _plane(frame: list[list[float]]) -> str:
 
 #: What an input of each kind takes: a surface is meshed by the server.
 _GEOMETRY: dict[str, tuple[type, ...]] = {
-    "Mesh": (rhino3dm.Mesh, rhino3dm.Brep, rhino3dm.Surface),
+    "Mesh": (rhino3dm.Mesh, rhino3dm.Brep, rhino3dm.Surface, rhino3dm.SubD),
     "Curve": (rhino3dm.Curve,),
 }
 _NEEDED = {"Mesh": "a mesh or a surface", "Curve": "a curve"}

@@ -18,3 +18,8 @@ class UnreadableFileError(SurfaceError):
 class SeveralObjectsError(SurfaceError):
     slug = "several-objects"
     title = "The file holds more than one surface"
+
+
+class NoObjectError(SurfaceError):
+    slug = "no-such-object"
+    title = "The file does not hold the object"

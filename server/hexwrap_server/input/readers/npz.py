@@ -10,6 +10,7 @@ import numpy as np
 from numpy.lib import format as npy
 
 from hexwrap_server.input.readers.errors import UnreadableFileError
+from hexwrap_server.input.readers.found import FileContent, of_mesh
 from hexwrap_solver.arrays import Ragged
 from hexwrap_solver.surface import SentMesh
 
@@ -17,7 +18,7 @@ from hexwrap_solver.surface import SentMesh
 LARGEST = 2_000_000_000
 
 
-def read_npz(data: bytes) -> SentMesh:
+def read_npz(data: bytes) -> FileContent:
     """faces: (m, 3) or (m, 4); a quad whose last index repeats the one before, or is −1, is a triangle."""
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         if sum(member.file_size for member in archive.infolist()) > LARGEST:
@@ -32,10 +33,12 @@ def read_npz(data: bytes) -> SentMesh:
     if not {"vertices", "faces"} <= arrays.keys():
         raise UnreadableFileError("The archive must hold the arrays 'vertices' and 'faces'.")
     normals = arrays.get("normals")
-    return SentMesh(
-        arrays["vertices"].astype(float),
-        _rows(arrays["faces"]),
-        None if normals is None else normals.astype(float),
+    return of_mesh(
+        SentMesh(
+            arrays["vertices"].astype(float),
+            _rows(arrays["faces"]),
+            None if normals is None else normals.astype(float),
+        )
     )
 
 

@@ -7,6 +7,7 @@ import re
 import numpy as np
 
 from hexwrap_server.input.readers.errors import UnreadableFileError
+from hexwrap_server.input.readers.found import FileContent, of_mesh
 from hexwrap_server.input.readers.text import as_utf8, floats, integers
 from hexwrap_solver.arrays import Ints, Ragged
 from hexwrap_solver.surface import SentMesh
@@ -18,8 +19,11 @@ _VERTEX, _FACE = (b"v ", b"v\t"), (b"f ", b"f\t", b"fo")
 _OTHERS = {b"surf": "NURBS surfaces", b"curv": "curves", b"l": "lines", b"p": "points"}
 
 
-def read_obj(data: bytes) -> SentMesh:
-    """Every ``v`` and ``f`` of the file, whatever its objects and groups. Raises UnreadableFileError."""
+def read_obj(data: bytes) -> FileContent:
+    """Every ``v`` and ``f`` of the file; its objects, or else its groups, can be told apart.
+
+    Raises UnreadableFileError.
+    """
     lines = _lines(as_utf8(data))
     kinds = [line[:2].lower() for line in lines]
     at_vertex = np.flatnonzero([kind in _VERTEX for kind in kinds])
@@ -35,10 +39,24 @@ def read_obj(data: bytes) -> SentMesh:
     named = integers([x for row in corners for x in row], "faces of the OBJ file")
     lengths = np.array([len(row) for row in corners], dtype=np.int64)
     before = np.repeat(np.searchsorted(at_vertex, at_face), lengths)  # negative: back from those so far
-    return SentMesh(
+    mesh = SentMesh(
         vertices.reshape(-1, 3),
         Ragged(_checked(named, before, len(at_vertex), lengths), np.append(0, np.cumsum(lengths))),
     )
+    return of_mesh(mesh, *_groups(lines, kinds, at_face))
+
+
+def _groups(lines: list[bytes], kinds: list[bytes], at_face: Ints) -> tuple[list[tuple[str, str]], Ints]:
+    """Name and group of every object (its name is the group's where it has none), and each face's object."""
+    labels = []
+    for marks in ((b"o ", b"o\t"), (b"g ", b"g\t")):
+        at = [i for i, kind in enumerate(kinds) if kind in marks]
+        names = ["", *(b" ".join(lines[i][2:].split()).decode("utf-8", "replace") for i in at)]
+        labels.append([names[k] for k in np.searchsorted(at, at_face)])
+    pairs = [(o, g) if o else (g, "") for o, g in zip(*labels, strict=True)]
+    number: dict[tuple[str, str], int] = {}
+    owner = np.array([number.setdefault(pair, len(number)) for pair in pairs], dtype=np.int64)
+    return list(number), owner
 
 
 def _lines(data: bytes) -> list[bytes]:

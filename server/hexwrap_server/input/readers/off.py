@@ -7,6 +7,7 @@ import re
 import numpy as np
 
 from hexwrap_server.input.readers.errors import UnreadableFileError
+from hexwrap_server.input.readers.found import FileContent, of_mesh
 from hexwrap_server.input.readers.text import as_utf8, count, floats, integers, rows
 from hexwrap_solver.arrays import Ragged
 from hexwrap_solver.surface import SentMesh
@@ -15,7 +16,7 @@ from hexwrap_solver.surface import SentMesh
 _KEYWORD = re.compile(rb"(?P<st>ST)?(?P<c>C)?(?P<n>N)?(?P<w>4)?OFF", re.IGNORECASE)
 
 
-def read_off(data: bytes) -> SentMesh:
+def read_off(data: bytes) -> FileContent:
     """One mesh. Raises UnreadableFileError."""
     lines = [line for raw in as_utf8(data).splitlines() if (line := raw.partition(b"#")[0].split())]
     if not lines:
@@ -48,7 +49,7 @@ def read_off(data: bytes) -> SentMesh:
     lengths = np.array([int(row[0]) for row in face_rows], dtype=np.int64)
     corners = [x for row in face_rows for x in row[1 : 1 + int(row[0])]]
     faces = Ragged(integers(corners, "faces of the OFF file"), np.append(0, np.cumsum(lengths)))
-    return SentMesh(points[:, :3] / points[:, 3:] if homogeneous else points, faces)
+    return of_mesh(SentMesh(points[:, :3] / points[:, 3:] if homogeneous else points, faces))
 
 
 def _counts(lines: list[list[bytes]]) -> tuple[int, int, list[list[bytes]]]:

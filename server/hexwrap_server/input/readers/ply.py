@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexwrap_server.input.readers.errors import UnreadableFileError
+from hexwrap_server.input.readers.found import FileContent, of_mesh
 from hexwrap_server.input.readers.text import MARKS, Width, as_utf8, count, floats, rows
 from hexwrap_solver.arrays import Floats, Ints, Ragged
 from hexwrap_solver.surface import SentMesh
@@ -48,7 +49,7 @@ class _Rows:
     lists: dict[str, Ragged]
 
 
-def read_ply(data: bytes) -> SentMesh:
+def read_ply(data: bytes) -> FileContent:
     """The vertices with their normals, where it has some, and the faces or strips.
 
     Raises UnreadableFileError.
@@ -64,7 +65,8 @@ def read_ply(data: bytes) -> SentMesh:
     normals = None
     if {"nx", "ny", "nz"} <= vertex.single.keys():
         normals = np.stack([vertex.single[name] for name in ("nx", "ny", "nz")], axis=1)
-    return SentMesh(np.stack([vertex.single[name] for name in "xyz"], axis=1), faces, normals)
+    points = np.stack([vertex.single[name] for name in "xyz"], axis=1)
+    return of_mesh(SentMesh(points, faces, normals))
 
 
 def _head(data: bytes) -> tuple[str, list[_Element], bytes]:

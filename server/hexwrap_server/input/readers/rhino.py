@@ -1,78 +1,130 @@
-"""Rhino's .3dm: one mesh, or one untrimmed surface."""
+"""Rhino's .3dm: meshes, surfaces, polysurfaces, extrusions and SubDs, in blocks or not."""
 
 from __future__ import annotations
 
+from collections import Counter
+from itertools import product
 from typing import Any
 
 import numpy as np
 import rhino3dm
 
-from hexwrap_server.input.readers.errors import SeveralObjectsError, UnreadableFileError
-from hexwrap_server.input.readers.rhino_brep import nurbs_surface
+from hexwrap_server.input.readers.errors import UnreadableFileError
+from hexwrap_server.input.readers.found import FileContent, Found, Geometry
+from hexwrap_server.input.readers.rhino_brep import brep_of, nurbs_surface, subd_mesh
+from hexwrap_server.input.readers.rhino_model import MOST_OBJECTS, Model, Placed, TooManyObjectsError
 from hexwrap_solver.arrays import Floats, Ragged
 from hexwrap_solver.surface import NurbsSurface, SentMesh
+from hexwrap_solver.surface.brep import Brep
 
 #: Rhino's geometry types that are surfaces; curves, points, lights and texts beside them do no harm.
-SURFACES = (rhino3dm.Mesh, rhino3dm.Brep, rhino3dm.Surface)
+SURFACES = (rhino3dm.Mesh, rhino3dm.Brep, rhino3dm.Surface, rhino3dm.SubD)
+#: Rhino's unit systems that are carried.
+UNITS = {"Meters": "m", "Centimeters": "cm", "Millimeters": "mm", "Feet": "ft", "Inches": "in"}
 
 
-def read_3dm(data: bytes) -> SentMesh | NurbsSurface:
-    """The only surface of the file. Raises SeveralObjectsError, UnreadableFileError."""
-    model: Any = rhino3dm.File3dm.FromByteArray(data)
+def read_3dm(data: bytes) -> FileContent:
+    """Raises UnreadableFileError."""
+    model = Model.read(data)
     if model is None:
         raise UnreadableFileError("The file is no Rhino file, or it is cut short: save it again from Rhino.")
-    objects = [item for item in model.Objects if not item.Attributes.IsInstanceDefinitionObject]
-    found = [item for item in objects if isinstance(item.Geometry, SURFACES)]
-    if not found:
-        kinds = sorted({type(item.Geometry).__name__ for item in objects})
+    try:
+        placed = model.objects()
+    except TooManyObjectsError:
         raise UnreadableFileError(
-            f"The Rhino file holds no mesh or surface (but {', '.join(kinds) or 'nothing at all'}): save the "
-            "tube as a mesh or as one untrimmed surface."
-        )
-    if len(found) > 1:
-        named = [f"{type(item.Geometry).__name__} {_name(item)}" for item in found]
-        listed = ", ".join(named[:6]) + (" …" if len(named) > 6 else "")
-        raise SeveralObjectsError(
-            f"The Rhino file holds {len(found)} surfaces ({listed}): save the one that is to be "
-            "panelized alone, or join them into one mesh.",
-            data={"objects": named[:100]},
-        )
-    return convert(found[0].Geometry)
+            f"The blocks of the Rhino file hold more than {MOST_OBJECTS} objects in all: delete those that "
+            "are not needed, or export the facade alone with Rhino's ExportSelected command."
+        ) from None
+    settings = model.file.Settings
+    tolerance = float(settings.ModelAbsoluteTolerance)
+    return FileContent(
+        tuple(_found(item, tolerance) for item in placed if isinstance(item.geometry, SURFACES)),
+        UNITS.get(str(settings.ModelUnitSystem).rpartition(".")[2]),
+        tolerance if 0 < tolerance < np.inf else None,
+        Counter(type(item.geometry).__name__ for item in placed if not isinstance(item.geometry, SURFACES)),
+    )
 
 
-def _name(item: Any) -> str:
-    return f"'{item.Attributes.Name}'" if item.Attributes.Name else str(item.Attributes.Id)
+def _found(placed: Placed, tolerance: float) -> Found:
+    return Found(
+        placed.id,
+        placed.name or (placed.blocks[-1] if placed.blocks else ""),
+        _kind(placed.geometry),
+        _size(placed),
+        lambda: _moved(convert(placed.geometry, tolerance), placed.matrix),
+        placed.layer,
+        placed.visible,
+        placed.locked,
+        {str(key): str(value) for key, value in placed.attributes.GetUserStrings()},
+    )
 
 
-def convert(geometry: Any) -> SentMesh | NurbsSurface:
-    """One mesh, polysurface or surface of rhino3dm. Raises UnreadableFileError."""
+def _kind(geometry: Any) -> str:
+    """As Rhino's What command says it."""
+    if isinstance(geometry, rhino3dm.Mesh):
+        return "mesh"
+    if isinstance(geometry, rhino3dm.SubD):
+        return "SubD"
+    if isinstance(geometry, rhino3dm.Extrusion):
+        return "extrusion"
+    if isinstance(geometry, rhino3dm.Brep):
+        if len(geometry.Faces) > 1:
+            return "closed polysurface" if geometry.IsSolid else "polysurface"
+        return "surface" if geometry.IsSurface else "trimmed surface"
+    return "surface"
+
+
+def _size(placed: Placed) -> tuple[float, float, float]:
+    box = placed.geometry.GetBoundingBox()
+    corners = np.array(list(product(*zip(_xyz(box.Min), _xyz(box.Max), strict=True))))
+    if placed.matrix is not None:
+        corners = corners @ placed.matrix[:3, :3].T
+    x, y, z = np.ptp(corners, axis=0).tolist()
+    return x, y, z
+
+
+def _moved(geometry: Geometry, matrix: Floats | None) -> Geometry:
+    """Where its block puts it; the outside stays outside where a block is mirrored."""
+    if matrix is None:
+        return geometry
+    if isinstance(geometry, Brep):
+        return geometry.transformed(matrix)
+    linear, shift = matrix[:3, :3], matrix[:3, 3]
+    mirrored = float(np.linalg.det(linear)) < 0
+    if isinstance(geometry, NurbsSurface):
+        net = geometry.control_points
+        moved = np.concatenate([net[..., :3] @ linear.T + shift, net[..., 3:]], axis=-1)
+        surface = NurbsSurface(geometry.degree, geometry.knots, moved, geometry.closed)
+        return _turned(surface) if mirrored else surface
+    faces = geometry.faces
+    if mirrored:
+        backwards = np.repeat(faces.offsets[:-1] + faces.offsets[1:] - 1, faces.lengths)
+        faces = Ragged(faces.values[backwards - np.arange(len(faces.values))], faces.offsets)
+    normals = geometry.normals
+    if normals is not None:
+        normals = normals @ np.linalg.pinv(linear)
+    return SentMesh(geometry.vertices @ linear.T + shift, faces, normals)
+
+
+def convert(geometry: Any, tolerance: float = 0.0) -> Geometry:
+    """One object of rhino3dm. tolerance: the file's. Raises UnreadableFileError."""
     if isinstance(geometry, rhino3dm.Mesh):
         return _mesh(geometry)
+    if isinstance(geometry, rhino3dm.SubD):
+        mesh = subd_mesh(geometry)
+        if mesh is None:
+            raise UnreadableFileError(
+                "The SubD cannot be subdivided: convert it with Rhino's ToNURBS command."
+            )
+        return _mesh(mesh)
+    if isinstance(geometry, rhino3dm.Extrusion):
+        geometry = geometry.ToBrep(True) or geometry
+    if isinstance(geometry, rhino3dm.Brep) and len(geometry.Faces) == 1 and geometry.IsSurface:
+        surface = nurbs_surface(geometry.Faces[0].UnderlyingSurface())
+        return _turned(surface) if geometry.Faces[0].OrientationIsReversed else surface
     if isinstance(geometry, rhino3dm.Brep):
-        return _brep(geometry)
+        return brep_of(geometry, tolerance)
     return nurbs_surface(geometry)
-
-
-def _brep(brep: Any) -> SentMesh | NurbsSurface:
-    """Its surface where it has one untrimmed face, else the render meshes that Rhino saved with it."""
-    faces = [brep.Faces[i] for i in range(len(brep.Faces))]
-    if len(faces) == 1 and brep.IsSurface:
-        surface = nurbs_surface(faces[0].UnderlyingSurface())
-        return _turned(surface) if faces[0].OrientationIsReversed else surface
-    meshes = [face.GetMesh(rhino3dm.MeshType.Any) for face in faces]
-    if any(mesh is None for mesh in meshes):
-        raise UnreadableFileError(
-            f"The Rhino file holds a polysurface of {len(faces)} faces or a trimmed surface, without its "
-            "render mesh: save it with render meshes, or convert it with Rhino's Mesh command."
-        )
-    parts = [_mesh(mesh) for mesh in meshes]
-    first = np.cumsum([0, *(len(part.vertices) for part in parts)])
-    corners = np.concatenate([part.faces.values + k for part, k in zip(parts, first, strict=False)])
-    lengths = np.concatenate([part.faces.lengths for part in parts])
-    return SentMesh(
-        np.concatenate([part.vertices for part in parts]),
-        Ragged(corners.astype(np.int64), np.concatenate([[0], np.cumsum(lengths)])),
-    )
 
 
 def _mesh(mesh: Any) -> SentMesh:

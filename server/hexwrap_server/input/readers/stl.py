@@ -7,8 +7,9 @@ import re
 import numpy as np
 
 from hexwrap_server.input.readers.errors import UnreadableFileError
+from hexwrap_server.input.readers.found import FileContent, of_mesh
 from hexwrap_server.input.readers.text import as_utf8, floats
-from hexwrap_solver.arrays import Floats, Ragged
+from hexwrap_solver.arrays import Ragged
 from hexwrap_solver.surface import SentMesh
 
 HEADER = 84
@@ -16,12 +17,12 @@ HEADER = 84
 _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 #: Text begins so. Binary headers may, too, but the number behind them has a zero among its bytes.
 _TEXT = re.compile(rb"\s*(facet|solid)\b", re.IGNORECASE)
-_NAMES = re.compile(rb"^[ \t]*(end[ \t]*)?solid\b[^\r\n]*", re.IGNORECASE | re.MULTILINE)
+_NAMES = re.compile(rb"^[ \t]*(?P<end>end[ \t]*)?solid\b(?P<name>[^\r\n]*)", re.IGNORECASE | re.MULTILINE)
 _WORD = re.compile(rb"\b(facet|vertex|endfacet)\b", re.IGNORECASE)
 
 
-def read_stl(data: bytes) -> SentMesh:
-    """All facets of all solids, as one mesh. Raises UnreadableFileError."""
+def read_stl(data: bytes) -> FileContent:
+    """All facets, as one mesh; the solids of a text file can be told apart. Raises UnreadableFileError."""
     announced = int.from_bytes(data[80:HEADER], "little") if len(data) >= HEADER else -1
     if announced > 0 and len(data) == HEADER + announced * _TRIANGLE.itemsize:
         return _binary(data, announced)
@@ -39,21 +40,20 @@ def read_stl(data: bytes) -> SentMesh:
     return _binary(data, announced)
 
 
-def _binary(data: bytes, count: int) -> SentMesh:
+def _binary(data: bytes, count: int) -> FileContent:
     """Bytes behind the last triangle are passed over."""
     read = np.frombuffer(data, dtype=_TRIANGLE, count=count, offset=HEADER)
-    return _triangles(read["corners"].reshape(-1, 3).astype(np.float64))
+    corners = read["corners"].reshape(-1, 3).astype(np.float64)
+    return of_mesh(SentMesh(corners, Ragged.from_table(np.arange(len(corners)).reshape(-1, 3))))
 
 
-def _triangles(corners: Floats) -> SentMesh:
-    return SentMesh(corners, Ragged.from_table(np.arange(len(corners), dtype=np.int64).reshape(-1, 3)))
-
-
-def _text(text: bytes) -> SentMesh:
+def _text(text: bytes) -> FileContent:
     """Facets of any number of solids, whether or not the last one is ended."""
     lines = re.split(rb"[\r\n]+", text)
-    # Names may hold any word, so their lines go first; where all stands on one line, they stay.
-    body = b"\n".join(lines) if len(lines) < 3 else _NAMES.sub(b"", b"\n".join(lines))
+    body = b"\n".join(lines)
+    # Names may hold any word, so they are blanked out first; where all stands on one line, they stay.
+    names = list(_NAMES.finditer(body)) if len(lines) > 2 else []
+    body = body if not names else _NAMES.sub(lambda match: b" " * len(match[0]), body)
     pieces = _WORD.split(body)
     words = [word.lower() for word in pieces[1::2]]
     behind = pieces[2::2]
@@ -75,4 +75,10 @@ def _text(text: bytes) -> SentMesh:
         raise UnreadableFileError("A vertex of the STL file has fewer than three coordinates.")
     corners = floats([x for row in rows for x in row], "vertices of the STL file").reshape(-1, 3)
     offsets = np.append(0, np.cumsum(lengths)).astype(np.int64)
-    return SentMesh(corners, Ragged(np.arange(len(corners), dtype=np.int64), offsets))
+    mesh = SentMesh(corners, Ragged(np.arange(len(corners), dtype=np.int64), offsets))
+    solids = [match for match in names if not match["end"]]
+    starts = [match.start() for match in _WORD.finditer(body) if match[0].lower() == b"facet"]
+    owner = np.maximum(np.searchsorted([match.start() for match in solids], starts) - 1, 0)
+    used, owner = np.unique(owner, return_inverse=True)
+    titles = [solids[k]["name"].strip().decode("utf-8", "replace") if solids else "" for k in used]
+    return of_mesh(mesh, [(title, "") for title in titles], owner)

@@ -21,7 +21,7 @@ from collections.abc import Callable
 import numpy as np
 
 from hexwrap_solver.arrays import Complexes, Floats, Ints
-from hexwrap_solver.conformal.robust.mirror import MirrorMesh
+from hexwrap_solver.conformal.robust.mirror import MirrorMesh, link, set_cross
 from hexwrap_solver.errors import ConvergenceError
 
 #: An edge passes whose cosines add up to more than −TOLERANCE times the terms that they are made of: rounding
@@ -163,19 +163,6 @@ def flip(mesh: MirrorMesh, edges: Ints, length: Floats, euclidean: bool) -> None
     mesh.flipped()
 
 
-def _link(mesh: MirrorMesh, *ring: Ints) -> None:
-    for one, two in zip(ring, (*ring[1:], ring[0]), strict=True):
-        mesh.next[one] = two
-        mesh.prev[two] = one
-
-
-def _set_cross(mesh: MirrorMesh, cells: Ints, cross: Ints) -> None:
-    """The crossing edges at the origins of cells; ``next`` leads back from a crossing edge to its cell."""
-    mesh.cross[cells] = cross
-    is_edge = cross >= 0
-    mesh.next[2 * cross[is_edge]] = cells[is_edge]
-
-
 def _flip_across(mesh: MirrorMesh, edges: Ints, length: Floats, euclidean: bool) -> None:
     h, t = 2 * edges, 2 * edges + 1
     h1, h2, t1, t2 = mesh.next[h], mesh.prev[h], mesh.next[t], mesh.prev[t]
@@ -188,8 +175,8 @@ def _flip_across(mesh: MirrorMesh, edges: Ints, length: Floats, euclidean: bool)
     mesh.origin[h], mesh.origin[t] = mesh.origin[t2], mesh.origin[h2]
     mesh.turn[h] = mesh.turn[t2] + mesh.turn[h1]
     mesh.turn[t] = -mesh.turn[h]
-    _link(mesh, h, h2, t1)
-    _link(mesh, t, t2, h1)
+    link(mesh, h, h2, t1)
+    link(mesh, t, t2, h1)
 
 
 def _flip_down(mesh: MirrorMesh, edges: Ints, length: Floats, euclidean: bool) -> None:
@@ -209,8 +196,8 @@ def _flip_down(mesh: MirrorMesh, edges: Ints, length: Floats, euclidean: bool) -
         length[edges] = (
             np.logaddexp(np.logaddexp(2 * a + m_j, 2 * b + m_i), np.log(2.0) + a + b + diagonal) - 2 * e
         )
-    _set_cross(mesh, h1, mesh.cross[below])
-    _set_cross(mesh, h2, edges)
+    set_cross(mesh, h1, mesh.cross[below])
+    set_cross(mesh, h2, edges)
     mesh.outer[h1] = mesh.outer[h2] = True
     mesh.outer[below] = False
     mesh.crossing[edges] = True
@@ -236,14 +223,14 @@ def _flip_up(mesh: MirrorMesh, edges: Ints, length: Floats, euclidean: bool) -> 
         length[edges] = (
             np.logaddexp(a + 0.5 * np.logaddexp(2 * b, m + m_j), b + 0.5 * np.logaddexp(2 * a, m + m_i)) - m
         )
-    _set_cross(mesh, below, mesh.cross[left])
+    set_cross(mesh, below, mesh.cross[left])
     mesh.outer[left] = mesh.outer[right] = False
     mesh.outer[below] = True
     mesh.crossing[edges] = False
     mesh.origin[h], mesh.origin[below] = mesh.origin[after], mesh.origin[left]
     mesh.turn[below] = mesh.turn[left] + mesh.turn[right]
     mesh.turn[h] = -mesh.turn[below]
-    _link(mesh, left, right, h)
+    link(mesh, left, right, h)
     mesh.next[before], mesh.prev[below] = below, before
     mesh.next[below], mesh.prev[after] = after, below
 

@@ -131,3 +131,16 @@ def mirror_mesh(surface: Surface, log_length: Floats, turn: Ints) -> MirrorMesh:
         turns,
         lengths,
     )
+
+
+def link(mesh: MirrorMesh, *ring: Ints) -> None:
+    for one, two in zip(ring, (*ring[1:], ring[0]), strict=True):
+        mesh.next[one] = two
+        mesh.prev[two] = one
+
+
+def set_cross(mesh: MirrorMesh, cells: Ints, cross: Ints) -> None:
+    """The crossing edges at the origins of cells; ``next`` leads back from a crossing edge to its cell."""
+    mesh.cross[cells] = cross
+    is_edge = cross >= 0
+    mesh.next[2 * cross[is_edge]] = cells[is_edge]

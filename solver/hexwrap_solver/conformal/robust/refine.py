@@ -1,4 +1,4 @@
-"""Splitting edges of an annulus where straight triangles cannot follow the map.
+"""Splitting edges of a surface where straight triangles cannot follow the map.
 
 New vertices lie on edges of the old mesh, so the surface stays the same point set.
 """
@@ -76,10 +76,7 @@ def split_edges(problem: Problem, marked: Ints, place: Floats) -> Problem:
         surface,
         vertices=vertices,
         faces=flatten_out(vertices, parts, parent),
-        loops=(
-            _extend(surface.loops[0], h, new, tail, inner),
-            _extend(surface.loops[1], h, new, tail, inner),
-        ),
+        loops=tuple(_extend(loop, h, new, tail, inner) for loop in surface.loops),
         input_vertex=np.concatenate([surface.input_vertex, np.full(len(h), -1, dtype=np.int64)]),
         normals=normals,
         patch=None if surface.patch is None else surface.patch[source],
@@ -91,6 +88,7 @@ def split_edges(problem: Problem, marked: Ints, place: Floats) -> Problem:
         np.concatenate([targets.angle, np.where(inner, 2 * np.pi, np.pi)]),
         np.concatenate([targets.tie, tie]),
         targets.tie_angle + np.pi * counts,
+        None if targets.offset is None else blend(targets.offset),
     )
     return Problem(refined, grown, blend(problem.u), parent)
 
@@ -197,14 +195,14 @@ def collapsing(surface: Surface, targets: Targets, turn: Ints) -> Ints:
     that it cuts off; and around a boundary vertex with few triangles their angles, below π each, cannot add
     up to a large target. turn: (3m,) as in ``MirrorMesh``.
     """
-    crowded = _crowded(surface, targets, FULLEST, np.concatenate(surface.loops))
+    crowded = _crowded(surface, targets, FULLEST, surface.boundary)
     return np.union1d(_chords(surface, targets, turn), crowded)
 
 
 def _chords(surface: Surface, targets: Targets, turn: Ints) -> Ints:
     faces, twin, n = surface.faces, surface.twin, len(surface.vertices)
     tail, head = half_edges(faces)
-    found = []
+    found = [np.zeros(0, dtype=np.int64)]
     for loop in surface.loops:
         place = np.full(n, -1, dtype=np.int64)
         place[loop] = np.arange(len(loop))
@@ -229,7 +227,7 @@ def _crowded(surface: Surface, targets: Targets, most: float, among: Ints) -> In
     faces = surface.faces
     count = np.bincount(faces.ravel(), minlength=len(surface.vertices))
     boundary = np.zeros(len(count), dtype=bool)
-    boundary[np.concatenate(surface.loops)] = True
+    boundary[surface.boundary] = True
     among = among[boundary[among] & (targets.tie[among] < 0)]
     crowded = np.zeros(len(count), dtype=bool)
     crowded[among] = targets.angle[among] > count[among] * most

@@ -1,5 +1,5 @@
-"""A conformal map for every annulus: flips where the triangulation needs them, new vertices where a straight
-triangle cannot follow the map."""
+"""A conformal map for every surface of genus 0: flips where the triangulation needs them, new vertices
+where a straight triangle cannot follow the map."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ import numpy as np
 from hexwrap_solver.arrays import Floats, Ints, Progress, no_progress
 from hexwrap_solver.conformal.boundary import curvatures
 from hexwrap_solver.conformal.cut import cut_open
-from hexwrap_solver.conformal.energy import Energy, opposite_lengths
-from hexwrap_solver.conformal.layout import normalise
-from hexwrap_solver.conformal.orientation import drawn_errors, misdrawn
+from hexwrap_solver.conformal.energy import Energy, corner_angles, opposite_lengths, total
+from hexwrap_solver.conformal.layout import lay_out, normalise
+from hexwrap_solver.conformal.orientation import drawn_errors, misdrawn, positive
 from hexwrap_solver.conformal.robust.delaunay import make_delaunay
 from hexwrap_solver.conformal.robust.descent import ACCEPTED, Descent, FlipEnergy, descend
 from hexwrap_solver.conformal.robust.develop import develop
-from hexwrap_solver.conformal.robust.metric import Metric, angle_sums
-from hexwrap_solver.conformal.robust.mirror import MirrorMesh, mirror_mesh
+from hexwrap_solver.conformal.robust.metric import Metric, angle_sums, measure
+from hexwrap_solver.conformal.robust.mirror import MirrorMesh, half_edge_names, mirror_mesh
 from hexwrap_solver.conformal.robust.overlay import Overlay, insert
 from hexwrap_solver.conformal.robust.refine import (
     Problem,
@@ -28,7 +28,16 @@ from hexwrap_solver.conformal.robust.refine import (
     spread,
 )
 from hexwrap_solver.conformal.robust.straight import straighten
-from hexwrap_solver.conformal.span import MAX_SPAN, check_reach, check_span, failure, largest_span
+from hexwrap_solver.conformal.robust.unflip import Record
+from hexwrap_solver.conformal.span import (
+    MAX_SPAN,
+    check_reach,
+    check_span,
+    cone_angle_of,
+    failure,
+    is_annulus,
+    largest_span,
+)
 from hexwrap_solver.conformal.types import Cones, ConformalMap, Deck, Targets, Unrolled
 from hexwrap_solver.errors import ConvergenceError
 from hexwrap_solver.surface.types import Surface
@@ -56,51 +65,56 @@ def solve_with_flips(
     start: Floats | None = None,
     cones: Cones | None = None,
 ) -> ConformalMap:
-    """The discretely conformal map that every annulus has if its triangulation may change.
+    """The discretely conformal map that every surface of genus 0 has if its triangulation may change.
 
-    Newton's method runs on the intrinsic Delaunay triangulation of the annulus glued to its mirror image (see
-    ``mirror``, ``delaunay``, ``descent``). The vertices keep the places it gives them, and the original
-    triangles are drawn straight between these. Where one would turn over, its longest edge is split: at first
-    without solving again (see ``overlay``); where that does not suffice, with the new vertices as unknowns.
-    ``surface`` of the result is then the refined mesh. start: (n,) u to start from.
+    Newton's method runs on the intrinsic Delaunay triangulation of the surface glued to its mirror image (see
+    ``mirror``, ``delaunay``, ``descent``); a closed surface needs no mirror. The vertices keep the places it
+    gives them, and the original triangles are drawn straight between these. Where one would turn over, its
+    longest edge is split: on annuli at first without solving again (see ``overlay``); where that does not
+    suffice, with the new vertices as unknowns. ``surface`` of the result is then the refined mesh.
+    start: (n,) u to start from. cones: whose angles the targets hold.
     Sources: Gu, Luo, Sun, Wu 2018 (existence); Springborn 2020; Gillespie, Springborn, Crane 2021 (flips).
     Raises ConvergenceError where double precision does not suffice.
     """
-    if len(surface.loops) != 2 or cones:
-        raise ConvergenceError(
-            "The mesh does not suit this map as it is: triangles would break or turn over in the domain; "
-            "remesh it more evenly."
-        )
+    cones = Cones.none() if cones is None else cones
     problem = _problem(surface, targets, start)
     omitted: list[int] = []
     try:
-        return _refined(surface, problem, progress, SPREAD_MOST, omitted)
+        return _refined(surface, problem, cones, progress, SPREAD_MOST, omitted)
     except ConvergenceError:
         if not omitted:
             raise
-        return _refined(surface, problem, progress, np.inf, [])
+        return _refined(surface, problem, cones, progress, np.inf, [])
 
 
 def _refined(
-    surface: Surface, problem: Problem, progress: Progress, most: float, omitted: list[int]
+    surface: Surface, problem: Problem, cones: Cones, progress: Progress, most: float, omitted: list[int]
 ) -> ConformalMap:
     """The map of a problem on ``surface``, refined as often as need be. Rounds whose ``spread`` would make
     more than ``most`` times the vertices go without, and into ``omitted``."""
     iterations, fewest, span = 0, len(surface.faces), np.inf
+    unrolled = is_annulus(surface, cones)
     for attempt in range(MAX_ROUNDS):
-        problem, cut = _uncollapse(problem)
-        flat = _flatten(problem, cut, progress, span)
-        found, lift, first = _draw(problem, flat)
-        iterations += found.iterations
-        wrong = np.flatnonzero(misdrawn(found))
-        if not len(wrong):
-            _check_drawn(found, flat.off)
-            return _told(_in_one_piece(found, first), surface, iterations)
-        if attempt == 0:
-            refined = _inserted(problem, flat, found, lift, first)
-            if refined is not None:
-                return _told(refined, surface, iterations)
-        problem = replace(problem, u=found.log_scale)
+        problem, cut = _uncollapse(problem, unrolled)
+        flat = _flatten(problem, cut, cones, progress, span)
+        iterations += flat.descent.iterations
+        if unrolled:
+            found, lift, first = _draw(problem, flat)
+            u, wrong = found.log_scale, np.flatnonzero(misdrawn(found))
+            if not len(wrong):
+                _check_drawn(found, flat.off)
+                return _told(_in_one_piece(found, first), surface, iterations)
+            if attempt == 0:
+                refined = _inserted(problem, flat, found, lift, first)
+                if refined is not None:
+                    return _told(refined, surface, iterations)
+        else:
+            u, _ = _centred(flat.descent, problem.targets)
+            net, wrong = _draw_net(problem, flat, cones)
+            if net is not None:
+                _check_drawn(net, flat.off)
+                return _told(net, surface, iterations)
+        problem = replace(problem, u=u)
         before = len(problem.surface.vertices)
         if attempt >= PATIENCE and attempt % SHELLS == 0 and len(wrong) <= FEW:
             problem = split_edges(problem, *shells(problem.surface, wrong, len(surface.vertices)))
@@ -113,13 +127,13 @@ def _refined(
             else:
                 omitted.append(attempt)
         fewest = min(fewest, len(wrong))
-        span = min(span, float(np.ptp(found.log_scale)))
+        span = min(span, float(np.ptp(u)))
         if len(problem.surface.vertices) > MOST * len(surface.vertices) + MOST_MORE:
             break
     inserted = len(problem.surface.vertices) - len(surface.vertices)
     raise failure(
         span,
-        found.deck.angle,
+        flat.cone_angle,
         f"After {attempt + 1} rounds of refinement with {inserted} new vertices {len(wrong)} triangles still "
         "turn over in the domain",
         "around the named vertices the mesh does not suit the boundary angles; remesh it more evenly and "
@@ -171,16 +185,16 @@ class FlatMetric:
 
 
 def metric_with_flips(
-    surface: Surface, targets: Targets, progress: Progress = no_progress, start: Floats | None = None
+    surface: Surface,
+    targets: Targets,
+    progress: Progress = no_progress,
+    start: Floats | None = None,
+    cones: Cones | None = None,
 ) -> FlatMetric:
     """The metric of ``solve_with_flips``, whether or not straight triangles can be drawn in it."""
-    if len(surface.loops) != 2:
-        raise ConvergenceError(
-            "The mesh does not suit this map as it is: triangles would break or turn over in the domain; "
-            "remesh it more evenly."
-        )
-    problem, cut = _uncollapse(_problem(surface, targets, start))
-    flat = _flatten(problem, cut, progress)
+    cones = Cones.none() if cones is None else cones
+    problem, cut = _uncollapse(_problem(surface, targets, start), is_annulus(surface, cones))
+    flat = _flatten(problem, cut, cones, progress)
     return FlatMetric(problem.surface, flat.descent.u, flat.sums, problem.targets)
 
 
@@ -196,16 +210,19 @@ def _turns(sheet: Ints) -> Ints:
 
 
 def _sheets(surface: Surface) -> Ints:
-    """(m, 3) sheet of every corner: 1 to the left of the cut, 0 elsewhere."""
+    """(m, 3) sheet of every corner of an annulus: 1 to the left of the cut, 0 elsewhere."""
     fan = cut_open(surface, np.zeros(0, dtype=np.int64)).fan
     return np.where(fan > 0, 1, 0).reshape(-1, 3)
 
 
-def _uncollapse(problem: Problem) -> tuple[Problem, Ints]:
-    """Splits what has no room in the domain, until there is nothing of the kind. Also gives the sheets of a
-    ``Cut``."""
+def _uncollapse(problem: Problem, unrolled: bool) -> tuple[Problem, Ints]:
+    """Splits what has no room in the domain, until there is nothing of the kind. Also gives the sheets of an
+    annulus. In other nets every edge between two vertices of one side counts, whatever lies between: more are
+    split than need be."""
     while True:
-        sheet = _sheets(problem.surface)
+        sheet = (
+            _sheets(problem.surface) if unrolled else np.zeros(problem.surface.faces.shape, dtype=np.int64)
+        )
         marked = collapsing(problem.surface, problem.targets, _turns(sheet).ravel())
         if not len(marked):
             return problem, sheet
@@ -214,18 +231,18 @@ def _uncollapse(problem: Problem) -> tuple[Problem, Ints]:
 
 @dataclass(frozen=True)
 class _Flat:
-    """A flat Delaunay metric on the mirrored annulus.
+    """A flat Delaunay metric on the mirrored surface.
 
-    cut: (m, 3) sheets of a ``Cut``. unit: logarithm of the length in which the metric is measured.
+    cut: (m, 3) sheets of an annulus. unit: logarithm of the length in which the metric is measured.
     log_length: (3m,) of the surface's half-edges in it.
-    cone_angle: K. sums: (n,) angle sums. flips: all of them. off: how far prescribed boundary angles are
-    missed."""
+    curvature: (b + c,) of loops and cones. sums: (n,) angle sums. flips: all of them. off: how far
+    prescribed boundary angles are missed."""
 
     mesh: MirrorMesh
     cut: Ints
     log_length: Floats
     unit: float
-    cone_angle: float
+    curvature: Floats
     descent: Descent
     sums: Floats
     flips: int
@@ -235,12 +252,19 @@ class _Flat:
     def turn(self) -> Ints:
         return _turns(self.cut)
 
+    @property
+    def cone_angle(self) -> float | None:
+        """K of an annulus without cones."""
+        return float(self.curvature[0]) if len(self.curvature) == 2 else None
 
-def _flatten(problem: Problem, cut: Ints, progress: Progress, known_span: float = np.inf) -> _Flat:
+
+def _flatten(
+    problem: Problem, cut: Ints, cones: Cones, progress: Progress, known_span: float = np.inf
+) -> _Flat:
     """The metric with the problem's angle sums. Raises ConvergenceError.
 
-    cut: (m, 3) sheets of a ``Cut``. known_span: the least span of u that came out of the rounds of refinement
-    so far; later ones may have run away.
+    cut: (m, 3) sheets of an annulus. known_span: the least span of u that came out of the rounds of
+    refinement so far; later ones may have run away.
     """
     surface, targets = problem.surface, problem.targets
     free = bool((targets.tie == 0).any() and len(targets.tie_angle) == 1)  # the cone angle comes out
@@ -248,11 +272,12 @@ def _flatten(problem: Problem, cut: Ints, progress: Progress, known_span: float 
     unit = float(np.median(log_length))  # logarithms near 0 have the most digits behind the point
     mesh = mirror_mesh(surface, log_length - unit, _turns(cut).ravel())
     flips = make_delaunay(mesh, np.zeros(mesh.n), euclidean=True)
-    span = MAX_SPAN if free else largest_span(_cone_angle(targets, targets.angle, surface))
+    known = curvatures(targets, targets.angle, surface, cones)
+    span = MAX_SPAN if free else largest_span(cone_angle_of(surface, known))
     descent = descend(FlipEnergy(Energy(surface, targets), mesh), problem.u, span, progress)
     sums = angle_sums(mesh, descent.metric)
-    known = sums if free else targets.angle
-    angle = _cone_angle(targets, known, surface)
+    curvature = curvatures(targets, sums, surface, cones)
+    angle = cone_angle_of(surface, curvature)
     check_span(descent.u, angle)
     off = _off(targets, sums, surface)
     if not (descent.residual <= ACCEPTED and off <= PROMISED):
@@ -264,7 +289,43 @@ def _flatten(problem: Problem, cut: Ints, progress: Progress, known_span: float 
             "double precision cannot hold the map of this surface; remesh it more evenly",
             [],
         )
-    return _Flat(mesh, cut, log_length - unit, unit, angle, descent, sums, flips + descent.flips, off)
+    return _Flat(mesh, cut, log_length - unit, unit, curvature, descent, sums, flips + descent.flips, off)
+
+
+def _draw_net(problem: Problem, flat: _Flat, cones: Cones) -> tuple[ConformalMap | None, Ints]:
+    """The map of the vertices with the triangles as they are, and none; or None, and (k,) the triangles that
+    turn over in it."""
+    surface, descent = problem.surface, flat.descent
+    mesh, record = mirror_mesh(surface, flat.log_length, flat.turn.ravel()), Record()
+    make_delaunay(mesh, np.zeros(mesh.n), euclidean=True, do=record.flip)
+    u, _ = _centred(descent, problem.targets)
+    make_delaunay(mesh, u, do=record.flip)
+    side = record.undone(mesh, measure(mesh, u))[half_edge_names(surface)].reshape(-1, 3)
+    turned = ~positive(np.stack([0 * side[:, 0], side[:, 0], side[:, 0] + side[:, 1]], axis=1))
+    if turned.any():
+        return None, np.flatnonzero(turned)
+    lengths = np.ascontiguousarray(np.abs(side).T[[1, 2, 0]]) * np.exp(flat.unit)
+    corners = corner_angles(lengths)
+    told = 2 * np.pi - np.bincount(cones.vertex, cones.curvature, len(u))
+    told[surface.boundary] = flat.sums[surface.boundary]
+    drawn = total(surface.faces.T.ravel(), corners.angle.ravel(), len(u))
+    wound = (np.abs(drawn - told) > np.pi)[surface.faces].any(axis=1)
+    if wound.any():
+        return None, np.flatnonzero(wound)
+    layout = lay_out(surface, lengths, corners, flat.curvature, cones.vertex)
+    found = ConformalMap(
+        surface=surface,
+        log_scale=u,
+        domain=layout.domain,
+        boundary_angles=tuple(flat.sums[loop] for loop in surface.loops),
+        iterations=descent.iterations,
+        residual=descent.residual,
+        flips=flat.flips,
+        closing_error=layout.closing_error,
+        cones=cones,
+    )
+    wrong = np.flatnonzero(misdrawn(found))
+    return (None if len(wrong) else found), wrong
 
 
 def _draw(problem: Problem, flat: _Flat) -> tuple[ConformalMap, Ints, Ints]:
@@ -272,14 +333,15 @@ def _draw(problem: Problem, flat: _Flat) -> tuple[ConformalMap, Ints, Ints]:
     ``Development``; and (m,) where the first corner of each face stands if all are laid out side by side."""
     surface, targets, descent, sums = problem.surface, problem.targets, flat.descent, flat.sums
     u, metric = _centred(descent, targets)
-    check_reach(u, flat.cone_angle)
+    angle = float(flat.curvature[0])
+    check_reach(u, angle)
     foot = int(surface.loops[0][0])
-    laid = develop(flat.mesh, metric, flat.cone_angle)
+    laid = develop(flat.mesh, metric, angle)
     sheet = flat.cut - laid.lift[surface.faces]
     first = sheet[:, 0].copy()
     sheet -= first[:, None]  # every face beside the copy of its first corner, near which its digits are
     unit = np.exp(flat.unit)
-    deck = Deck(flat.cone_angle, laid.translation * unit)
+    deck = Deck(angle, laid.translation * unit)
     uv, deck, circumference = normalise(surface, laid.uv * unit, sheet, deck, foot)
     uv = straighten(surface, targets, uv, sheet, deck)
     found = ConformalMap(
@@ -295,15 +357,9 @@ def _draw(problem: Problem, flat: _Flat) -> tuple[ConformalMap, Ints, Ints]:
     return found, laid.lift, first
 
 
-def _cone_angle(targets: Targets, sums: Floats, surface: Surface) -> float:
-    """K of an annulus."""
-    return float(curvatures(targets, sums, surface)[0])
-
-
 def _off(targets: Targets, sums: Floats, surface: Surface) -> float:
     """How far prescribed boundary angles are missed, radians."""
-    loops = np.concatenate(surface.loops)
-    listed = loops[targets.tie[loops] < 0]
+    listed = surface.boundary[targets.tie[surface.boundary] < 0]
     return float(np.abs(sums - targets.angle)[listed].max(initial=0.0))
 
 
@@ -323,7 +379,7 @@ def _check_drawn(found: ConformalMap, off: float) -> None:
     if not error <= PROMISED:  # nor if it is NaN
         raise failure(
             float(np.ptp(found.log_scale)),
-            found.deck.angle,
+            None if found.kind == "net" else found.deck.angle,
             f"Boundary angles of the map as drawn would be {error:.1e} rad off",
             "double precision cannot hold the map of this surface; remesh it more evenly",
             [],

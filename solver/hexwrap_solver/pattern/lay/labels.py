@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import breadth_first_order
+from scipy.sparse import coo_array, csr_array
+from scipy.sparse.csgraph import breadth_first_order, connected_components
+from scipy.spatial import cKDTree
 
 from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged
 from hexwrap_solver.conformal.types import ConformalMap
@@ -48,6 +49,49 @@ def winding(cmap: ConformalMap, layout: Layout) -> int:
     tail = cmap.surface.faces[face, edge]
     gained = cmap.sheet[face, (edge + 1) % 3] - cmap.sheet[face, edge]
     return int(gained[np.isin(tail, cmap.surface.loops[0])].sum())
+
+
+def first_on_net(cmap: ConformalMap, centers: Floats, neighbours: Ragged) -> Bools:
+    """(c,) where rows begin on a net: cells at the boundary nearest to loop 0 of the surface, or, where there
+    is none, the lowest cell. centers: (c, 3)."""
+    first = np.zeros(len(centers), dtype=bool)
+    at_edge = np.unique(neighbours.row[neighbours.values < 0])
+    if not cmap.surface.loops or not len(at_edge):
+        x, y, z = np.round(centers, 9).T
+        first[np.lexsort((x, y, z))[0]] = True
+        return first
+    _, part = connected_components(_touching(neighbours, at_edge), directed=False)
+    near, _ = cKDTree(cmap.surface.vertices[cmap.surface.loops[0]]).query(centers[at_edge])
+    distance = np.bincount(part, weights=near) / np.bincount(part)
+    first[at_edge[part == np.argmin(np.round(distance, 9))]] = True
+    return first
+
+
+def _touching(neighbours: Ragged, members: Ints) -> csr_array:
+    """Graph of some of the cells, joined across edges, directly or through one other cell."""
+    n = neighbours.n_rows
+    inner = neighbours.values >= 0
+    pairs = (neighbours.row[inner], neighbours.values[inner].astype(np.int64))
+    rows = csr_array((np.ones(len(pairs[0])), pairs), shape=(n, n))[members]
+    return rows @ rows.T + rows[:, members]
+
+
+def azimuth(cmap: ConformalMap, centers: Floats) -> Floats:
+    """(c,) turns of cells about the axis of loop 0, of a closed surface about the vertical, in [0, 1)."""
+    points = cmap.surface.vertices
+    axis, middle = np.array([0.0, 0.0, 1.0]), points.mean(axis=0)
+    if cmap.surface.loops:
+        rim = points[cmap.surface.loops[0]]
+        middle = rim.mean(axis=0)
+        area = np.cross(rim - middle, np.roll(rim, -1, axis=0) - middle).sum(axis=0)
+        length = float(np.linalg.norm(area))
+        axis = area / length if length > 0 else axis
+    across = np.eye(3)[np.argmin(abs(axis))]
+    east = np.cross(axis, across)
+    east /= np.linalg.norm(east)
+    north = np.cross(axis, east)
+    away = centers - middle
+    return np.asarray(np.arctan2(away @ north, away @ east) / (2 * np.pi) % 1.0)
 
 
 def rows_from(neighbours: Ragged, first: Bools) -> Ints:

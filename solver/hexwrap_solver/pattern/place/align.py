@@ -135,12 +135,12 @@ def place_by_sides(straightening: Straightening, settings: PatternSettings) -> P
     distortion, best, place = min(tried, key=lambda found: found[0] + found[1].extra)
     width = width_per_cell(lattice, angle) * lattice.edge
     around = round(cmap.circumference * abs(best.scale) / width)
-    if frame.turns == 0:
+    if frame.turns == 0 and any(best.motion.shift):
         around = int(lattice.cells_around(np.array(best.motion.shift)))
     notes = (
         ("phase has no effect: lattice lines on all sides leave no freedom.",) if any(settings.phase) else ()
     )
-    return Placement(place, best.motion, angle, around, distortion, notes)
+    return Placement.on_annulus(cmap, place, best.motion, angle, around, distortion, notes)
 
 
 def _frame(
@@ -253,6 +253,8 @@ def _translation(frame: _Frame, wanted: complex) -> Ints:
     A loop that is one closed line runs along it exactly. On a cylinder it has the number of cells asked for.
     """
     lattice = frame.lattice
+    if wanted == 0:  # a disk
+        return np.zeros(2, dtype=np.int64)
     if (np.bincount(frame.sides.loop) == 1).any():
         row = lattice.shortest_towards(wanted)
         return np.asarray(max(1, round(abs(wanted) / abs(complex(lattice.position(row))))) * row)

@@ -12,11 +12,13 @@ from hexwrap_solver.pattern.lattice import Lattice
 from hexwrap_solver.pattern.place.align import Straightening, place_by_sides, turn_between_loops
 from hexwrap_solver.pattern.place.cone import place_on_cone, place_on_flat_ring
 from hexwrap_solver.pattern.place.cylinder import place_on_cylinder
+from hexwrap_solver.pattern.place.net import as_sheet, place_on_net
 from hexwrap_solver.pattern.place.placement import (
     BEARABLE,
     Placement,
     check_phase,
     edge_angle,
+    is_disk,
     is_straight,
     quantized,
     quantum_turns,
@@ -47,20 +49,28 @@ class Placing:
     @classmethod
     def of(cls, cmap: ConformalMap, lattice: Lattice, settings: PatternSettings) -> Placing:
         check_phase(settings)
-        cmap = quantized(cmap, lattice)
+        cmap = as_sheet(cmap) if cmap.kind == "net" else quantized(cmap, lattice)
         loops, notes = loops_to_align(cmap, lattice, settings)
-        return cls(cmap, lattice, settings, quantum_turns(cmap, lattice), loops, notes)
+        turns = 0 if cmap.kind == "net" else quantum_turns(cmap, lattice)
+        return cls(cmap, lattice, settings, turns, loops, notes)
 
     def at(self, settings: PatternSettings) -> Placement:
         """settings: those it was made for, but for the size."""
         cmap, lattice, loops = self.cmap, self.lattice, self.loops
-        if self.turns == 0 and not any(has_corners(cmap, lattice, loop) for loop in loops):
+        if cmap.kind == "net":
+            placement = place_on_net(cmap, lattice, settings)
+        elif self.is_cylinder and not any(has_corners(cmap, lattice, loop) for loop in loops):
             placement = place_on_cylinder(cmap, lattice, settings, loops)
         elif loops:
             placement = self._by_sides(settings)
         else:
             placement = self._freely(settings)
         return replace(placement, notes=(*self.notes, *placement.notes))
+
+    @property
+    def is_cylinder(self) -> bool:
+        """And no disk."""
+        return self.turns == 0 and not is_disk(self.cmap)
 
     @cached_property
     def _straightening(self) -> Straightening:
@@ -74,8 +84,10 @@ class Placing:
 
     def _freely(self, settings: PatternSettings) -> Placement:
         """Aligned nowhere."""
-        if self.turns == 0:
+        if self.is_cylinder:
             return place_on_cylinder(self.cmap, self.lattice, settings, [])
+        if is_disk(self.cmap):
+            return place_on_net(self.cmap, self.lattice, settings)
         if self.cmap.deck.is_translation:
             return place_on_flat_ring(self.cmap, self.lattice, settings, self.turns)
         return place_on_cone(self.cmap, self.lattice, settings, self.turns)
@@ -114,6 +126,11 @@ def loops_to_align(
             f"With edges at {angle:.4g}° to the boundary no lattice line can lie on it: the pattern is not "
             "aligned."
         ]
+    wanted = wanted[: len(cmap.surface.loops)]
+    if cmap.kind == "net":
+        return [], [
+            "The pattern is not aligned: sides are aligned on cylinders, cones and disks."
+        ] if wanted else []
     loops = [loop for loop in wanted if is_polygon(cmap, lattice, loop)]
     if len(loops) == len(wanted):
         return loops, []

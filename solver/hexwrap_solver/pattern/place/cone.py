@@ -11,7 +11,7 @@ from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.pattern.lattice import Isometry, Lattice
 from hexwrap_solver.pattern.place.deform import System, deform, distortion_of
 from hexwrap_solver.pattern.place.glued import Glued
-from hexwrap_solver.pattern.place.placement import Placement, anchor_vertex, edge_angle
+from hexwrap_solver.pattern.place.placement import Placement, anchor_vertex, edge_angle, main_loops
 from hexwrap_solver.pattern.place.size import ASKED, edges_around, wanted_edge, width_per_cell
 from hexwrap_solver.pattern.types import PatternSettings
 
@@ -24,24 +24,31 @@ LEAST_GROWTH = 0.1
 def boundary_direction(cmap: ConformalMap, lattice: Lattice, anchor: int) -> complex:
     """Unit direction along the boundary, meaningful up to the symmetry ζ of the lattice, which g respects.
 
-    The mean of (boundary edge)^order over both loops; where that cancels (round boundaries), the direction
-    around the apex at the anchor.
+    The mean of (boundary edge)^order over the boundary; where that cancels (round boundaries, none), the
+    direction around the apex, or the middle, at the anchor.
     """
-    corners = cmap.corners()
-    on_rim = (cmap.surface.twin < 0).reshape(-1, 3)
-    edges = (np.roll(corners, -1, axis=1) - corners)[on_rim]
+    corners, faces = cmap.corners(), cmap.surface.faces
+    on_ends = np.zeros(len(cmap.surface.vertices), dtype=bool)
+    on_ends[np.concatenate([np.zeros(0, dtype=np.int64), *main_loops(cmap)])] = True
+    on_boundary = (cmap.surface.twin < 0).reshape(-1, 3) & on_ends[faces]
+    edges = (np.roll(corners, -1, axis=1) - corners)[on_boundary]
     length = abs(edges)
-    mean = complex((length * (edges / length) ** lattice.order).sum() / length.sum())
+    mean = complex((length * (edges / length) ** lattice.order).sum() / max(length.sum(), 1e-300))
     if abs(mean) > 0.05:
         return complex(np.exp(1j * np.angle(mean) / lattice.order))
-    around = 1j * (cmap.uv[anchor] - _middle(cmap))
+    stands = (
+        corners.ravel()[np.flatnonzero(faces.ravel() == anchor)[0]] if cmap.kind == "net" else cmap.uv[anchor]
+    )
+    around = 1j * (stands - _middle(cmap))
     return complex(around / abs(around))
 
 
 def _middle(cmap: ConformalMap) -> complex:
     """The apex, or where there is none the centre of the boundary."""
+    if cmap.kind == "net":
+        return complex(cmap.corners().mean())
     apex = cmap.deck.apex
-    return complex(np.mean([cmap.uv[loop].mean() for loop in cmap.surface.loops])) if apex is None else apex
+    return complex(np.mean([cmap.uv[loop].mean() for loop in main_loops(cmap)])) if apex is None else apex
 
 
 @dataclass(frozen=True)
@@ -78,7 +85,7 @@ def place_on_cone(cmap: ConformalMap, lattice: Lattice, settings: PatternSetting
     factor = frame.factor * np.exp(1j * turn) * max(1 + up * lattice.edge / radius, LEAST_GROWTH)
     place = (cmap.uv - _middle(cmap)) * factor
     around = round(cmap.circumference * abs(factor) / frame.width)
-    return Placement(place, Isometry(lattice, turns, (0, 0)), frame.angle, around, 0.0, ())
+    return Placement.on_annulus(cmap, place, Isometry(lattice, turns, (0, 0)), frame.angle, around, 0.0, ())
 
 
 def place_on_flat_ring(
@@ -106,8 +113,8 @@ def place_on_flat_ring(
     around = round(cmap.circumference * abs(factor) / frame.width)
     angle = frame.angle - float(np.angle(factor / frame.factor))
     if fits:
-        return Placement(place, motion, angle, around, 0.0, ())
+        return Placement.on_annulus(cmap, place, motion, angle, around, 0.0, ())
     nowhere = np.zeros((len(place), 2))
     glued = Glued.by_sheets(cmap, motion)
     place = deform(System(cmap, glued, nowhere.astype(complex)), glued, factor, place, nowhere)
-    return Placement(place, motion, angle, around, distortion_of(cmap, glued, place), ())
+    return Placement.on_annulus(cmap, place, motion, angle, around, distortion_of(cmap, glued, place), ())

@@ -68,7 +68,8 @@ def place_on_cylinder(
     place = strip.place.real * scale + 1j * _heights(strip, rows, loops, scale * stretch)
     place = (place + phase) * unit
     distortion = max(stretch, 1 / stretch) - 1
-    return Placement(
+    return Placement.on_annulus(
+        cmap,
         place,
         Isometry(lattice, 0, (int(T[0]), int(T[1]))),
         angle_taken(lattice, along, angle),
@@ -88,7 +89,7 @@ def angle_taken(lattice: Lattice, along: complex, wanted: float) -> float:
 def _strip(cmap: ConformalMap, anchor: int, loops: list[int]) -> _Strip:
     t = cmap.deck.translation
     place = (cmap.uv - cmap.uv[anchor]) * np.conj(t) / abs(t)
-    low, high = (float(place[loop].imag.mean()) for loop in cmap.surface.loops)
+    low, high = (float(place[loop].imag.mean()) for loop in cmap.surface.loops[:2])
     for which in loops:
         loop = cmap.surface.loops[which]
         place[loop] = place[loop].real + 1j * (low, high)[which]  # straight but for rounding; made exactly so

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexwrap_solver.arrays import Complexes
+from hexwrap_solver.arrays import Complexes, Ints
 from hexwrap_solver.conformal.types import ConformalMap, Deck
 from hexwrap_solver.errors import NotAdaptedError, PatternError
 from hexwrap_solver.pattern.lattice import Isometry, Lattice
+from hexwrap_solver.pattern.place.glued import Glued
 from hexwrap_solver.pattern.types import PatternSettings
 
 #: Largest |k| of a cone angle k·π/3 or k·π/2.
@@ -27,19 +28,45 @@ BEARABLE = 0.5
 
 @dataclass(frozen=True)
 class Placement:
-    """place: (n,) the vertices of the (perhaps slightly stretched) domain, each in its own sheet, in lattice
-    units; motion: what g is there. rotation: angle from the boundary direction to an edge. around: cells
-    once around (middle ring on cones). distortion: worst ratio of singular values − 1 of the stretch. step:
-    around is one of its multiples.
+    """place: (n,) the vertices of the (perhaps slightly stretched) domain, each at home, in lattice units;
+    glued: how the corners of the faces follow. isometries: (t, 4) what the motions of the net are on the
+    lattice. rotation: angle from the boundary direction to an edge. around: cells once around (middle ring on
+    cones, longest loop on nets). distortion: worst ratio of singular values − 1 of the stretch. step: around
+    is one of its multiples. motion: on annuli, what g is.
     """
 
     place: Complexes
-    motion: Isometry
+    glued: Glued
+    isometries: Ints
     rotation: float
     around: int
     distortion: float
     notes: tuple[str, ...]
     step: int = 1
+    motion: Isometry | None = None
+
+    @classmethod
+    def on_annulus(
+        cls,
+        cmap: ConformalMap,
+        place: Complexes,
+        motion: Isometry,
+        rotation: float,
+        around: int,
+        distortion: float,
+        notes: tuple[str, ...],
+        step: int = 1,
+    ) -> Placement:
+        """All follows from what the deck transformation is."""
+        winding = cmap.net.winding
+        assert winding is not None
+        glued, isometries = Glued.by_sheets(cmap, motion), motion.power(winding)
+        return cls(place, glued, isometries, rotation, around, distortion, notes, step, motion)
+
+    @property
+    def narrows(self) -> bool:
+        """Whether fewer cells go around some places than others."""
+        return self.motion is None or self.motion.turns != 0
 
 
 def quantum_turns(cmap: ConformalMap, lattice: Lattice) -> int:
@@ -80,12 +107,24 @@ def check_phase(settings: PatternSettings) -> None:
 
 
 def anchor_vertex(cmap: ConformalMap) -> int:
-    """A boundary vertex that depends neither on numbering nor on the cut: the greatest (x, y, z)."""
-    rim = np.concatenate(cmap.surface.loops)
+    """A vertex of the boundary (of its two ends where there are openings besides; of all where there is none)
+    that depends neither on numbering nor on the cut: the greatest (x, y, z)."""
+    loops = main_loops(cmap)
+    rim = np.concatenate(loops) if loops else np.arange(len(cmap.surface.vertices))
     points = cmap.surface.vertices[rim]
     unit = 1e-7 * float(np.ptp(cmap.surface.vertices, axis=0).max())
     x, y, z = np.rint(points / unit).T
     return int(rim[np.lexsort((z, y, x))[-1]])
+
+
+def main_loops(cmap: ConformalMap) -> tuple[Ints, ...]:
+    """The loops that matter to where the lattice lies: not the openings of a cylinder or cone."""
+    return cmap.surface.loops if cmap.kind == "net" else cmap.surface.loops[:2]
+
+
+def is_disk(cmap: ConformalMap) -> bool:
+    """A disk taken as a sheet, see ``as_sheet``: its deck transformation is the identity."""
+    return cmap.kind != "net" and cmap.deck.angle == 0 and cmap.deck.translation == 0
 
 
 def edge_angle(lattice: Lattice, settings: PatternSettings) -> float:

@@ -8,12 +8,15 @@ from hexwrap_solver.arrays import Floats
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.errors import PatternError
 from hexwrap_solver.pattern.lattice import Lattice
+from hexwrap_solver.pattern.place.placement import is_disk, main_loops
 from hexwrap_solver.pattern.types import PatternSettings
 
 #: Where neither a number nor a length is asked for: so many cells around, but fewer where that would make
 #: more cells altogether, and more where not so many rows would fit between the loops, or where fewer cells
 #: than the last would go around the shorter loop.
 DEFAULT_AROUND, DEFAULT_CELLS, DEFAULT_ROWS, DEFAULT_NARROWEST = 48, 3000, 3.0, 3
+#: On nets: so many cells, or more where not so many rows would fit.
+DEFAULT_ON_NETS = 1000
 #: Whole cells may stay away from so much of the surface at its narrow end.
 DEFAULT_OPEN = 0.01
 
@@ -54,18 +57,30 @@ def wanted_edge(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings,
         return settings.edge_length / mean_stretch(cmap)
     if settings.around is None:
         return default_edge(cmap, lattice, settings, angle)
-    return cmap.circumference / (settings.around * width_per_cell(lattice, angle))
+    return girth(cmap) / (settings.around * width_per_cell(lattice, angle))
 
 
 def default_edge(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings, angle: float) -> float:
     """Edge length in the domain that suits its shape, whatever it is: short and long, conical and flat."""
     area = float(face_areas(cmap)[1].sum())
     width = width_per_cell(lattice, angle)
-    edge = cmap.circumference / (DEFAULT_AROUND * width)
+    edge = girth(cmap) / (DEFAULT_AROUND * width)
     of_cells = float(np.sqrt(area / (DEFAULT_CELLS * _unit_area(lattice))))
+    if cmap.kind == "net" or is_disk(cmap):
+        few = float(np.sqrt(area / (DEFAULT_ON_NETS * _unit_area(lattice))))
+        return min(few, _edge_of_rows(cmap, lattice, angle))
     narrow = min(_lengths_of_loops(cmap)) if settings.boundary == "trim" else _narrow_ring(cmap)
     fitting = min(_edge_of_rows(cmap, lattice, angle), narrow / (DEFAULT_NARROWEST * width))
     return min(max(edge, of_cells), fitting)
+
+
+def girth(cmap: ConformalMap) -> float:
+    """Length in the domain of once around: the circumference of cylinders and cones; else of the longest
+    loop, or, of closed surfaces, of the equator of a sphere of equal area."""
+    if cmap.kind != "net":
+        return cmap.circumference
+    area = float(face_areas(cmap)[1].sum())
+    return max(_lengths_of_loops(cmap), default=float(np.sqrt(np.pi * area)))
 
 
 def _narrow_ring(cmap: ConformalMap) -> float:
@@ -81,7 +96,7 @@ def _narrow_ring(cmap: ConformalMap) -> float:
 
 def _edge_of_rows(cmap: ConformalMap, lattice: Lattice, angle: float) -> float:
     """Edge length in the domain at which ``DEFAULT_ROWS`` fit between the loops, on the average."""
-    height = float(face_areas(cmap)[1].sum()) / cmap.circumference
+    height = float(face_areas(cmap)[1].sum()) / girth(cmap)
     return height * width_per_cell(lattice, angle) / (DEFAULT_ROWS * _unit_area(lattice))
 
 
@@ -100,12 +115,12 @@ def _unit_area(lattice: Lattice) -> float:
 
 
 def _lengths_of_loops(cmap: ConformalMap) -> list[float]:
-    """Of both loops, in the domain."""
+    """Of the loops that matter, in the domain."""
     faces, corners = cmap.surface.faces, cmap.corners()
-    n = len(cmap.uv)
+    n = len(cmap.surface.vertices)
     key = faces * n + np.roll(faces, -1, axis=1)
     length = abs(np.roll(corners, -1, axis=1) - corners)
-    return [float(length[np.isin(key, loop * n + np.roll(loop, -1))].sum()) for loop in cmap.surface.loops]
+    return [float(length[np.isin(key, loop * n + np.roll(loop, -1))].sum()) for loop in main_loops(cmap)]
 
 
 def edges_around(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings, angle: float) -> float:

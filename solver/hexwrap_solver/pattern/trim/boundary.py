@@ -209,6 +209,16 @@ def chords(layout: Layout, boundary: Boundary) -> Chords:
     return Chords(edge[once], t[once], end_edge[once], end_t[once], isometry[once])
 
 
+def met_by_chords(met: Bools, layout: Layout, boundary: Boundary) -> Bools:
+    """(loops,) those met, and those that a pattern edge passes without reaching a node."""
+    if met.all():
+        return met
+    chord = chords(layout, boundary)
+    met = met.copy()
+    met[boundary.loop[np.concatenate([chord.edge, chord.end_edge])]] = True
+    return met
+
+
 def _edges_across(layout: Layout, boundary: Boundary) -> tuple[Ints, Ints, Ints]:
     """(boundary edge, node outside, direction) of all pattern edges that enter through a boundary edge."""
     lattice = layout.lattice

@@ -37,7 +37,8 @@ from hexwrap_solver.pattern.lay.edges import PatternEdges
 from hexwrap_solver.pattern.lay.layout import Layout
 from hexwrap_solver.pattern.lay.nodes import Nodes
 from hexwrap_solver.pattern.trim.arrangement import HalfEdges, Points, arrangement
-from hexwrap_solver.pattern.trim.boundary import Boundary
+from hexwrap_solver.pattern.trim.boundary import Boundary, met_by_chords
+from hexwrap_solver.pattern.trim.enclosed import around_enclosed
 
 #: Pieces smaller than this part of a cell are joined to a cut neighbour, or dropped where there is none.
 SLIVER = 0.05
@@ -54,7 +55,8 @@ class TooCoarse(Exception):
 @dataclass(frozen=True)
 class Trimmed:
     """cells with points as corners; whole: (c,) not cut; points; dropped: area left out, in cells; joined and
-    lost: how many pieces were joined to a neighbour or dropped."""
+    lost: how many pieces were joined to a neighbour or dropped; holed: how many cells were left out because
+    an opening lies inside them."""
 
     cells: Cells
     whole: Bools
@@ -62,10 +64,15 @@ class Trimmed:
     dropped: float = 0.0
     joined: int = 0
     lost: int = 0
+    holed: int = 0
 
 
-def trim(layout: Layout, boundary: Boundary, nodes: Nodes, edges: PatternEdges, cells: WholeCells) -> Trimmed:
+def trim(
+    layout: Layout, boundary: Boundary, met: Bools, nodes: Nodes, edges: PatternEdges, cells: WholeCells
+) -> Trimmed:
     """Whole cells and the cells that the boundary cuts.
+
+    met: (loops,) those that the pattern meets, or that no cell may enclose.
 
     Raises TooCoarse where a face goes around the surface.
     """
@@ -90,8 +97,22 @@ def trim(layout: Layout, boundary: Boundary, nodes: Nodes, edges: PatternEdges, 
     kept = faces.part(~small)
     together = _together(layout, cells, side_of_edge, kept, half_edges, edges)
     whole = np.arange(together.n) < cells.n
-    dropped = float(area[small].sum() / lattice.cell_area)
-    return Trimmed(together, whole, points, dropped, max(joined - lost, 0), lost)
+    dropped = float(area[small & (area > 0)].sum() / lattice.cell_area)
+    holed = around_enclosed(layout, boundary, nodes, met_by_chords(met, layout, boundary))
+    keep = ~_left_of(holed, cells, side_of_edge, kept, half_edges)
+    return Trimmed(
+        together.part(keep), whole[keep], points, dropped, max(joined - lost, 0), lost, int((~keep).sum())
+    )
+
+
+def _left_of(slots: Ints, cells: WholeCells, side_of_edge: Ints, cut: _Faces, half_edges: HalfEdges) -> Bools:
+    """(cells,) those, whole or cut, that have one of the pattern edges as a side."""
+    found = np.zeros(cells.n + cut.half_edge.n_rows, dtype=bool)
+    side = side_of_edge[slots]
+    found[cells.corner.row[side[side >= 0]]] = True
+    named = np.isin(half_edges.name[cut.half_edge.values], slots)
+    found[cells.n + cut.half_edge.row[named]] = True
+    return found
 
 
 @dataclass(frozen=True)

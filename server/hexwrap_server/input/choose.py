@@ -1,0 +1,161 @@
+"""Which of the objects of a file are meant, and what becomes of them: chosen, joined, strays left out.
+
+First, those that are named, or else all that are visible and not locked. Then what meets along its edges is
+joined. Of the parts that are left, the only one that can be meant is taken: a tube before a closed mass
+before a surface with one boundary curve, and of several such one that is far larger than the others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from hexwrap_server.input.object_words import joint, label, listed, others, point, rows, strays
+from hexwrap_server.input.parts import Part, brep_where_needed, parts_of
+from hexwrap_server.input.readers.errors import NoObjectError, SeveralObjectsError, UnreadableFileError
+from hexwrap_server.input.readers.found import FileContent, Found, Geometry
+from hexwrap_solver.surface import SentMesh
+
+#: Of several parts that could be meant, one whose area is so many times that of the next is meant.
+DOMINANT = 10.0
+#: Edges that nearly meet are told up to so many times the tolerance.
+NEARLY = 100.0
+#: At most so many such places are told.
+SHOWN = 5
+#: Of more objects than these, only the largest are looked at.
+MOST = 300
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """What a file stands for. told: sentences for the user. used: the objects it is made of."""
+
+    geometry: Geometry
+    used: tuple[Found, ...]
+    told: tuple[str, ...] = ()
+
+
+def choose(
+    content: FileContent, object: str | None = None, layer: str | None = None, unit: str | None = None
+) -> Chosen:
+    """Raises NoObjectError, SeveralObjectsError, UnreadableFileError, SurfaceError."""
+    meant = named(content, object, layer)
+    unit = unit or content.unit
+    if content.is_whole and content.mesh is not None:
+        return Chosen(content.mesh, tuple(meant))
+    if content.mesh is None and len(meant) == 1:
+        geometry = meant[0].read()
+        if not isinstance(geometry, SentMesh):
+            geometry, told = brep_where_needed(geometry, content.tolerance)
+            return Chosen(geometry, tuple(meant), (*told, *others(content, meant)))
+    meant = sorted(meant, key=lambda item: -max(item.size))[:MOST]
+    found = parts_of(content, meant)
+    if not found.parts:
+        raise UnreadableFileError(found.spoilt[0][1] if found.spoilt else "The file holds no faces.")
+    best = min(part.rank for part in found.parts)
+    fitting = sorted((part for part in found.parts if part.rank == best), key=lambda part: -part.area)
+    if len(fitting) > 1 and fitting[0].area < DOMINANT * fitting[1].area:
+        raise several(content, [meant[i] for part in fitting for i in part.members], len(fitting), unit)
+    part = fitting[0]
+    used = [meant[i] for i in part.members]
+    geometry, told = brep_where_needed(part.make(), content.tolerance)
+    for seam in found.joints if len(used) > 1 or len(meant) == 1 else ():
+        told += joint(seam, content.tolerance or 0.0, len(used))
+    told += strays([piece for members, piece in found.strays if members & set(part.members)])
+    told += _nearly(part, [other for other in found.parts if other is not part], meant, content.tolerance)
+    return Chosen(geometry, tuple(used), (*told, *others(content, used)))
+
+
+def named(content: FileContent, object: str | None, layer: str | None) -> list[Found]:
+    """Objects that are named, or those in sight. Raises NoObjectError."""
+    objects = content.objects
+    if not objects:
+        held = ", ".join(f"{count} {kind}" for kind, count in sorted(content.others.items()))
+        raise UnreadableFileError(
+            f"The file holds no mesh, surface, polysurface, extrusion or SubD ({held or 'nothing at all'}): "
+            "in Rhino, make one with Loft, ExtrudeCrv or NetworkSrf, or run ExtractSrf on a solid."
+        )
+    if object is None and layer is None:
+        seen = [found for found in objects if found.visible and not found.locked]
+        if seen:
+            return seen
+        raise NoObjectError(
+            f"All {len(objects)} surfaces of the file are hidden, locked or on layers that are off: show "
+            f"them in Rhino, or name the one that is meant ({listed(objects, content.unit)}).",
+            data={"objects": rows(objects)},
+        )
+    on = [(i, item) for i, item in enumerate(objects) if _is_on(item, layer)]
+    exact = [item for _, item in on if object is not None and item.name == object]
+    found = exact or [item for i, item in on if _is_named(item, i, object)]
+    if found:
+        return found
+    what = " and ".join(
+        ([f"is named '{object}'"] if object is not None else [])
+        + ([f"is on layer '{layer}'"] if layer is not None else [])
+    )
+    raise NoObjectError(
+        f"No surface of the file {what}; there are {listed(objects, content.unit)}.",
+        data={"objects": rows(objects)},
+    )
+
+
+def _is_named(found: Found, number: int, object: str | None) -> bool:
+    if object is None:
+        return True
+    word = object.strip().lower()
+    return word in (str(number), found.id.lower(), *found.id.lower().split("/")) or fnmatchcase(
+        found.name.lower(), word
+    )
+
+
+def _is_on(found: Found, layer: str | None) -> bool:
+    """A layer stands for those below it; a single name for every layer of that name."""
+    if layer is None:
+        return True
+    word = layer.strip().lower()
+    steps = found.layer.lower().split("::")
+    paths = ["::".join(steps[i : k + 1]) for k in range(len(steps)) for i in (0, k)]
+    return any(fnmatchcase(path, word) for path in paths)
+
+
+def _nearly(part: Part, others: Sequence[Part], meant: Sequence[Found], tolerance: float | None) -> list[str]:
+    """Where edges of another part come near, but not within the tolerance."""
+    if tolerance is None or not len(part.rim):
+        return []
+    told = []
+    tree = cKDTree(part.rim)
+    for other in others:
+        if not len(other.rim):
+            continue
+        distance, _ = tree.query(other.rim)
+        k = int(np.argmin(distance))
+        if tolerance < distance[k] < NEARLY * tolerance:
+            told.append(
+                f"{label(meant[other.members[0]], other.members[0])} comes within {distance[k]:.3g} of the "
+                f"surface at {point(other.rim[k])}, more than the file's tolerance of {tolerance:g}, and was "
+                "not joined: close the gap with Rhino's MatchSrf or JoinEdge."
+            )
+    return told[:SHOWN]
+
+
+def several(
+    content: FileContent, objects: Sequence[Found], count: int, unit: str | None
+) -> SeveralObjectsError:
+    distinct = list({id(found): found for found in objects}.values())
+    if len(distinct) < 2:
+        return SeveralObjectsError(
+            f"The mesh is in {count} pieces of about the same size that do not meet: delete those that are "
+            "not meant, or join them along their edges (in Rhino: SplitDisjointMesh shows them).",
+            data={"objects": rows(content.objects)},
+        )
+    return SeveralObjectsError(
+        f"The file holds {len(distinct)} objects that could be meant: "
+        f"{listed(distinct, unit, content.objects)}. Name one with --object or --layer ('object' or 'layer' "
+        "of the surface in a request), or hide the others; edges that meet within the file's tolerance are "
+        "joined.",
+        data={"objects": rows(content.objects)},
+    )

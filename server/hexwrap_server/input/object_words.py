@@ -1,0 +1,87 @@
+"""Sentences about the objects of a file: what they are called, what was joined, what was left out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from hexwrap_server.input.readers.found import FileContent, Found
+from hexwrap_solver.surface.pieces import Joint, Piece
+
+#: Sentences name at most so many objects, problems list at most so many.
+SHOWN, LISTED = 5, 200
+#: A gap below this part of the tolerance is rounding.
+NONE = 1e-6
+
+
+def joint(joint: Joint, tolerance: float, objects: int) -> list[str]:
+    if joint.count == 0 or (objects == 1 and joint.gap <= NONE * tolerance):
+        return []
+    what = f"{objects} objects were joined along their edges" if objects > 1 else "Open edges were joined"
+    if joint.gap <= NONE * tolerance:
+        return [f"{what}."]
+    return [
+        f"{what}: the greatest gap closed was {joint.gap:.3g}, at {point(joint.place)}, within the file's "
+        f"tolerance of {tolerance:g}."
+    ]
+
+
+def strays(strays: Sequence[Piece]) -> list[str]:
+    if not strays:
+        return []
+    places = ", ".join(point((piece.low + piece.high) / 2) for piece in strays[:SHOWN])
+    more = f" and {len(strays) - SHOWN} more" if len(strays) > SHOWN else ""
+    faces = sum(len(piece.faces) for piece in strays)
+    noun = "piece" if len(strays) == 1 else "pieces"
+    return [
+        f"{len(strays)} stray {noun} of {faces} face{'s' * (faces > 1)} in all left out, at {places}{more}."
+    ]
+
+
+def others(content: FileContent, used: Sequence[Found]) -> tuple[str, ...]:
+    """What was taken and what was not, where there was a choice."""
+    kept = {id(found) for found in used}
+    left = [found for found in content.objects if id(found) not in kept]
+    if not left:
+        return ()
+    taken = ", ".join(described(found, i, content.unit) for i, found in enumerate(content.objects)
+                      if id(found) in kept)  # fmt: skip
+    return (f"Taken: {taken}. Left out: {listed(left, content.unit, content.objects)}.",)
+
+
+def listed(objects: Sequence[Found], unit: str | None, among: Sequence[Found] | None = None) -> str:
+    number = {id(found): i for i, found in enumerate(among or objects)}
+    shown = ", ".join(described(found, number[id(found)], unit) for found in objects[:SHOWN])
+    return shown + (f" and {len(objects) - SHOWN} more" if len(objects) > SHOWN else "")
+
+
+def described(found: Found, number: int, unit: str | None) -> str:
+    """Name, kind, layer and size in one phrase."""
+    size = " × ".join(f"{x:.4g}" for x in found.size)
+    layer = f" on layer {found.layer}" if found.layer else ""
+    return f"{label(found, number)} ({found.kind}{layer}, {size}{' ' + unit if unit else ''})"
+
+
+def label(found: Found, number: int) -> str:
+    return f"'{found.name}'" if found.name else f"object {number}"
+
+
+def rows(objects: Sequence[Found], used: Sequence[Found] = ()) -> list[dict[str, Any]]:
+    """As POST /v1/surfaces answers them."""
+    kept = {id(found) for found in used}
+    return [
+        {
+            "id": found.id,
+            "name": found.name,
+            "layer": found.layer,
+            "kind": found.kind,
+            "visible": found.visible and not found.locked,
+            "size": list(found.size),
+            "used": id(found) in kept,
+        }
+        for found in objects[:LISTED]
+    ]
+
+
+def point(place: Iterable[float]) -> str:
+    return "(" + ", ".join(f"{x:.6g}" for x in place) + ")"

@@ -1,0 +1,219 @@
+"""What hangs together in a file: meshes and surfaces joined along their edges, and what bounds them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+
+import numpy as np
+
+from hexwrap_server.input.readers.found import STRAY, FileContent, Found, Geometry
+from hexwrap_solver.arrays import Floats, Ints
+from hexwrap_solver.errors import SurfaceError
+from hexwrap_solver.surface import NurbsSurface, SentMesh
+from hexwrap_solver.surface.brep import Brep
+from hexwrap_solver.surface.brep.join import joined as joined_brep
+from hexwrap_solver.surface.brep.types import together as one_brep
+from hexwrap_solver.surface.brep.whole import brep_of_surface
+from hexwrap_solver.surface.checks import check_arrays
+from hexwrap_solver.surface.nurbs_checks import TOLERANCE, closed_within, end_gap
+from hexwrap_solver.surface.pieces import Joint, Piece, joined, only, pieces, together
+
+#: The tolerance of a file counts up to this part of the size of what is joined.
+COARSEST = 1e-3
+
+
+@dataclass(frozen=True)
+class Part:
+    """Something that hangs together. members: places of its objects. area: of a mesh, or of control nets.
+
+    make: its geometry. rim: (k, 3) points on its boundary.
+    """
+
+    members: tuple[int, ...]
+    loops: int
+    area: float
+    rim: Floats
+    make: Callable[[], Geometry]
+
+    @property
+    def rank(self) -> int:
+        return 0 if self.loops > 1 else 1 if self.loops == 0 else 2
+
+
+@dataclass(frozen=True)
+class Parts:
+    """strays: small pieces that were left out, with the places of their objects. joints: what was joined.
+
+    spoilt: objects that cannot be read, with the reason.
+    """
+
+    parts: list[Part] = field(default_factory=list)
+    strays: list[tuple[set[int], Piece]] = field(default_factory=list)
+    joints: list[Joint] = field(default_factory=list)
+    spoilt: list[tuple[int, str]] = field(default_factory=list)
+
+
+def parts_of(content: FileContent, meant: Sequence[Found]) -> Parts:
+    """Everything that hangs together after joining. Raises SurfaceError for a lone object that is broken."""
+    found = Parts()
+    if content.mesh is not None and content.owner is not None:
+        place = {id(item): i for i, item in enumerate(meant)}
+        lookup = np.array([place.get(id(item), -1) for item in content.objects], dtype=np.int64)
+        owner = lookup[content.owner]
+        mesh = only(content.mesh, np.flatnonzero(owner >= 0))
+        check_arrays(mesh)
+        _add_meshes(mesh, owner[owner >= 0], content.tolerance, found)
+        return found
+    meshes: list[tuple[int, SentMesh]] = []
+    others: list[tuple[int, NurbsSurface | Brep]] = []
+    for i, item in enumerate(meant):
+        try:
+            geometry = item.read()
+            if isinstance(geometry, SentMesh):
+                check_arrays(geometry)
+                meshes.append((i, geometry))
+            else:
+                others.append((i, geometry))
+        except SurfaceError as error:
+            if len(meant) == 1:
+                raise
+            found.spoilt.append((i, error.detail))
+    if meshes:
+        mesh, source = together([geometry for _, geometry in meshes])
+        _add_meshes(mesh, np.array([i for i, _ in meshes])[source], content.tolerance, found)
+    if others:
+        _add_breps(others, content.tolerance, found)
+    return found
+
+
+def _add_meshes(mesh: SentMesh, owner: Ints, tolerance: float | None, found: Parts) -> None:
+    if tolerance is not None:
+        mesh, source, joint = joined(mesh, min(tolerance, COARSEST * _size(mesh.vertices[mesh.faces.values])))
+        owner = owner[source]
+        found.joints.append(joint)
+    split = [(piece, np.unique(owner[piece.faces]).tolist()) for piece in pieces(mesh)]
+    largest: dict[int, float] = {}
+    for piece, members in split:  # the largest come first
+        for i in members:
+            largest.setdefault(i, piece.area)
+    for piece, members in split:
+        if all(piece.area < STRAY * largest[i] for i in members):
+            found.strays.append((set(members), piece))
+        else:
+            found.parts.append(
+                Part(tuple(members), piece.loops, piece.area, piece.rim, partial(only, mesh, piece.faces))
+            )
+
+
+def _add_breps(objects: list[tuple[int, NurbsSurface | Brep]], tolerance: float | None, found: Parts) -> None:
+    """Surfaces and polysurfaces, their open edges joined where they meet."""
+    breps = [
+        geometry
+        if isinstance(geometry, Brep)
+        else brep_of_surface(geometry, _allowed(tolerance, _size(geometry.control_points[..., :3])))
+        for _, geometry in objects
+    ]
+    whole = one_brep(breps)
+    owner = np.repeat([i for i, _ in objects], [len(brep.faces) for brep in breps])
+    if len(objects) > 1:
+        whole, joints = joined_brep(whole)
+        x, y, z = joints.place.tolist()
+        found.joints.append(Joint(joints.count, joints.gap, (x, y, z)))
+    for faces in _connected(whole):
+        members = tuple(np.unique(owner[faces]).tolist())
+        own = [geometry for i, geometry in objects if i in members]
+        rim, loops = _naked(whole, faces)
+        make = partial(_same, own[0]) if len(own) == 1 else partial(_some, whole, faces)
+        found.parts.append(Part(members, loops, _net_area(whole, faces), rim, make))
+
+
+def _same(geometry: Geometry) -> Geometry:
+    return geometry
+
+
+def _size(points: Floats) -> float:
+    return float(np.linalg.norm(np.ptp(points.reshape(-1, 3), axis=0)))
+
+
+def _allowed(tolerance: float | None, size: float) -> float:
+    """The file's tolerance as far as it is sane, and never less than rounding."""
+    return max(TOLERANCE * size, min(tolerance or 0.0, COARSEST * size))
+
+
+def brep_where_needed(geometry: Geometry, tolerance: float | None) -> tuple[Geometry, list[str]]:
+    """The NURBS surface itself where it is closed in one direction and has no pole, else a Brep of one face
+    whose ends are one seam where they meet within the file's tolerance; and what is to be told."""
+    if not isinstance(geometry, NurbsSurface):
+        return geometry, []
+    size = _size(geometry.control_points[..., :3])
+    exact, wide = TOLERANCE * size, _allowed(tolerance, size)
+    is_tube = sum(closed_within(geometry, exact)) == 1
+    brep = brep_of_surface(geometry, exact if is_tube else wide)
+    if is_tube and all(trim.edge >= 0 for loop in brep.faces[0].loops for trim in loop):
+        return geometry, []
+    told = [
+        f"The ends of the surface in {'uv'[d]} are up to {end_gap(geometry, d):.3g} apart and were made one "
+        f"seam, within the file's tolerance of {wide:g}."
+        for d in (0, 1)
+        if closed_within(geometry, wide)[d] and not closed_within(geometry, exact)[d]
+    ]
+    return brep, told
+
+
+def _some(brep: Brep, faces: Iterable[int]) -> Brep:
+    return Brep(brep.vertices, brep.edges, tuple(brep.faces[f] for f in faces), brep.tolerance)
+
+
+def _connected(brep: Brep) -> list[list[int]]:
+    """Faces that hang together across edges."""
+    label = list(range(len(brep.faces)))
+
+    def root(f: int) -> int:
+        while label[f] != f:
+            label[f] = label[label[f]]
+            f = label[f]
+        return f
+
+    first: dict[int, int] = {}
+    for f, face in enumerate(brep.faces):
+        for loop in face.loops:
+            for trim in loop:
+                if trim.edge >= 0:
+                    label[root(f)] = root(first.setdefault(trim.edge, f))
+    groups: dict[int, list[int]] = {}
+    for f in range(len(brep.faces)):
+        groups.setdefault(root(f), []).append(f)
+    return list(groups.values())
+
+
+def _naked(brep: Brep, faces: Sequence[int]) -> tuple[Floats, int]:
+    """Ends of edges with one face only, and the number of closed curves that these edges make."""
+    uses: dict[int, int] = {}
+    for f in faces:
+        for loop in brep.faces[f].loops:
+            for trim in loop:
+                if trim.edge >= 0:
+                    uses[trim.edge] = uses.get(trim.edge, 0) + 1
+    naked = [e for e, count in uses.items() if count == 1]
+    label: dict[int, int] = {}
+
+    def root(v: int) -> int:
+        while label.setdefault(v, v) != v:
+            v = label[v]
+        return v
+
+    for e in naked:
+        label[root(brep.edges[e].start)] = root(brep.edges[e].end)
+    ends = sorted(label)
+    return brep.vertices[ends], len({root(v) for v in ends})
+
+
+def _net_area(brep: Brep, faces: Sequence[int]) -> float:
+    total = 0.0
+    for f in faces:
+        net = brep.faces[f].surface.control_points[..., :3]
+        one, two = net[1:, 1:] - net[:-1, :-1], net[1:, :-1] - net[:-1, 1:]
+        total += float(np.linalg.norm(np.cross(one, two), axis=-1).sum()) / 2
+    return total

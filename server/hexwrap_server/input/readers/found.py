@@ -1,0 +1,98 @@
+"""What a file holds, whatever its format: objects that can be chosen, its unit and its tolerance."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hexwrap_solver.arrays import Ints
+from hexwrap_solver.errors import SurfaceError
+from hexwrap_solver.surface import NurbsSurface, SentMesh
+from hexwrap_solver.surface.brep import Brep
+from hexwrap_solver.surface.checks import check_arrays
+from hexwrap_solver.surface.pieces import only, pieces
+
+#: A piece of an object with less than this part of its largest piece's area is a stray.
+STRAY = 0.01
+
+Geometry = SentMesh | NurbsSurface | Brep
+
+
+@dataclass(frozen=True)
+class Found:
+    """An object of a file that is a mesh or a surface.
+
+    kind: Rhino's word for it. size: of its bounding box. read: its geometry, converted when it is asked for.
+    attributes: user strings.
+    """
+
+    id: str
+    name: str
+    kind: str
+    size: tuple[float, float, float]
+    read: Callable[[], Geometry]
+    layer: str = ""
+    visible: bool = True
+    locked: bool = False
+    attributes: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class FileContent:
+    """unit: ``m``, ``cm``, ``mm``, ``ft``, ``in`` or None. tolerance: of the file, in its unit; None where
+    the format has none. others: what else is there, by kind.
+
+    mesh, owner: where the objects are faces (m,) of one table of vertices, the whole table; its vertices keep
+    their numbers whatever is chosen. is_whole: the mesh is one object, and known to be one piece.
+    """
+
+    objects: tuple[Found, ...]
+    unit: str | None = None
+    tolerance: float | None = None
+    others: Counter[str] = field(default_factory=Counter)
+    mesh: SentMesh | None = None
+    owner: Ints | None = None
+    is_whole: bool = False
+
+
+def of_mesh(mesh: SentMesh, names: Sequence[tuple[str, str]] = (), owner: Ints | None = None) -> FileContent:
+    """The content of a file that is one table of vertices and faces.
+
+    names: (name, layer) of each object, owner: (m,) the object of each face; without, the pieces of the mesh
+    that do not hang together are its objects, but for strays.
+    """
+    try:
+        check_arrays(mesh)
+    except SurfaceError:  # told when the mesh is taken in
+        return FileContent((_object("0", "", mesh),), mesh=mesh, owner=_none(mesh), is_whole=True)
+    if owner is not None and len(names) > 1:
+        parts = [only(mesh, np.flatnonzero(owner == i)) for i in range(len(names))]
+        objects = [
+            _object(str(i), name, part, layer)
+            for i, ((name, layer), part) in enumerate(zip(names, parts, strict=True))
+        ]
+        return FileContent(tuple(objects), mesh=mesh, owner=owner)
+    found = pieces(mesh)
+    large = [piece for piece in found if piece.area >= STRAY * found[0].area]
+    name = names[0][0] if names else ""
+    if len(large) < 2:
+        whole = _object("0", name, mesh)
+        return FileContent((whole,), mesh=mesh, owner=_none(mesh), is_whole=len(found) == 1)
+    owner = _none(mesh)
+    for i, piece in enumerate(large):
+        owner[piece.faces] = i
+    objects = [_object(str(i), f"part {i}", only(mesh, piece.faces)) for i, piece in enumerate(large)]
+    return FileContent(tuple(objects), mesh=mesh, owner=owner)
+
+
+def _object(id: str, name: str, mesh: SentMesh, layer: str = "") -> Found:
+    used = mesh.vertices[mesh.faces.values] if mesh.faces.n_rows else np.zeros((1, 3))
+    x, y, z = np.ptp(used, axis=0).tolist()
+    return Found(id, name, "mesh", (x, y, z), lambda: mesh, layer)
+
+
+def _none(mesh: SentMesh) -> Ints:
+    return np.zeros(mesh.faces.n_rows, dtype=np.int64)

@@ -1,0 +1,444 @@
+"""Singularities moved until the pattern closes up around every one of them and around every loop.
+
+Cut open along a tree, the surface is laid out in the plane; across each branch of the cut stands a motion.
+All of these must be symmetries of one lattice. Deforming the layout until they are would strain it at the
+singularities; instead these move on the surface, by less than a cell each, and u varies a little along free
+loops (a dipole each), so that the map stays conformal.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hexwrap_solver.arrays import Complexes, Floats, Ints, Progress, no_progress
+from hexwrap_solver.conformal.energy import Corners, Energy, opposite_lengths
+from hexwrap_solver.conformal.layout import _develop
+from hexwrap_solver.conformal.newton import minimise
+from hexwrap_solver.errors import ConvergenceError
+from hexwrap_solver.linalg.factor import Factorisation
+from hexwrap_solver.singularities.cut import Branches, branches
+from hexwrap_solver.singularities.drag import Grip, dragged, grips
+from hexwrap_solver.singularities.integers import nearest_integers
+from hexwrap_solver.singularities.linear import targets, vertex_areas
+from hexwrap_solver.singularities.types import End
+from hexwrap_solver.surface.topology import next_half_edge
+from hexwrap_solver.surface.types import Surface
+
+#: Units of the unknowns beside moves by a cell: a dipole's amplitude, a uniform stretch, a turn of the
+#: lattice, a change of its scale.
+DIPOLE, STRETCH, TURN, SCALE = 0.15, 0.002, 0.1, 0.02
+#: Largest move in one step, cells; steps of Newton's method; residuals at which it ends, and which are
+#: accepted.
+STRIDE, STEPS, DONE, ACCEPTED = 0.6, 40, 1e-11, 1e-9
+#: Differences for the Jacobian, in units, and the residual of the angle sums that will do for it.
+DIFFERENCE, ROUGH = 0.02, 1e-6
+#: Chord steps of the inner Newton's method, each of which must leave at most this part of the residual
+#: until it is down to rounding, radians.
+CHORDS, CHORD_GAIN, SMALL = 60, 0.3, 1e-12
+#: Rotations and scales of the lattice that are tried where nothing is aligned.
+TURNS, SCALES = 48, 9
+
+
+@dataclass(frozen=True)
+class Line:
+    """Straight loops that are to be lattice lines: the shortest translation along one, and at which depths
+    ≡ first (mod period), inwards from a cell's centre, they may lie; in widths of a cell."""
+
+    step: complex
+    first: float
+    period: float
+
+
+@dataclass(frozen=True)
+class Seen:
+    """The map at some moves. place: (3, m) the layout. image: (e,) M(c) − c of every leaf's motion M, c
+    being the root's place; turn: (e,) quanta by which M turns. foot: per straight loop a point of it less
+    c, and heading its direction. residual: of the angle sums, radians. lengths, metric: (3, m) of the flat
+    triangles."""
+
+    surface: Surface
+    u: Floats
+    place: Complexes
+    image: Complexes
+    turn: Ints
+    center: complex
+    foot: Complexes
+    heading: Complexes
+    residual: float
+    lengths: Floats
+    metric: Corners
+
+
+class Chart:
+    """The map as a function of moves, dipoles and stretch; connectivity and cut stay the same."""
+
+    def __init__(
+        self,
+        surface: Surface,
+        cones: Ints,
+        index: Ints,
+        loops: tuple[int, ...],
+        ends: tuple[End, ...],
+        quantum: float,
+        cell: float,
+        slope: Floats | None = None,
+        angles: Floats | None = None,
+    ) -> None:
+        """The first cone is the root of the cut. angles: see ``targets``. slope: (m, 3) squared sine of
+        every half-edge's angle to the horizontal, in which direction a stretch is allowed; None: none is.
+        Raises ConvergenceError."""
+        self.surface, self.cones, self.index, self.cell = surface, cones, index, cell
+        self.quantum, self.ends = quantum, ends
+        self.energy = Energy(surface, targets(surface, ends, loops, quantum, cones, index, angles=angles))
+        self.factor = Factorisation(self.energy.points, self.energy.rows, self.energy.columns)
+        self.cut: Branches = branches(surface, int(cones[0]), cones[1:], tuple(surface.loops))
+        self.hold: list[Grip] = grips(surface, cones, cell)
+        pairs = list(zip(surface.loops, ends, strict=True))
+        self.waves = [_waves(surface, loop) for loop, end in pairs if end == "free"]
+        self.straight = [_rim(surface, loop) for loop, end in pairs if end == "straight"]
+        self.slope = None if slope is None else np.ascontiguousarray(slope.T[[1, 2, 0]])
+        self.area = vertex_areas(surface)
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            found = minimise(self.energy)
+        if not found.converged or found.broken:
+            raise ConvergenceError(
+                "With these singularities there is no map on the triangles of the surface as they are: send "
+                "a finer or more regular mesh, or ask for fewer singularities."
+            )
+        self.factor.factorise(*self.energy.hessian(found.corners))
+        self._x = self.energy.unknowns_of(found.u)
+        self._root = int(np.flatnonzero(surface.faces.ravel() == cones[0])[0])
+
+    @property
+    def unknowns(self) -> int:
+        return 2 * len(self.cones) + 2 * len(self.waves) + (self.slope is not None)
+
+    def at(self, x: Floats, enough: float = 0.0) -> Seen:
+        """x: (unknowns,) moves of each singularity in cells, dipoles and stretch in their units. enough:
+        residual of the angle sums that will do, 0: rounding."""
+        s, d = 2 * len(self.cones), 2 * len(self.waves)
+        surface = dragged(self.surface, self.hold, x[:s].reshape(-1, 2) * self.cell)
+        factor = np.zeros(len(surface.vertices))
+        for (loop, wave), amplitude in zip(self.waves, DIPOLE * x[s : s + d].reshape(-1, 2), strict=True):
+            factor[loop] += wave @ amplitude
+        half = np.exp(factor / 2)[self.energy.corner]
+        lengths = opposite_lengths(surface.vertices, surface.faces) * half[[1, 2, 0]] * half[[2, 0, 1]]
+        if self.slope is not None:
+            lengths *= np.sqrt(1 + ((1 + STRETCH * x[-1]) ** 2 - 1) * self.slope)
+        self.energy.lengths = lengths
+        u, corners, residual = self._solve(enough)
+        total = u + factor
+        shift = float(self.area @ total / self.area.sum())
+        flat_lengths = self.energy.scaled_lengths(u - shift)
+        place = _develop(self.cut.twin, flat_lengths, corners)
+        flat = place.T.ravel()
+        center = complex(flat[self._root])
+        image, turn = self._images(flat, center)
+        rims = [(flat[h], flat[next_half_edge(h)]) for h in self.straight]
+        foot = np.array([complex((start + end).mean() / 2) - center for start, end in rims])
+        heading = np.array([complex((end - start).sum()) for start, end in rims])
+        return Seen(
+            surface,
+            total - shift,
+            place,
+            image,
+            turn,
+            center,
+            foot,
+            heading,
+            residual,
+            flat_lengths,
+            corners,
+        )
+
+    def _solve(self, enough: float) -> tuple[Floats, Corners, float]:
+        """Newton's method from the last solution; the Hessian is factorised again where it has aged."""
+        energy, x = self.energy, self._x
+        corners = energy.corners(energy.scale_of(x))
+        gradient = energy.gradient(corners)
+        residual, fresh = float(np.abs(gradient).max()), False
+        for _ in range(CHORDS):
+            if residual <= enough:
+                break
+            trial = x - self.factor.solve(gradient)
+            seen = energy.corners(energy.scale_of(trial))
+            new = energy.gradient(seen)
+            after = float(np.abs(new).max())
+            good = after < residual and not seen.broken.any()
+            gain = after / max(residual, 1e-300)
+            if good:
+                x, corners, gradient, residual = trial, seen, new, after
+            if residual <= SMALL and gain > CHORD_GAIN:
+                break
+            if good and (fresh or gain <= CHORD_GAIN):
+                fresh = False
+                continue
+            if fresh:
+                break
+            self.factor.factorise(*energy.hessian(corners))
+            fresh = True
+        if residual > max(enough, ACCEPTED):
+            raise ConvergenceError("Newton's method did not converge after a singularity was moved.")
+        self._x = x
+        return energy.scale_of(x), corners, residual
+
+    def _images(self, flat: Complexes, center: complex) -> tuple[Complexes, Ints]:
+        """flat: (3m,) the layout."""
+        images, turns = [], []
+        for way in self.cut.ways:
+            there = self.surface.twin[way]
+            one, other = flat[way], flat[next_half_edge(way)]
+            across_other, across_one = flat[there], flat[next_half_edge(there)]
+            angle = float(np.angle(((other - one) / (across_other - across_one)).sum()))
+            turn = round(angle / self.quantum)
+            rho = np.exp(1j * turn * self.quantum)
+            shift = complex((one + other - rho * (across_one + across_other)).mean() / 2)
+            images.append(rho * center + shift - center)
+            turns.append(turn)
+        return np.array(images, dtype=complex), np.array(turns, dtype=np.int64)
+
+
+def _waves(surface: Surface, loop: Ints) -> tuple[Ints, Floats]:
+    """(k,) a loop and (k, 2) cosine and sine along its length."""
+    step = np.linalg.norm(surface.vertices[np.roll(loop, -1)] - surface.vertices[loop], axis=1)
+    along = 2 * np.pi * (np.cumsum(step) - step) / step.sum()
+    return loop, np.stack([np.cos(along), np.sin(along)], axis=1)
+
+
+def _rim(surface: Surface, loop: Ints) -> Ints:
+    """The loop's boundary half-edges."""
+    on = np.zeros(len(surface.vertices), dtype=bool)
+    on[loop] = True
+    rim = np.flatnonzero(surface.twin < 0)
+    return rim[on[surface.faces.ravel()[rim]]]
+
+
+@dataclass(frozen=True)
+class Closed:
+    """seen: the map. factor, shift: z ↦ factor · z + shift carries its layout to the lattice whose
+    translations are ℤ[ζ]. motion: (e, 2) translation of each leaf's motion there. moves: (s,) cells;
+    dipole: the largest amplitude; stretch: ε. residual: cells."""
+
+    seen: Seen
+    factor: complex
+    shift: complex
+    motion: Ints
+    moves: Floats
+    dipole: float
+    stretch: float
+    residual: float
+    steps: int
+
+
+def near_lattice(z: Complexes, order: int) -> Ints:
+    """(…, 2) integers (a, b), a + bζ being nearest to each z."""
+    zeta = np.exp(2j * np.pi / order)
+    b = z.imag / zeta.imag
+    a = z.real - b * zeta.real
+    low = np.stack([np.floor(a), np.floor(b)], axis=-1)
+    every = low[..., None, :] + np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
+    off = np.abs(every[..., 0] + every[..., 1] * zeta - z[..., None])
+    return np.asarray(
+        np.take_along_axis(every, off.argmin(-1)[..., None, None], -2)[..., 0, :], dtype=np.int64
+    )
+
+
+def as_complex(points: Ints, order: int) -> Complexes:
+    return np.asarray(points[..., 0] + points[..., 1] * np.exp(2j * np.pi / order))
+
+
+@dataclass(frozen=True)
+class Goal:
+    """Wanted values of the equations: images as complex numbers, then depths."""
+
+    factor: complex
+    image: Complexes
+    depth: Floats
+    cost: float
+
+
+class Closing:
+    """Newton's method for a chart: factor · image must be translations of the lattice, and straight loops
+    lie on its lines."""
+
+    def __init__(
+        self,
+        chart: Chart,
+        width: float,
+        line: Line | None = None,
+        free_scale: float = 0.05,
+        aligned: tuple[bool, ...] | None = None,
+    ) -> None:
+        """width: of a cell in the domain; it may change by the share ``free_scale``. line: None leaves
+        straight loops where they come. aligned: per loop, whether it is to be a line; None: straight ones."""
+        self.chart, self.width, self.free_scale = chart, width, free_scale
+        straight = [end == "straight" for end in chart.ends]
+        on_line = straight if aligned is None else [a and b for a, b in zip(aligned, straight, strict=True)]
+        self.line = line if any(on_line) else None
+        self.lines = np.flatnonzero(np.array(on_line, dtype=bool)[np.array(straight, dtype=bool)])
+        self.order = round(2 * np.pi / chart.quantum)
+        self.zeta = complex(np.exp(1j * chart.quantum))
+        self.base = chart.at(np.zeros(chart.unknowns))
+        s = len(chart.cones) - 1
+        loops = [-1] * s + [-2 if self.line is None or not on else -3 for on in on_line]
+        kind = np.array(loops, dtype=np.int64)
+        # Of the motions around all leaves and the root one follows from the others.
+        spare = np.flatnonzero(kind == -2)
+        if not len(spare):
+            spare = np.flatnonzero((kind == -1) & (np.abs(np.append(chart.index[1:], 0 * kind[s:])) == 1))
+        keep = np.ones(len(kind), dtype=bool)
+        if len(spare):
+            keep[spare[-1]] = False
+        self.kept = np.flatnonzero(keep)
+        self.aligned = kind[self.kept] == -3
+        # The motion of a cone with |k| ≥ 2 turns about a cell's centre only for some translations.
+        k = np.concatenate([chart.index[1:], np.zeros(len(kind) - s, dtype=np.int64)])
+        self.divisor = np.where(np.abs(k) >= 2, 1 - self.zeta**self.base.turn, 1.0)[self.kept]
+
+    def _depth(self, seen: Seen, factor: complex) -> Floats:
+        """Of straight loops that are to be aligned, inwards."""
+        if self.line is None:
+            return np.zeros(0)
+        heading, foot = seen.heading[self.lines], seen.foot[self.lines]
+        inward = 1j * heading / np.abs(heading)
+        return np.asarray(abs(factor) * (inward.conj() * foot).real)
+
+    def _values(self, seen: Seen, factor: complex) -> Floats:
+        """All equations, real."""
+        image = factor * seen.image[self.kept]
+        return np.concatenate([image.real, image.imag, self._depth(seen, factor)])
+
+    def _jacobian(self) -> list[Seen]:
+        """What is seen after a small change of each unknown."""
+        found = []
+        for i in range(self.chart.unknowns):
+            x = np.zeros(self.chart.unknowns)
+            x[i] = DIFFERENCE
+            found.append(self.chart.at(x, ROUGH))
+        return found
+
+    def _slopes(self, changed: list[Seen], factor: complex) -> Floats:
+        """(equations, unknowns + 2); the last two: turn and scale of the lattice."""
+        here = self._values(self.base, factor)
+        columns = [(self._values(seen, factor) - here) / DIFFERENCE for seen in changed]
+        for change in (np.exp(1j * TURN * DIFFERENCE), np.exp(SCALE * DIFFERENCE)):
+            columns.append((self._values(self.base, factor * change) - here) / DIFFERENCE)
+        return np.stack(columns, axis=1)
+
+    def start(self, changed: list[Seen]) -> Goal:
+        """The place of the lattice, and the integers there, that ask for the least moves."""
+        factors = self._factors()
+        if self.line is None:
+            factors = [self._least(changed, np.array(factors))]
+        return min((self._goal(changed, factor) for factor in factors), key=lambda goal: goal.cost)
+
+    def _least(self, changed: list[Seen], factors: Complexes) -> complex:
+        """Of many places of the lattice the one whose nearest translations ask for the least moves."""
+        image = self.base.image[self.kept]
+        inverse = np.linalg.pinv(self._slopes(changed, 1.0), rcond=1e-9)
+        wanted = factors[:, None] * image
+        zeta = self.zeta ** np.arange(2)
+        nearest = near_lattice(wanted / self.divisor, self.order) @ zeta * self.divisor
+        off = (nearest - wanted) / factors[:, None]
+        moves = inverse @ np.concatenate([off.real, off.imag], axis=1).T
+        cost = (moves**2).sum(axis=0) + self._cost_of_scale(factors)
+        return complex(factors[cost.argmin()])
+
+    def _cost_of_scale(self, factor: Complexes | complex) -> Floats:
+        return np.asarray(0.02 * (np.log(np.abs(factor) * self.width) / SCALE) ** 2)
+
+    def _factors(self) -> list[complex]:
+        most = self.free_scale
+        if self.line is not None:
+            at = int(self.kept[np.flatnonzero(self.aligned)[0]])
+            around = abs(self.base.image[at]) / (self.width * abs(self.line.step))
+            numbers = range(
+                max(1, int(np.ceil(around * np.exp(-most)))), max(1, int(np.floor(around * np.exp(most)))) + 1
+            )
+            every = list(numbers) or [max(1, round(around))]
+            return [complex(k * self.line.step / self.base.image[at]) for k in every]
+        scales = np.exp(np.linspace(-most, most, SCALES if most else 1))
+        turns = np.arange(TURNS) / TURNS * self.chart.quantum
+        return [complex(np.exp(1j * turn) / (self.width * scale)) for scale in scales for turn in turns]
+
+    def _goal(self, changed: list[Seen], factor: complex) -> Goal:
+        """The integers nearest in moves."""
+        here = self._values(self.base, factor)
+        slopes = self._slopes(changed, factor)
+        steps, rest = self._lattice(factor)
+        inverse = np.linalg.pinv(slopes, rcond=1e-9)
+        weighted = inverse @ steps
+        centre = np.linalg.lstsq(weighted, inverse @ (here - rest), rcond=None)[0]
+        z, _ = nearest_integers(
+            np.asarray(weighted.T @ weighted, dtype=float), np.asarray(centre, dtype=float)
+        )
+        wanted = steps @ z + rest
+        moves = inverse @ (wanted - here)
+        cost = float(moves @ moves + self._cost_of_scale(factor))
+        e = len(self.kept)
+        return Goal(factor, wanted[:e] + 1j * wanted[e : 2 * e], wanted[2 * e :], cost)
+
+    def _lattice(self, factor: complex) -> tuple[Floats, Floats]:
+        """(equations, integers) and (equations,): the admissible values are steps @ z + rest."""
+        e, columns = len(self.kept), []
+        depths = len(self.lines) if self.line is not None else 0
+        for i in range(e):
+            units = [self.divisor[i], self.divisor[i] * self.zeta]
+            if self.aligned[i] and self.line is not None:
+                towards = factor * self.base.image[self.kept[i]] / self.line.step
+                turn = round(float(np.angle(towards)) / self.chart.quantum)
+                units = [self.line.step * self.zeta**turn]
+            for unit in units:
+                column = np.zeros(2 * e + depths)
+                column[i], column[e + i] = complex(unit).real, complex(unit).imag
+                columns.append(column)
+        rest = np.zeros(2 * e + depths)
+        for i in range(depths):
+            assert self.line is not None
+            column = np.zeros(2 * e + depths)
+            column[2 * e + i] = self.line.period
+            columns.append(column)
+            rest[2 * e + i] = self.line.first
+        return np.stack(columns, axis=1), rest
+
+    def solve(self, progress: Progress = no_progress) -> Closed:
+        """Raises ConvergenceError where it does not close."""
+        chart = self.chart
+        changed = self._jacobian()
+        goal = self.start(changed)
+        wanted = np.concatenate([goal.image.real, goal.image.imag, goal.depth])
+        factor, x, seen = goal.factor, np.zeros(chart.unknowns), self.base
+        slopes = self._slopes(changed, factor)
+        off = wanted - self._values(seen, factor)
+        best, steps, s = float(np.abs(off).max()), 0, 2 * len(chart.cones)
+        for _ in range(STEPS):
+            if best <= DONE:
+                break
+            d = np.linalg.lstsq(slopes, off, rcond=1e-9)[0]
+            stride = float(np.hypot(d[0:s:2], d[1:s:2]).max())
+            d *= min(1.0, STRIDE / max(stride, 1e-300))
+            new_x, new_factor = x + d[:-2], factor * complex(np.exp(1j * TURN * d[-2] + SCALE * d[-1]))
+            new_seen = chart.at(new_x)
+            new_off = wanted - self._values(new_seen, new_factor)
+            slopes = slopes + np.outer(off - new_off - slopes @ d, d) / (d @ d)  # Broyden 1965
+            residual = float(np.abs(new_off).max())
+            progress(0.5, f"singularities close to {residual:.1e} cells")
+            if residual > 0.5 * best and best <= ACCEPTED:
+                break
+            steps += 1
+            x, factor, seen, off, best = new_x, new_factor, new_seen, new_off, residual
+        every = factor * seen.image
+        motion = near_lattice(every, self.order)
+        residual = max(best, float(np.abs(every - as_complex(motion, self.order)).max()))
+        if residual > ACCEPTED:
+            raise ConvergenceError(
+                f"The singularities could not be moved so that the pattern closes: {residual:.1e} cells are "
+                "left. Another size of the cells or another number of singularities may do."
+            )
+        w = s + 2 * len(chart.waves)
+        dipole = float(np.hypot(x[s:w:2], x[s + 1 : w : 2]).max(initial=0.0)) * DIPOLE
+        stretch = STRETCH * float(x[-1]) if chart.slope is not None else 0.0
+        moves = np.hypot(x[0:s:2], x[1:s:2])
+        return Closed(seen, factor, -factor * seen.center, motion, moves, dipole, stretch, residual, steps)

@@ -1,0 +1,214 @@
+"""Log scale factors as a linear function of singularities and loop curvatures (Soliman, Slepčev, Crane 2018;
+Springborn, Schröder, Pinkall 2008, section 5).
+
+On a surface with a flat metric, Δu = −curvature is linear. The discrete map is so up to a few per cent, so
+its Hessian at the solution without singularities tells what any of them would do.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.spatial import cKDTree
+
+from hexwrap_solver.arrays import Bools, Floats, Ints
+from hexwrap_solver.conformal.energy import Energy
+from hexwrap_solver.conformal.newton import minimise
+from hexwrap_solver.conformal.types import Targets
+from hexwrap_solver.linalg.factor import Factorisation
+from hexwrap_solver.singularities.types import Rules
+from hexwrap_solver.surface.types import Surface
+
+#: The surface is seen in about so many patches: u is smooth, and a patch is as large as a cell or so.
+PATCHES = 1200
+#: Right-hand sides solved at a time.
+BLOCK = 128
+
+
+@dataclass(frozen=True)
+class Model:
+    """Mean u of every patch: reference + response @ k + loop_response @ dK.
+
+    seat: (q,) mesh vertices on which a singularity may stand. place: (q, 3). weight: (p,) the patches'
+    shares of the area. reference: (p,). response: (p, q), per k = 1. loop_response: (p, f), per quantum
+    more on each free loop but the first, which takes what is left. free: indices of the free loops. loops:
+    per loop, its curvature in quanta at the reference. total: Σ k wanted where no loop can take a rest,
+    None elsewhere. turn: (q,) for two straight loops on a tube: where seats stand around it, in turns; Σ
+    k·turn quanta is how far the second loop is turned against the first.
+    """
+
+    seat: Ints
+    place: Floats
+    weight: Floats
+    reference: Floats
+    response: Floats
+    loop_response: Floats
+    free: tuple[int, ...]
+    loops: tuple[int, ...]
+    total: int | None
+    turn: Floats | None = None
+
+
+def vertex_areas(surface: Surface) -> Floats:
+    """(n,) a third of the triangles around each."""
+    a, b, c = (surface.vertices[corner] for corner in surface.faces.T)
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6
+    return np.asarray(np.bincount(surface.faces.ravel(), np.repeat(area, 3), len(surface.vertices)))
+
+
+def targets(
+    surface: Surface,
+    ends: tuple[str, ...],
+    loops: tuple[int, ...],
+    quantum: float,
+    vertex: Ints,
+    index: Ints,
+    background: float = 0.0,
+    angles: Floats | None = None,
+) -> Targets:
+    """Cone angles at vertices, curvatures in quanta on loops; background: further curvature, spread evenly
+    over the area. angles: (n,) or more, of loops whose ends are "angles"."""
+    n = len(surface.vertices)
+    angle, tie = np.full(n, 2 * np.pi), np.full(n, -1, dtype=np.int64)
+    tie_angle: list[float] = []
+    if background:
+        share = vertex_areas(surface)
+        angle -= background * share / share.sum()
+    angle[vertex] -= quantum * index
+    for loop, end, curvature in zip(surface.loops, ends, loops, strict=True):
+        angle[loop] -= np.pi if end != "angles" or angles is None else 2 * np.pi - angles[loop]
+        if end == "free":
+            tie[loop] = len(tie_angle)
+            tie_angle.append(len(loop) * np.pi - curvature * quantum)
+    return Targets(angle, tie, np.array(tie_angle))
+
+
+def reference_loops(surface: Surface, rules: Rules) -> tuple[int, ...]:
+    """Curvatures in quanta without singularities: a disk has 2π, an annulus none, and each further opening
+    turns back by 2π; those of loops that are not free are what they are."""
+    ends, turns = rules.ends, round(2 * np.pi / rules.quantum)
+    fixed = [
+        0 if rules.angles is None else round(float((np.pi - rules.angles[loop]).sum()) / rules.quantum)
+        for loop in surface.loops
+    ]
+    free = [end == "free" for end in ends]
+    if len(ends) == 1:
+        return (turns if free[0] else fixed[0],)
+    length = [
+        float(np.linalg.norm(np.diff(surface.vertices[loop], axis=0), axis=1).sum()) for loop in surface.loops
+    ]
+    longest = np.argsort(-np.array(length), kind="stable")[:2]
+    return tuple((0 if i in longest else -turns) if free[i] else fixed[i] for i in range(len(ends)))
+
+
+def linear_model(
+    surface: Surface, rules: Rules, turn: Floats | None = None, seats: Ints | None = None
+) -> Model:
+    """turn: (n,) see Model. seats: vertices that singularities may stand on; None: as the rules allow. One
+    nonlinear solution without singularities, one factorisation, and a solve for every seat."""
+    turns = round(2 * np.pi / rules.quantum)
+    free = tuple(i for i, end in enumerate(rules.ends) if end == "free")
+    loops = reference_loops(surface, rules)
+    rest = turns * (2 - len(rules.ends)) - sum(loops)
+    none = np.zeros(0, dtype=np.int64)
+    area = vertex_areas(surface)
+    background = rest * rules.quantum if not free else 0.0
+    wanted = targets(surface, rules.ends, loops, rules.quantum, none, none, background, rules.angles)
+    energy = Energy(surface, wanted)
+    u, factor = _reference(energy)
+    patch, seat = _patches(surface, area)
+    weight = np.bincount(patch, area)
+    share = csr_array((area / weight[patch], (patch, np.arange(len(patch)))), shape=(len(seat), len(patch)))
+
+    def mean(values: Floats) -> Floats:
+        return np.asarray(share @ values)
+
+    seats = seat[_allowed(surface, seat, rules)] if seats is None else seats
+    shift = np.zeros(len(seat))
+    if not free:  # a singularity takes its curvature from everywhere
+        shift = mean(energy.scale_of(factor.solve(energy.reduce(area / area.sum()))))
+    response = np.empty((len(seat), len(seats)))
+    for begin in range(0, response.shape[1], BLOCK):
+        vertices = seats[begin : begin + BLOCK]
+        response[:, begin : begin + BLOCK] = mean(_scales(energy, factor, energy.dof[vertices]))
+    response -= shift[:, None]
+    ties = np.arange(energy.n_dof - max(len(free) - 1, 0), energy.n_dof)
+    loop_response = mean(_scales(energy, factor, ties))
+    return Model(
+        seats,
+        surface.vertices[seats],
+        weight / weight.sum(),
+        mean(u),
+        rules.quantum * response,
+        rules.quantum * loop_response,
+        free,
+        loops,
+        None if free else rest,
+        None if turn is None else turn[seats],
+    )
+
+
+def _reference(energy: Energy) -> tuple[Floats, Factorisation]:
+    """u without singularities and the factorised Hessian there; where triangles would have to be flipped, one
+    Newton step on the surface's own metric: with smooth surfaces, u is linear anyway."""
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        found = minimise(energy)
+    holds = found.converged and not found.broken
+    corners = found.corners if holds else energy.corners(np.zeros(energy.n))
+    factor = Factorisation(energy.points, energy.rows, energy.columns)
+    diagonal, off = energy.hessian(corners)
+    factor.factorise(diagonal + (0.0 if holds else 1e-12 * np.abs(diagonal).max()), off)
+    if holds:
+        return found.u, factor
+    return energy.scale_of(factor.solve(-energy.gradient(corners))), factor
+
+
+def _scales(energy: Energy, factor: Factorisation, dof: Ints) -> Floats:
+    """(n, k) u when one unit of curvature goes to each of the unknowns (−1: the pinned one, nothing)."""
+    right = np.zeros((energy.n_dof, len(dof)))
+    inside = np.flatnonzero(dof >= 0)
+    right[dof[inside], inside] = 1.0
+    solved = factor.solve(right)
+    return np.asarray(np.concatenate([np.zeros((1, len(dof))), solved])[energy.dof + 1])
+
+
+def _patches(surface: Surface, area: Floats) -> tuple[Ints, Ints]:
+    """(n,) patch of each vertex, and (p,) the vertex in its middle; the same whatever the numbering."""
+    vertices = surface.vertices
+    if len(vertices) <= PATCHES:
+        middle = np.lexsort(vertices.T)
+        return np.argsort(middle), middle
+    size = float(np.sqrt(area.sum() / PATCHES))
+    low = vertices.min(axis=0)
+    for _ in range(4):  # a surface meets more cubes than squares of its size
+        box = np.floor((vertices - low) / size).astype(np.int64)
+        _, cube, count = np.unique(box, axis=0, return_inverse=True, return_counts=True)
+        size *= float(np.sqrt(len(count) / PATCHES))
+    cube = cube.ravel()
+    off = np.linalg.norm(vertices - _means(vertices, cube, area)[cube], axis=1)
+    order = np.lexsort((*vertices.T, off, cube))
+    first = np.flatnonzero(np.diff(cube[order], prepend=-1))
+    middle = order[first]
+    middle = middle[np.lexsort(vertices[middle].T)]
+    return np.asarray(cKDTree(vertices[middle]).query(vertices)[1], dtype=np.int64), middle
+
+
+def _means(points: Floats, group: Ints, weight: Floats) -> Floats:
+    total = np.maximum(np.bincount(group, weight), 1e-300)
+    return np.stack([np.bincount(group, weight * x) / total for x in points.T], axis=1)
+
+
+def _allowed(surface: Surface, seat: Ints, rules: Rules) -> Bools:
+    """Which seats the rules leave."""
+    place = surface.vertices[seat]
+    allowed = np.ones(len(seat), dtype=bool)
+    for loop in surface.loops:
+        allowed &= cKDTree(surface.vertices[loop]).query(place)[0] >= rules.from_loops * rules.cell
+        allowed &= ~np.isin(seat, loop)
+    if rules.away is not None and len(rules.away):
+        allowed &= cKDTree(rules.away).query(place)[0] >= rules.from_away * rules.cell
+    if rules.only is not None and len(rules.only):
+        allowed &= cKDTree(rules.only).query(place)[0] <= rules.cell
+    return allowed

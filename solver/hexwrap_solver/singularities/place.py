@@ -1,0 +1,140 @@
+"""Where singularities stand: those asked for, or as many as pay."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from hexwrap_solver.arrays import Floats, Ints
+from hexwrap_solver.errors import SingularitiesError
+from hexwrap_solver.singularities.linear import linear_model
+from hexwrap_solver.singularities.search import Search, State, curve
+from hexwrap_solver.singularities.types import Proposal, Rules, SingularityAt
+from hexwrap_solver.surface.types import Surface
+
+#: Share of the area that one more singularity must be worth, and the part of what is uncovered without any
+#: that all of them together must save.
+WORTH, CLEARLY = 0.002, 0.25
+
+
+@dataclass(frozen=True)
+class Placing:
+    """proposals: the best with each number of singularities that is possible, ascending. chosen: index of
+    the one to take."""
+
+    proposals: tuple[Proposal, ...]
+    chosen: int
+
+    @property
+    def proposal(self) -> Proposal:
+        return self.proposals[self.chosen]
+
+
+def place(
+    surface: Surface, rules: Rules, count: int | Literal["auto"] = "auto", turn: Floats | None = None
+) -> Placing:
+    """The whole curve over the number of singularities, up to ``rules.most``, and the number to take: with
+    "auto" as many as pay, else at most ``count``, whatever leaves least uncovered.
+
+    turn: see ``linear.Model``. Raises SingularitiesError where no number is possible.
+    """
+    proposals = curve(Search(linear_model(surface, rules, turn), rules))
+    if not proposals:
+        raise SingularitiesError(
+            f"No {rules.most} singularities or fewer can make the angles of this surface add up, "
+            f"{_told(rules)}, and keep the distances asked for: allow more."
+        )
+    return Placing(tuple(proposals), _choice(proposals, count))
+
+
+def _choice(proposals: list[Proposal], count: int | Literal["auto"]) -> int:
+    uncovered = np.array([one.uncovered for one in proposals])
+    number = np.array([one.count for one in proposals])
+    if count != "auto":
+        possible = np.flatnonzero(number <= count)
+        if not len(possible):
+            raise SingularitiesError(
+                f"At most {count} singularities are asked for, but this surface takes at least {number[0]} "
+                "(Gauss–Bonnet): ask for so many, or give an end of the surface the freedom to turn.",
+                field=("singularities", "count"),
+            )
+        return int(possible[np.argmin(uncovered[possible])])
+    best = int(np.argmin(uncovered + WORTH * number))
+    return best if uncovered[best] <= (1 - CLEARLY) * uncovered[0] else 0
+
+
+def given(surface: Surface, rules: Rules, listed: tuple[SingularityAt, ...]) -> Proposal:
+    """The singularities that are listed, with the loop curvatures that suit them best.
+
+    Raises SingularitiesError: places that cannot be used, indices that do not add up.
+    """
+    index = np.array([one.index for one in listed], dtype=np.int64)
+    vertex = _vertices(surface, listed)
+    search = Search(linear_model(surface, rules, seats=vertex), rules)
+    state = State.of([(i, int(k)) for i, k in enumerate(index)], (0,) * max(len(search.model.free) - 1, 0))
+    if not search.complete(state):
+        raise SingularitiesError(
+            f"The indices add up to {int(index.sum())}, but {_told(rules)}, they must add up to "
+            f"{search.model.total} (Gauss–Bonnet): add singularities of the other sign, or give an end the "
+            "freedom to turn (boundary.mode isometric).",
+            vertices=surface.input_vertex[vertex],
+            field=("singularities", "at"),
+            data={"sum": int(index.sum()), "wanted": search.model.total},
+        )
+    return search.proposal(search.with_loops(state))
+
+
+def _told(rules: Rules) -> str:
+    return (
+        f"the ends of the surface being {' and '.join(rules.ends)}"
+        if rules.ends
+        else "the surface being closed"
+    )
+
+
+def _vertices(surface: Surface, listed: tuple[SingularityAt, ...]) -> Ints:
+    """(k,) mesh vertices of the list, all checked."""
+    nothing = np.zeros(0, dtype=np.int64)
+    inner = np.setdiff1d(np.arange(len(surface.vertices)), np.concatenate([nothing, *surface.loops]))
+    tree = cKDTree(surface.vertices[inner])
+    found: list[int] = []
+    for i, one in enumerate(listed):
+        if one.vertex is not None:
+            vertex = _inside(surface, inner, i, one.vertex)
+        else:
+            vertex = int(inner[tree.query(np.array(one.point, dtype=float))[1]])
+        if vertex in found:
+            raise _refused(
+                i,
+                "vertex" if one.point is None else "point",
+                f"Singularity {i} stands where singularity {found.index(vertex)} does: list each place once.",
+                (int(surface.input_vertex[vertex]),),
+            )
+        found.append(vertex)
+    return np.array(found, dtype=np.int64)
+
+
+def _inside(surface: Surface, inner: Ints, i: int, sent: int) -> int:
+    """The mesh vertex of a sent one."""
+    if sent >= len(surface.vertex_of_input):
+        last = len(surface.vertex_of_input) - 1
+        raise _refused(
+            i, "vertex", f"Singularity {i} names vertex {sent}, but only vertices 0 to {last} were sent."
+        )
+    vertex = int(surface.vertex_of_input[sent])
+    if vertex not in inner:
+        raise _refused(
+            i,
+            "vertex",
+            f"Singularity {i} stands at vertex {sent}, which is not inside the surface: choose one at least "
+            "two cells away from its boundary.",
+            (sent,),
+        )
+    return vertex
+
+
+def _refused(i: int, name: str, sentence: str, vertices: tuple[int, ...] = ()) -> SingularitiesError:
+    return SingularitiesError(sentence, vertices=vertices, field=("singularities", "at", int(i), name))

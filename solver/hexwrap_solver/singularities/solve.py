@@ -1,0 +1,347 @@
+"""The map with singularities: where they stand, and the exact map with them (beyond the paper)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from hexwrap_solver.arrays import Floats, Ints, Progress, no_progress
+from hexwrap_solver.conformal import conformal_map
+from hexwrap_solver.conformal.corners import asked_angles
+from hexwrap_solver.conformal.layout import lay_out
+from hexwrap_solver.conformal.net import Net
+from hexwrap_solver.conformal.types import QUANTA, BoundaryCondition, Cones, ConformalMap, Fitted
+from hexwrap_solver.errors import ConvergenceError, NotAdaptedError
+from hexwrap_solver.pattern.lattice import LATTICES, Lattice
+from hexwrap_solver.pattern.place.placement import edge_angle, is_straight
+from hexwrap_solver.pattern.place.rows import rows_along
+from hexwrap_solver.pattern.place.size import (
+    DEFAULT_ON_NETS,
+    face_areas,
+    wanted_edge,
+    width_per_cell,
+)
+from hexwrap_solver.pattern.types import PatternSettings
+from hexwrap_solver.singularities.close import Chart, Closed, Closing, Line
+from hexwrap_solver.singularities.drag import refined
+from hexwrap_solver.singularities.linear import vertex_areas
+from hexwrap_solver.singularities.place import Placing, given, place
+from hexwrap_solver.singularities.types import End, Proposal, Rules, SingularitySettings
+from hexwrap_solver.surface.types import Surface
+
+#: Size classes for which singularities are placed where every panel may have its own size.
+SIZES = 11
+#: Numbers of singularities tried where as many as pay are asked for, and how many more than the topology
+#: asks for.
+MOST, MORE = 8, 2
+#: The size of the cells may change by this share, and by this one where a length is asked for.
+FREE, ASKED = 0.05, 0.015
+#: Where the least moves that close are longer than this, in cells, singularities are seated anew, so many
+#: times.
+FAR, AGAIN = 0.6, 2
+#: Sums of listed angles this near to a multiple of the quantum are one, radians.
+NEARLY = 1e-3
+
+
+@dataclass(frozen=True)
+class Frame:
+    """What the singularities of one surface are chosen and closed for.
+
+    width: of a cell, which is that of the surface as of the domain. line: for straight loops that are to be
+    lattice lines; aligned: which ones. turn: (n,) and slope: (m, 3) of two straight ends, see
+    ``linear.Model`` and ``close.Chart``.
+    """
+
+    lattice: Lattice
+    rules: Rules
+    width: float
+    line: Line | None
+    aligned: tuple[bool, ...]
+    turn: Floats | None
+    free_scale: float
+
+
+def needs_singularities(surface: Surface, boundary: BoundaryCondition) -> bool:
+    """Whether no map without any can have what is asked for at the boundary: of a closed surface, and where
+    straight and listed angles add up to no surface without."""
+    angles = [angle for angle in asked_angles(surface, boundary) if angle is not None]
+    if len(angles) < len(surface.loops):
+        return False
+    missing = 2 * np.pi * (2 - len(surface.loops)) - sum(float((np.pi - angle).sum()) for angle in angles)
+    quantum = QUANTA.get(boundary.quantum, np.pi / 3)
+    listed = boundary.mode == "angles" or any(one.mode == "angles" for one in boundary.loops)
+    return not listed and abs(missing) > quantum / 2
+
+
+def frame_of(
+    surface: Surface,
+    boundary: BoundaryCondition,
+    settings: SingularitySettings,
+    pattern: PatternSettings | None,
+    sizes: int | None,
+) -> Frame:
+    """Raises RequestError."""
+    pattern = pattern or PatternSettings()
+    if pattern.rotation in ("u", "v"):
+        pattern = replace(pattern, rotation="edge")
+    lattice = LATTICES[pattern.kind]
+    ends, angles = _ends(surface, boundary, lattice)
+    angle = edge_angle(lattice, pattern)
+    straight = [end == "straight" for end in ends]
+    wanted = {"none": 0, "first": 1, "both": 2}[pattern.align]
+    aligned = tuple(on and i < wanted and is_straight(lattice, angle) for i, on in enumerate(straight))
+    tube = conformal_map(surface, BoundaryCondition("straight")) if len(surface.loops) == 2 else None
+    width = _width(surface, lattice, pattern, angle, tube)
+    most = max(settings.count if isinstance(settings.count, int) else MOST, 1)
+    if "free" not in ends:
+        missing = 6 * (2 - len(ends)) if lattice.order == 6 else 4 * (2 - len(ends))
+        missing -= sum(round(float((np.pi - angles[loop]).sum()) / lattice.quantum) for loop in surface.loops)
+        most = max(most, abs(missing) + MORE) if settings.count in (None, "auto") else most
+    rules = Rules(
+        lattice.quantum,
+        width,
+        sizes or SIZES,
+        ends,
+        most=most,
+        from_loops=settings.from_boundary,
+        angles=angles if "angles" in ends else None,
+    )
+    turn = None
+    if tube is not None and all(aligned):
+        turn = tube.uv.real / tube.circumference
+    free_scale = ASKED if pattern.edge_length is not None else FREE
+    line = _line(lattice, angle, pattern.boundary) if any(aligned) else None
+    return Frame(lattice, rules, width, line, aligned, turn, free_scale)
+
+
+@dataclass(frozen=True)
+class Seated:
+    """What was chosen, and what for."""
+
+    frame: Frame
+    placing: Placing
+
+
+def seated(
+    surface: Surface,
+    boundary: BoundaryCondition,
+    settings: SingularitySettings,
+    pattern: PatternSettings | None,
+    sizes: int | None,
+    progress: Progress = no_progress,
+) -> Seated:
+    """Where singularities are to stand. pattern, sizes: None for the default. Raises RequestError."""
+    frame = frame_of(surface, boundary, settings, pattern, sizes)
+    progress(0.3, "placing singularities")
+    return Seated(frame, chosen(surface, frame, settings))
+
+
+def _ends(surface: Surface, boundary: BoundaryCondition, lattice: Lattice) -> tuple[tuple[End, ...], Floats]:
+    """What each loop is, and (n,) the angles of those that are not free."""
+    target = np.full(len(surface.vertices), np.pi)
+    ends: list[End] = []
+    for i, (loop, angles) in enumerate(zip(surface.loops, asked_angles(surface, boundary), strict=True)):
+        if angles is None:
+            ends.append("free")
+        elif (angles == np.pi).all():
+            ends.append("straight")
+        else:
+            curvature = float((np.pi - angles).sum())
+            nearest = round(curvature / lattice.quantum) * lattice.quantum
+            if abs(curvature - nearest) > NEARLY:
+                raise NotAdaptedError(
+                    f"The angles listed on loop {i} make it turn by {curvature:.6f} rad; with singularities "
+                    f"that must be a multiple of the quantum, {lattice.quantum:.6f} rad; the nearest is "
+                    f"{nearest:.6f}."
+                )
+            target[loop] = angles + (curvature - nearest) / len(loop)
+            ends.append("angles")
+    return tuple(ends), target
+
+
+def _width(
+    surface: Surface, lattice: Lattice, pattern: PatternSettings, angle: float, tube: ConformalMap | None
+) -> float:
+    """Of a cell: the shortest translation of the lattice, model units."""
+    if pattern.edge_length is not None:
+        edge = pattern.edge_length
+    elif tube is not None:
+        on_surface, in_domain = face_areas(tube)  # as many cells as without singularities
+        edge = wanted_edge(tube, lattice, pattern, angle) * float(np.sqrt(on_surface.sum() / in_domain.sum()))
+    else:
+        area = float(vertex_areas(surface).sum())
+        if pattern.around is None:
+            edge = float(np.sqrt(area * lattice.edge**2 / (DEFAULT_ON_NETS * lattice.cell_area)))
+        else:
+            rims = [surface.vertices[np.append(loop, loop[0])] for loop in surface.loops]
+            lengths = [float(np.linalg.norm(np.diff(rim, axis=0), axis=1).sum()) for rim in rims]
+            girth = max(lengths, default=float(np.sqrt(np.pi * area)))
+            edge = girth / (pattern.around * width_per_cell(lattice, angle))
+    return edge * abs(complex(lattice.position(lattice.basis[0]))) / lattice.edge
+
+
+def _line(lattice: Lattice, angle: float, boundary: str) -> Line:
+    e1 = complex(lattice.position(lattice.basis[0]))
+    along = complex(lattice.position(lattice.steps[0])) * np.exp(-1j * angle)
+    step = complex(lattice.position(lattice.shortest_towards(along))) / e1
+    rows = rows_along(lattice, angle, boundary)
+    return Line(step, rows.first / abs(e1), rows.period / abs(e1))
+
+
+def chosen(surface: Surface, frame: Frame, settings: SingularitySettings) -> Placing:
+    """Where singularities are to stand. Raises SingularitiesError."""
+    if settings.at:
+        return Placing((given(surface, frame.rules, settings.at),), 0)
+    count: int | Literal["auto"] = "auto" if settings.count is None else settings.count
+    return place(surface, frame.rules, count, frame.turn)
+
+
+def closed_map(
+    surface: Surface,
+    frame: Frame,
+    placing: Placing,
+    boundary: BoundaryCondition,
+    progress: Progress = no_progress,
+) -> ConformalMap:
+    """The map with the singularities that were chosen, moved until the pattern closes up. Without any: the
+    map for the boundary alone. Raises ConvergenceError."""
+    proposal = placing.proposal
+    if not proposal.count:
+        return conformal_map(surface, boundary, progress)
+    chart, found = _closed(surface, frame, proposal, progress)
+    return _as_map(frame, chart, found, placing, surface)
+
+
+def _closed(surface: Surface, frame: Frame, proposal: Proposal, progress: Progress) -> tuple[Chart, Closed]:
+    """Seated anew at the nearest vertices where the first moves would be too long."""
+    failed: ConvergenceError | None = None
+    vertex, index = _ordered(proposal)
+    finer = refined(surface, surface.vertices[vertex], frame.width)
+    slope = None
+    if frame.turn is not None:
+        corners = conformal_map(finer, BoundaryCondition("straight")).corners()
+        edge = np.roll(corners, -1, axis=1) - corners
+        slope = (edge.imag / np.abs(edge)) ** 2
+    angles = None
+    if frame.rules.angles is not None:
+        angles = np.concatenate([frame.rules.angles, np.zeros(len(finer.vertices) - len(frame.rules.angles))])
+    for _ in range(AGAIN + 1):
+        chart = Chart(
+            finer,
+            vertex,
+            index,
+            proposal.loops,
+            frame.rules.ends,
+            frame.lattice.quantum,
+            frame.width,
+            slope,
+            angles,
+        )
+        closing = Closing(chart, frame.width, frame.line, frame.free_scale, frame.aligned)
+        try:
+            found = closing.solve(progress)
+            if found.moves.max() <= FAR:
+                return chart, found
+        except ConvergenceError as error:
+            failed = error
+            found = None
+        if found is None:
+            break
+        best = chart, found
+        seats = _nearest_inside(finer, found.seen.surface.vertices[vertex])
+        if (seats == vertex).all():
+            return best
+        vertex = seats
+    if failed is not None:
+        raise failed
+    return best
+
+
+def _ordered(proposal: Proposal) -> tuple[Ints, Ints]:
+    """Vertices and indices; first, where the cut begins, one with |k| = 1 if there is any."""
+    order = np.argsort(np.abs(proposal.index), kind="stable")
+    return proposal.vertex[order], proposal.index[order]
+
+
+def _nearest_inside(surface: Surface, places: Floats) -> Ints:
+    """(k,) vertices nearest to places on the surface."""
+    seen = surface.tree.nearest(places)
+    corner = surface.faces[seen.face, np.argmax(seen.barycentric, axis=1)]
+    return np.asarray(corner)
+
+
+def _as_map(frame: Frame, chart: Chart, found: Closed, placing: Placing, before: Surface) -> ConformalMap:
+    seen, quantum = found.seen, frame.lattice.quantum
+    surface = seen.surface
+    sums = chart.energy.angle_sums(seen.metric)
+    curvature = np.concatenate(
+        [np.rint([(np.pi - sums[loop]).sum() / quantum for loop in surface.loops]), chart.index]
+    )
+    layout = lay_out(surface, seen.lengths, seen.metric, curvature * quantum, chart.cones)
+    net = layout.domain
+    assert isinstance(net, Net)
+    here, there = found.factor * seen.place[:, 0] + found.shift, net.corners[0]
+    factor = complex((here[1] - here[0]) / (there[1] - there[0]))
+    wanted = before.vertices[_ordered(placing.proposal)[0]]
+    moved = np.linalg.norm(surface.vertices[chart.cones] - wanted, axis=1)
+    return ConformalMap(
+        surface=surface,
+        log_scale=seen.u,
+        domain=net,
+        boundary_angles=tuple(sums[loop] for loop in surface.loops),
+        iterations=found.steps,
+        residual=seen.residual,
+        inserted=0,
+        closing_error=layout.closing_error,
+        cones=Cones(chart.cones, chart.index, quantum, moved),
+        fitted=Fitted(frame.lattice.order, factor, complex(here[0] - factor * there[0])),
+        notes=tuple(_notes(frame, found, placing)),
+    )
+
+
+#: What cells with k sides fewer are called.
+NAMES = {
+    "hex": {1: "pentagon", -1: "heptagon", 2: "quadrilateral", -2: "octagon"},
+    "quad": {1: "triangle", -1: "pentagon", 2: "digon", -2: "hexagon"},
+    "triangle": {
+        1: "vertex of five triangles",
+        -1: "vertex of seven triangles",
+        2: "vertex of four triangles",
+        -2: "vertex of eight triangles",
+    },
+}
+
+
+def told(kind: str, index: Ints) -> str:
+    """Such as "2 pentagons and 1 heptagon"."""
+    parts = []
+    for k in (1, -1, 2, -2):
+        number = int((index == k).sum())
+        name = NAMES[kind][k]
+        plural = name.replace("vertex", "vertices") if name.startswith("vertex") else name + "s"
+        if number:
+            parts.append(f"{number} {name if number == 1 else plural}")
+    return (
+        ", ".join(parts[:-1]) + (" and " if len(parts) > 1 else "") + parts[-1]
+        if parts
+        else "no singularities"
+    )
+
+
+def _notes(frame: Frame, found: Closed, placing: Placing) -> Iterator[str]:
+    proposal, kind = placing.proposal, frame.lattice.kind
+    yield (
+        f"{told(kind, proposal.index)}: moved by at most {found.moves.max():.2f} cells, so that the pattern "
+        f"closes around each to {found.residual:.0e} cells."
+    )
+    none = placing.proposals[0]
+    if len(placing.proposals) > 1 and none.count == 0:
+        yield (
+            f"In {frame.rules.sizes} sizes, the sizes alone leave about {proposal.uncovered:.1%} uncovered, "
+            f"without singularities {none.uncovered:.1%} (linear model)."
+        )
+    if found.stretch:
+        yield f"A uniform stretch by {abs(found.stretch):.2%} along the height makes both ends lattice lines."

@@ -1,0 +1,199 @@
+"""Meshes that come in parts: what hangs together, what is joined along open edges, what lies apart."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged
+from hexwrap_solver.surface.topology import face_graph, face_normals, half_edges
+from hexwrap_solver.surface.triangulate import triangulate
+from hexwrap_solver.surface.types import SentMesh, Triangles
+from hexwrap_solver.surface.weld import TOLERANCE, relabelled, weldings
+
+#: Open edges are divided again where a division has made new ones, at most so often.
+ROUNDS = 16
+
+
+@dataclass(frozen=True)
+class Piece:
+    """Faces that hang together across edges, ascending; loops: the number of their boundary curves.
+
+    rim: (k, 3) the vertices on these.
+    """
+
+    faces: Ints
+    loops: int
+    area: float
+    low: Floats
+    high: Floats
+    rim: Floats
+
+
+@dataclass(frozen=True)
+class Joint:
+    """What was joined: pairs of vertices, or vertices and edges, that were apart; the greatest distance and
+    where it was (3,)."""
+
+    count: int = 0
+    gap: float = 0.0
+    place: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def worse(self, other: Joint) -> Joint:
+        worst = max(self, other, key=lambda joint: joint.gap)
+        return Joint(self.count + other.count, worst.gap, worst.place)
+
+
+def pieces(mesh: SentMesh) -> list[Piece]:
+    """The pieces of a mesh whose equal vertices count as one, the largest first. Raises SurfaceError."""
+    triangles, polygon = triangulate(mesh.vertices, mesh.faces)
+    size = float(np.linalg.norm(np.ptp(mesh.vertices[triangles.ravel()], axis=0)))
+    welded = Triangles(mesh.vertices, triangles)
+    welded = relabelled(welded, weldings(welded, TOLERANCE * size)[0])
+    _, piece = connected_components(face_graph(welded.twin), directed=False)
+    # A quad may fall apart where one of its triangles has no area: the first triangle counts.
+    first = np.flatnonzero(np.diff(polygon, prepend=-1))
+    count = int(piece.max()) + 1
+    area = np.bincount(piece, np.linalg.norm(face_normals(mesh.vertices, triangles), axis=1) / 2, count)
+    rim = np.flatnonzero(welded.twin < 0)
+    start, end = (side[rim] for side in half_edges(welded.faces))
+    kept = start != end
+    rim, start, end = rim[kept], start[kept], end[kept]
+    n = len(mesh.vertices)
+    joined = coo_array((np.ones(len(rim), dtype=np.int8), (start, end)), shape=(n, n))
+    _, loop = connected_components(joined, directed=False)
+    found = []
+    by_piece = np.argsort(piece[first], kind="stable")
+    ends = np.searchsorted(piece[first][by_piece], np.arange(count + 1))
+    owner = piece[rim // 3]
+    order = np.argsort(owner, kind="stable")
+    rim_ends = np.searchsorted(owner[order], np.arange(count + 1))
+    for k in range(count):
+        own = order[rim_ends[k] : rim_ends[k + 1]]
+        faces = by_piece[ends[k] : ends[k + 1]]
+        if len(faces) == 0:
+            continue
+        points = mesh.vertices[triangles[first[faces]].ravel()]
+        found.append(
+            Piece(
+                faces,
+                len(np.unique(loop[start[own]])),
+                float(area[k]),
+                points.min(axis=0),
+                points.max(axis=0),
+                mesh.vertices[np.unique(start[own])],
+            )
+        )
+    return sorted(found, key=lambda piece: -piece.area)
+
+
+def only(mesh: SentMesh, faces: Ints) -> SentMesh:
+    """Those faces of the mesh; vertices keep their numbers."""
+    if len(faces) == mesh.faces.n_rows:
+        return mesh
+    keep = np.zeros(mesh.faces.n_rows, dtype=bool)
+    keep[faces] = True
+    values = mesh.faces.values[np.repeat(keep, mesh.faces.lengths)]
+    offsets = np.append(0, np.cumsum(mesh.faces.lengths[keep])).astype(np.int64)
+    return SentMesh(mesh.vertices, Ragged(values, offsets), mesh.normals)
+
+
+def together(meshes: Sequence[SentMesh]) -> tuple[SentMesh, Ints]:
+    """All of them as one, nothing joined, and which of them each face is from."""
+    if len(meshes) == 1:
+        return meshes[0], np.zeros(meshes[0].faces.n_rows, dtype=np.int64)
+    shift = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
+    values = np.concatenate([m.faces.values + k for m, k in zip(meshes, shift, strict=False)])
+    lengths = np.concatenate([mesh.faces.lengths for mesh in meshes])
+    normals = [mesh.normals for mesh in meshes if mesh.normals is not None]
+    whole = SentMesh(
+        np.concatenate([mesh.vertices for mesh in meshes]),
+        Ragged(values.astype(np.int64), np.append(0, np.cumsum(lengths)).astype(np.int64)),
+        np.concatenate(normals) if len(normals) == len(meshes) else None,
+    )
+    return whole, np.repeat(np.arange(len(meshes)), [mesh.faces.n_rows for mesh in meshes])
+
+
+def joined(mesh: SentMesh, tolerance: float) -> tuple[SentMesh, Ints, Joint]:
+    """The mesh with open edges closed that lie within the tolerance of each other, the face that each of its
+    faces comes from, and what was joined.
+
+    Vertices on open edges that lie within the tolerance of each other become one; then open edges are
+    divided at vertices on other open edges that lie on them. Raises SurfaceError.
+    """
+    triangles, polygon = triangulate(mesh.vertices, mesh.faces)
+    exact = Triangles(mesh.vertices, triangles)
+    size = float(np.linalg.norm(np.ptp(mesh.vertices[triangles.ravel()], axis=0)))
+    label = weldings(exact, min(TOLERANCE * size, tolerance))[0]
+    near = weldings(relabelled(exact, label), tolerance)[0][label]
+    moved = np.flatnonzero(near != label)
+    joint = Joint()
+    if len(moved):
+        apart = np.linalg.norm(mesh.vertices[moved] - mesh.vertices[near[moved]], axis=1)
+        worst = int(np.argmax(apart))
+        joint = Joint(len(moved), float(apart[worst]), _place(mesh.vertices[moved[worst]]))
+    faces, source, divided = _divided(mesh.vertices, near[triangles], polygon, tolerance)
+    if joint.count == 0 and divided.count == 0:
+        return mesh, np.arange(mesh.faces.n_rows), joint
+    if divided.count == 0:
+        values = near[np.asarray(mesh.faces.values, dtype=np.int64)]
+        whole = SentMesh(mesh.vertices, Ragged(values, mesh.faces.offsets), mesh.normals)
+        return whole, np.arange(mesh.faces.n_rows), joint
+    return SentMesh(mesh.vertices, Ragged.from_table(faces), mesh.normals), source, joint.worse(divided)
+
+
+def _place(point: Floats) -> tuple[float, float, float]:
+    x, y, z = point.tolist()
+    return x, y, z
+
+
+def _divided(vertices: Floats, faces: Ints, source: Ints, tolerance: float) -> tuple[Ints, Ints, Joint]:
+    """Triangles whose open edges are divided at open vertices that lie on them."""
+    joint = Joint()
+    for _ in range(ROUNDS):
+        twin = Triangles(vertices, faces).twin
+        start, end = half_edges(faces)
+        rim = np.flatnonzero((twin < 0) & (start != end))
+        h, v, apart = _on_edges(vertices, start[rim], end[rim], tolerance)
+        if len(h) == 0:
+            break
+        joint = joint.worse(Joint(len(h), float(apart.max()), _place(vertices[v[int(np.argmax(apart))]])))
+        h, one = rim[h], np.unique(rim[h] // 3, return_index=True)[1]  # one edge of a triangle at a time
+        h, v = h[one], v[one]
+        face, corner = h // 3, h % 3
+        a, b, c = (faces[face, (corner + k) % 3] for k in range(3))
+        first = np.stack([a, v, c], axis=1)
+        second = np.stack([v, b, c], axis=1)
+        faces = np.concatenate([faces, second])
+        faces[face] = first
+        source = np.concatenate([source, source[face]])
+    return faces, source, joint
+
+
+def _on_edges(vertices: Floats, start: Ints, end: Ints, tolerance: float) -> tuple[Ints, Ints, Floats]:
+    """Edges that an end of another lies on, one such vertex and its distance each; one edge per round."""
+    among = np.unique(np.concatenate([start, end]))
+    none = (start[:0], start[:0], vertices[:0, 0])
+    if len(among) == 0:
+        return none
+    a, along = vertices[start], vertices[end] - vertices[start]
+    length = np.linalg.norm(along, axis=1)
+    near = cKDTree(vertices[among]).query_ball_point(a + along / 2, length / 2 + tolerance)
+    counts = np.array([len(found) for found in near], dtype=np.int64)
+    edge = np.repeat(np.arange(len(start)), counts)
+    if counts.sum() == 0:
+        return none
+    v = among[np.concatenate([np.array(found, dtype=np.int64) for found in near])]
+    share = np.einsum("ij,ij->i", vertices[v] - a[edge], along[edge]) / np.maximum(length[edge] ** 2, 1e-300)
+    apart = np.linalg.norm(vertices[v] - a[edge] - share[:, None] * along[edge], axis=1)
+    margin = np.minimum(share, 1 - share) * length[edge]
+    hit = (apart <= tolerance) & (margin > tolerance) & (v != start[edge]) & (v != end[edge])
+    edge, v, apart = edge[hit], v[hit], apart[hit]
+    one: Bools = np.zeros(len(edge), dtype=bool)
+    one[np.unique(edge, return_index=True)[1]] = True
+    return edge[one], v[one], apart[one]

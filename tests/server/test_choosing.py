@@ -1,0 +1,431 @@
+"""Files with several objects: the one that is meant is taken, joined, told; the others can be named."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rhino3dm
+
+from hexwrap_server.cli.main import main
+from hexwrap_server.input.choose import Chosen, choose
+from hexwrap_server.input.readers.errors import NoObjectError, SeveralObjectsError, UnreadableFileError
+from hexwrap_server.input.surface_files import read_file, sent_surface
+from hexwrap_server.jobs.work import take_in
+from hexwrap_solver.surface import NurbsSurface, SentMesh, surface_from_mesh
+from hexwrap_solver.surface.brep import Brep
+from hexwrap_solver.surface.types import SurfaceSettings
+from tests.server.live import Live, running
+from tests.server.test_reading import obj, rhino_mesh
+from tests.solver.surface.shapes import mesh, triangles, tube
+
+CASES = Path(__file__).parents[3] / "shared" / "cases" / "rhino"
+VERTICES, QUADS = tube()
+
+
+class Model:
+    """A Rhino file on its way."""
+
+    def __init__(self, unit: str = "Meters") -> None:
+        self.file = rhino3dm.File3dm()
+        self.file.Settings.ModelUnitSystem = getattr(rhino3dm.UnitSystem, unit)
+        self.file.Settings.ModelAbsoluteTolerance = 0.001
+        self.layers: dict[str, int] = {}
+        self.layer("Default")
+
+    def layer(self, path: str, visible: bool = True, locked: bool = False) -> int:
+        if path not in self.layers:
+            layer = rhino3dm.Layer()
+            layer.Name = path.rpartition("::")[2]
+            layer.Visible, layer.Locked = visible, locked
+            above = path.rpartition("::")[0]
+            if above:
+                number = self.layer(above)
+                layer.ParentLayerId = next(x.Id for x in self.file.Layers if x.Index == number)
+            self.layers[path] = self.file.Layers.Add(layer)
+        return self.layers[path]
+
+    def add(
+        self, geometry: object, name: str = "", layer: str = "", mode: str = "Normal", **strings: str
+    ) -> Model:
+        self.file.Objects.Add(geometry, self.attributes(name, layer, mode, **strings))
+        return self
+
+    def attributes(
+        self, name: str = "", layer: str = "", mode: str = "Normal", **strings: str
+    ) -> rhino3dm.ObjectAttributes:
+        attributes = rhino3dm.ObjectAttributes()
+        attributes.Name = name
+        attributes.Mode = getattr(rhino3dm.ObjectMode, mode)
+        if layer:
+            attributes.LayerIndex = self.layer(layer)
+        for key, value in strings.items():
+            attributes.SetUserString(key, value)
+        return attributes
+
+    def block(self, name: str, *geometry: object) -> object:
+        plain = tuple(rhino3dm.ObjectAttributes() for _ in geometry)
+        self.file.InstanceDefinitions.Add(name, "", "", "", origin(), geometry, plain)
+        return next(d.Id for d in self.file.InstanceDefinitions if d.Name == name)
+
+    def bytes(self) -> bytes:
+        return base64.b64decode(self.file.Encode())
+
+    def choose(self, object: str | None = None, layer: str | None = None) -> Chosen:
+        return choose(read_file(self.bytes(), "a.3dm"), object, layer)
+
+
+def origin() -> rhino3dm.Point3d:
+    return rhino3dm.Point3d(0, 0, 0)
+
+
+def mesh_at(x: float = 0.0, scale: float = 1.0) -> rhino3dm.Mesh:
+    return rhino_mesh(VERTICES * scale + [x, 0, 0], QUADS.tolist())
+
+
+def cylinder(x: float = 0.0, radius: float = 1.0, capped: bool = False) -> rhino3dm.Brep:
+    circle = rhino3dm.Circle(rhino3dm.Point3d(x, 0, 0), radius)
+    return rhino3dm.Brep.CreateFromCylinder(rhino3dm.Cylinder(circle, 4.0), capped, capped)
+
+
+def plane(x: float, side: float, z: float = 0.0) -> rhino3dm.Mesh:
+    corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]) * side + np.array([x, 0, z])
+    return rhino_mesh(corners, [[0, 1, 2, 3]])
+
+
+def names(chosen: Chosen) -> list[str]:
+    return [found.name for found in chosen.used]
+
+
+def two() -> Model:
+    return Model().add(mesh_at(), "north", "Wall::Old").add(mesh_at(50), "south", "Wall::New")
+
+
+def test_a_lone_object_is_taken_without_a_word() -> None:
+    chosen = Model().add(mesh_at(), "tower").choose()
+    assert isinstance(chosen.geometry, SentMesh)
+    assert chosen.told == ()
+
+
+def test_the_only_tube_is_taken_and_told() -> None:
+    model = (
+        Model().add(mesh_at(), "tower").add(cylinder(30, capped=True), "context").add(plane(60, 500), "site")
+    )
+    chosen = model.choose()
+    assert names(chosen) == ["tower"]
+    (sentence,) = chosen.told
+    assert "Taken: 'tower' (mesh" in sentence
+    assert "'context' (closed polysurface" in sentence
+    assert "500 × 500 × 0 m" in sentence
+
+
+def test_several_that_could_be_meant_are_listed() -> None:
+    with pytest.raises(SeveralObjectsError, match=r"'north' \(mesh on layer Wall::Old, .*--object") as caught:
+        two().choose()
+    assert [row["name"] for row in caught.value.data["objects"]] == ["north", "south"]
+
+
+@pytest.mark.parametrize(
+    ("object", "layer", "found"),
+    [
+        ("north", None, "north"),
+        ("SOUTH", None, "south"),
+        ("n*", None, "north"),
+        ("?outh", None, "south"),
+        ("1", None, "south"),
+        (None, "Wall::Old", "north"),
+        (None, "new", "south"),
+        (None, "*::N*", "south"),
+        ("*th", "Old", "north"),
+    ],
+)
+def test_objects_and_layers_are_named(object: str | None, layer: str | None, found: str) -> None:
+    assert names(two().choose(object, layer)) == [found]
+
+
+def test_an_id_is_a_name() -> None:
+    content = read_file(two().bytes(), "a.3dm")
+    assert [found.name for found in choose(content, content.objects[1].id.upper()).used] == ["south"]
+
+
+def test_a_name_that_looks_like_a_number_goes_before_the_number() -> None:
+    model = Model().add(mesh_at(), "1").add(mesh_at(50), "south")
+    assert names(model.choose("1")) == ["1"]
+
+
+@pytest.mark.parametrize(("object", "layer"), [("east", None), (None, "Roof"), ("north", "New")])
+def test_names_that_nothing_has_are_told_with_what_there_is(object: str | None, layer: str | None) -> None:
+    with pytest.raises(NoObjectError, match=r"there are 'north' .* 'south'"):
+        two().choose(object, layer)
+
+
+@pytest.mark.parametrize("how", ["Hidden", "Locked", "off", "locked", "above"])
+def test_what_is_out_of_sight_counts_only_when_named(how: str) -> None:
+    model = Model()
+    model.layer("off", visible=False)
+    model.layer("locked", locked=True)
+    model.layer("off::above")
+    layer = {"off": "off", "locked": "locked", "above": "off::above"}.get(how, "")
+    mode = how if how in ("Hidden", "Locked") else "Normal"
+    model.add(mesh_at(50), "old", layer, mode)
+    with pytest.raises(NoObjectError, match=r"hidden, locked or on layers that are off.*'old'"):
+        model.choose()
+    model.add(mesh_at(), "new")
+    assert names(model.choose()) == ["new"]
+    assert names(model.choose("old")) == ["old"]
+
+
+def test_a_file_without_surfaces_names_what_it_holds() -> None:
+    line = rhino3dm.LineCurve(rhino3dm.Point3d(0, 0, 0), rhino3dm.Point3d(1, 0, 0))
+    with pytest.raises(UnreadableFileError, match="1 LineCurve"):
+        Model().add(line).choose()
+
+
+def test_strays_are_left_out_and_told_with_their_place() -> None:
+    stray = np.array([[500.0, 500, 0], [500.2, 500, 0], [500, 500.2, 0]])
+    n = len(VERTICES)
+    model = Model().add(rhino_mesh(np.vstack([VERTICES, stray]), [*QUADS.tolist(), [n, n + 1, n + 2]]))
+    chosen = model.choose()
+    assert isinstance(chosen.geometry, SentMesh)
+    assert len(surface_from_mesh(chosen.geometry).loops) == 2
+    assert "1 stray piece of 1 face" in chosen.told[0]
+    assert "(500.1, 500.1, 0)" in chosen.told[0]
+
+
+def parts(shift: float) -> Model:
+    """A tube in two meshes, the second moved."""
+    at = VERTICES[QUADS].mean(axis=1)
+    model = Model()
+    for name, kept, move in (("a", at[:, 0] > 0, 0.0), ("b", at[:, 0] <= 0, shift)):
+        model.add(rhino_mesh(VERTICES + np.array([move, 0, 0]), QUADS[kept].tolist()), name)
+    return model
+
+
+def test_meshes_whose_edges_meet_become_one() -> None:
+    chosen = parts(4e-4).choose()
+    assert isinstance(chosen.geometry, SentMesh)
+    assert names(chosen) == ["a", "b"]
+    assert len(surface_from_mesh(chosen.geometry).loops) == 2
+    assert "2 objects were joined along their edges: the greatest gap closed was 0.0004" in chosen.told[0]
+
+
+def test_edges_that_nearly_meet_are_told_with_where_and_how_far() -> None:
+    model = parts(4e-3)
+    with pytest.raises(SeveralObjectsError):
+        model.choose()
+    told = model.add(mesh_at(80), "tower").choose("[at]*").told
+    assert any("'tower'" in sentence for sentence in told)
+    ring = (
+        Model()
+        .add(mesh_at(), "tower")
+        .add(plane(VERTICES[:, 0].max() + 0.02, 0.5, VERTICES[:, 2].max()), "sill")
+    )
+    (nearly, _) = ring.choose().told
+    assert "'sill' comes within 0.02" in nearly or "was not joined" in nearly
+
+
+def test_surfaces_whose_edges_meet_become_one() -> None:
+    arcs = []
+    for start in (0.0, np.pi):
+        line = rhino3dm.LineCurve(
+            rhino3dm.Point3d(2 * np.cos(start), 2 * np.sin(start), 0),
+            rhino3dm.Point3d(2 * np.cos(start), 2 * np.sin(start), 5),
+        )
+        axis = rhino3dm.Line(origin(), rhino3dm.Point3d(0, 0, 1))
+        arcs.append(rhino3dm.RevSurface.Create(line, axis, 0.0, np.pi))
+    chosen = Model().add(arcs[0], "a").add(arcs[1], "b").choose()
+    assert isinstance(chosen.geometry, Brep)
+    assert names(chosen) == ["a", "b"]
+    assert "2 objects were joined" in chosen.told[0]
+
+
+def nested(*transforms: rhino3dm.Transform) -> SentMesh:
+    """A mesh in blocks within blocks, each moved."""
+    model = Model()
+    content: object = mesh_at()
+    for k, transform in enumerate(transforms):
+        content = rhino3dm.InstanceReference(model.block(f"b{k}", content), transform)
+    model.file.Objects.AddInstanceObject(content, model.attributes("tower"))
+    geometry = model.choose().geometry
+    assert isinstance(geometry, SentMesh)
+    return geometry
+
+
+def test_blocks_are_resolved_nested_scaled_and_mirrored() -> None:
+    move = rhino3dm.Transform.Translation(1, 2, 3)
+    scale = rhino3dm.Transform.Scale(origin(), 2.0)
+    mirror = rhino3dm.Transform.Mirror(origin(), rhino3dm.Vector3d(1, 0, 0))
+    plain = surface_from_mesh(mesh(VERTICES, QUADS))
+    twice = nested(move, scale)
+    np.testing.assert_allclose(twice.vertices, (VERTICES + np.array([1, 2, 3])) * 2, atol=1e-6)
+    turned = surface_from_mesh(nested(move, mirror, scale))
+    np.testing.assert_allclose(turned.vertices, (VERTICES + np.array([1, 2, 3])) * [-2, 2, 2], atol=1e-6)
+    assert (turned.normals * plain.normals * [-1, 1, 1]).sum(axis=1).min() > 0.9  # still outside
+
+
+def test_mirrored_surfaces_keep_their_outside() -> None:
+    mirror = rhino3dm.Transform.Mirror(origin(), rhino3dm.Vector3d(0, 0, 1))
+    model = Model()
+    block = model.block("b", rhino3dm.NurbsSurface.CreateFromCylinder(
+        rhino3dm.Cylinder(rhino3dm.Circle(origin(), 2.0), 5.0)))  # fmt: skip
+    model.file.Objects.AddInstanceObject(rhino3dm.InstanceReference(block, mirror), model.attributes())
+    read = sent_surface(model.bytes(), "a.3dm", SurfaceSettings())
+    assert isinstance(read.sent.nurbs, NurbsSurface)
+    surface = take_in(read.sent)
+    assert np.ptp(surface.vertices[:, 2]) == pytest.approx(5)
+    assert surface.vertices[:, 2].max() == pytest.approx(0)
+    outward = (surface.normals[:, :2] * surface.vertices[:, :2]).sum(axis=1)
+    assert np.all(outward > 0)
+
+
+@pytest.mark.parametrize(
+    ("unit", "word"),
+    [("Meters", "m"), ("Millimeters", "mm"), ("Feet", "ft"), ("Inches", "in"), ("Miles", None)],
+)
+def test_units_and_names_come_along(unit: str, word: str | None) -> None:
+    model = Model(unit).add(mesh_at(), "tower", "Facade::Outer", material="glass")
+    surface = take_in(sent_surface(model.bytes(), "a.3dm", SurfaceSettings()).sent)
+    assert surface.unit == word
+    assert surface.origin.name == "tower"
+    assert surface.origin.layer == "Facade::Outer"
+    assert surface.origin.attributes == (("material", "glass"),)
+    asked = sent_surface(model.bytes(), "a.3dm", SurfaceSettings(unit="cm")).sent
+    assert take_in(asked).unit == "cm"
+
+
+def test_a_seam_open_by_less_than_the_tolerance_closes() -> None:
+    surface = rhino3dm.NurbsSurface.CreateFromCylinder(rhino3dm.Cylinder(rhino3dm.Circle(origin(), 2.0), 5.0))
+    last = surface.Points.CountU - 1
+    for j in range(surface.Points.CountV):
+        point = surface.Points[last, j]
+        surface.Points[last, j] = rhino3dm.Point4d(point.X + 5e-4, point.Y, point.Z, point.W)
+    read = sent_surface(Model().add(surface).bytes(), "a.3dm", SurfaceSettings())
+    assert len(take_in(read.sent).loops) == 2
+    assert "up to 0.0005 apart" in read.sent.told[0]
+
+
+# Other formats
+
+
+def test_groups_of_an_obj_are_chosen_and_keep_the_numbers_of_the_file() -> None:
+    n = len(VERTICES)
+    far = VERTICES + np.array([50, 0, 0])
+    faces = [*QUADS.tolist(), *(QUADS + n).tolist()]
+    lines = obj(np.vstack([VERTICES, far]), faces).decode().splitlines()
+    first = next(i for i, line in enumerate(lines) if line.startswith("f "))
+    lines = [
+        *lines[:first],
+        "g left",
+        *lines[first : first + len(QUADS)],
+        "g right",
+        *lines[first + len(QUADS) :],
+    ]
+    content = read_file("\n".join(lines).replace("o tube\n", "").encode(), "a.obj")
+    assert [found.name for found in content.objects] == ["left", "right"]
+    with pytest.raises(SeveralObjectsError):
+        choose(content)
+    right = choose(content, "right").geometry
+    assert isinstance(right, SentMesh)
+    assert right.faces.values.min() == n
+    np.testing.assert_array_equal(right.vertices, np.vstack([VERTICES, far]))
+
+
+def test_groups_of_one_surface_are_joined_in_the_order_of_the_file() -> None:
+    lines = obj(VERTICES, QUADS.tolist()).decode().splitlines()
+    first = next(i for i, line in enumerate(lines) if line.startswith("f "))
+    lines[first + 7 : first + 7] = ["g other"]
+    chosen = choose(read_file("\n".join(lines).encode(), "a.obj"))
+    assert isinstance(chosen.geometry, SentMesh)
+    assert chosen.geometry.faces.to_lists() == QUADS.tolist()
+    assert len(chosen.used) == 2
+
+
+def test_pieces_of_a_ply_and_solids_of_an_stl_are_chosen() -> None:
+    from tests.server.test_reading import ply
+
+    n = len(VERTICES)
+    both = ply(np.vstack([VERTICES, VERTICES * 0.9 + [50, 0, 0]]), [*QUADS.tolist(), *(QUADS + n).tolist()])
+    content = read_file(both, "a.ply")
+    assert [found.name for found in content.objects] == ["part 0", "part 1"]
+    geometry = choose(content, "1").geometry
+    assert isinstance(geometry, SentMesh)
+    assert geometry.faces.values.min() == n
+
+    def solid(name: str, move: float) -> str:
+        facets = VERTICES[triangles(QUADS)] + [move, 0, 0]
+        rows = ["\n".join("vertex " + " ".join(map(repr, p)) for p in facet) for facet in facets.tolist()]
+        body = "".join(f"facet normal 0 0 0\nouter loop\n{row}\nendloop\nendfacet\n" for row in rows)
+        return f"solid {name}\n{body}endsolid {name}\n"
+
+    content = read_file((solid("east", 0) + solid("west", 50)).encode(), "a.stl")
+    chosen = choose(content, "west")
+    assert isinstance(chosen.geometry, SentMesh)
+    used = chosen.geometry.vertices[chosen.geometry.faces.values]
+    assert used[:, 0].min() > 20
+
+
+# Clients
+
+
+@pytest.fixture(scope="module")
+def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Live]:
+    with running(tmp_path_factory.mktemp("choosing"), workers=1) as live:
+        yield live
+
+
+def test_uploads_choose_by_fields_of_the_form(client: Live) -> None:
+    file = {"file": ("a.3dm", two().bytes())}
+    refused = client.post("/v1/surfaces", files=file)
+    assert refused.status_code == 422
+    assert refused.json()["type"] == "/problems/several-objects"
+    answer = client.post("/v1/surfaces", files=file, data={"object": "south", "unit": ""}).json()
+    assert answer["unit"] == "m"
+    assert [(row["name"], row["used"]) for row in answer["objects"]] == [("north", False), ("south", True)]
+    assert set(answer["objects"][0]) == {"id", "name", "layer", "kind", "visible", "size", "used"}
+    asked = client.post("/v1/surfaces", files=file, data={"layer": "Wall::Old", "unit": "mm"}).json()
+    assert asked["unit"] == "mm"
+    wrong = client.post("/v1/surfaces", files=file, data={"unit": "furlong"})
+    assert wrong.status_code == 422
+    assert "unit" in wrong.json()["detail"]
+    assert client.post("/v1/surfaces", files=file, data={"colour": "red"}).status_code == 422
+
+
+def test_inspect_prints_what_is_there_and_what_would_be_done(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "two.3dm"
+    path.write_bytes(two().bytes())
+    assert main(["inspect", str(path)]) == 1
+    said = capsys.readouterr().out
+    assert "unit m, tolerance 0.001" in said
+    assert "Wall::Old" in said
+    assert "to be chosen" in said
+    assert main(["inspect", str(path), "--object", "north"]) == 0
+    assert "taken" in capsys.readouterr().out
+    assert main(["inspect", str(tmp_path / "none.3dm")]) == 2
+
+
+def test_the_command_line_chooses(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "two.3dm"
+    path.write_bytes(two().bytes())
+    out = str(tmp_path / "out.json")
+    assert main(["solve", str(path), "--pattern", "none", "-o", out]) == 1
+    assert "--object" in capsys.readouterr().err
+    assert main(["solve", str(path), "--pattern", "none", "--object", "north", "-q", "-o", out]) == 0
+
+
+SHOWN = {
+    "02_loft_mm": 2, "10_seam_gap_0p5mm": 2, "17_polysrf_4faces_nomesh": 2, "19_polysrf_rounded_nomesh": 2,
+    "35_several_objects": 2, "36_others_hidden": 2, "39_block_instance": 2, "43_closed_top_1loop": 1,
+    "43b_dome_hemisphere_nurbs": 1, "50_two_halves_not_joined": 2, "54_mesh_with_stray_piece": 2,
+}  # fmt: skip
+
+
+@pytest.mark.skipif(not CASES.is_dir(), reason="the files shown are not here")
+@pytest.mark.parametrize("name", SHOWN)
+def test_files_shown_are_taken_in(name: str) -> None:
+    read = sent_surface((CASES / f"{name}.3dm").read_bytes(), "a.3dm", SurfaceSettings())
+    assert len(take_in(read.sent).loops) == SHOWN[name]

@@ -1,0 +1,235 @@
+"""Patterns on nets: disks, rings with openings, surfaces with singularities, closed ones.
+
+The theorems: the cells' Euler characteristic is the surface's; every node inside has the degree of the
+tiling; every interior cell has as many neighbours as corners, and at a singularity of index k these are k
+fewer; nothing depends on the numbering.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hexwrap_solver.conformal.net import Net
+from hexwrap_solver.conformal.types import ConformalMap
+from hexwrap_solver.domain import flatten, lift
+from hexwrap_solver.errors import NotAdaptedError
+from hexwrap_solver.pattern import lay_pattern
+from hexwrap_solver.pattern.types import Pattern, PatternSettings
+from tests.solver.pattern import annuli, nets
+
+SIDES = {"hex": 6, "triangle": 3, "quad": 4}
+DEGREE = {"hex": 3, "triangle": 6, "quad": 4}
+
+CASES = {
+    "roof": nets.roof,
+    "dome": nets.dome,
+    "pentagon": lambda: nets.dome(((0.0, 0.0, 1),)),
+    "heptagon": lambda: nets.dome(((2.0, 1.0, -1),)),
+    "three": lambda: nets.dome(((4.0, 0.0, 1), (-4.0, 1.0, 1), (0.0, -4.0, -1))),
+    "opening": lambda: nets.tower(1),
+    "openings": lambda: nets.tower(3),
+    "closed": lambda: nets.ellipsoid("hex"),
+}
+
+
+def euler(pattern: Pattern) -> int:
+    inner = np.count_nonzero(pattern.neighbours.values >= 0)
+    edges = len(pattern.faces.values) - inner // 2
+    return len(pattern.vertices) - edges + pattern.n_cells
+
+
+def on_boundary(pattern: Pattern) -> np.ndarray:
+    """(p,) vertices on the pattern's boundary."""
+    at = np.zeros(len(pattern.vertices), dtype=bool)
+    side = np.flatnonzero(pattern.neighbours.values < 0)
+    corner = pattern.faces.values
+    at[corner[side]] = at[corner[pattern.faces.next()[side]]] = True
+    return at
+
+
+def check_theorems(cmap: ConformalMap, pattern: Pattern) -> None:
+    assert euler(pattern) == 2 - len(cmap.surface.loops)
+    if pattern.whole.all():
+        inside = ~on_boundary(pattern)
+        degree = np.bincount(pattern.faces.values, minlength=len(pattern.vertices))
+        assert (degree[inside] == DEGREE[pattern.kind]).all()
+    whole = pattern.whole
+    assert (pattern.faces.lengths[whole] == SIDES[pattern.kind] - pattern.index[whole]).all()
+    assert (pattern.index[~whole] == 0).all()
+    assert sorted(pattern.index[pattern.index != 0]) == sorted(cmap.cones.index)
+    # Neighbours are mutual, along the same edge.
+    corner, following = pattern.faces.values, pattern.faces.values[pattern.faces.next()]
+    edges = {(a, b): f for a, b, f in zip(corner, following, pattern.faces.row, strict=True)}
+    assert len(edges) == len(corner)
+    across = [edges.get((b, a), -1) for a, b in zip(corner, following, strict=True)]
+    assert across == pattern.neighbours.values.tolist()
+    assert len(set(pattern.labels())) == pattern.n_cells
+
+
+@pytest.mark.parametrize("boundary", ["whole", "trim"])
+@pytest.mark.parametrize("case", list(CASES))
+def test_hexagons_close_up_on_every_surface(case, boundary):
+    cmap = CASES[case]()
+    pattern = lay_pattern(cmap, PatternSettings(boundary=boundary))
+    check_theorems(cmap, pattern)
+    assert pattern.distortion < 0.1
+
+
+@pytest.mark.parametrize("kind", ["triangle", "quad"])
+@pytest.mark.parametrize("case", ["roof", "dome"])
+def test_disks_take_every_kind(case, kind):
+    cmap = CASES[case]()
+    for boundary in ("whole", "trim"):
+        check_theorems(cmap, lay_pattern(cmap, PatternSettings(kind=kind, boundary=boundary)))
+
+
+def test_quads_close_around_eight_triangles():
+    cmap = nets.ellipsoid("quad")
+    check_theorems(cmap, lay_pattern(cmap, PatternSettings(kind="quad")))
+
+
+def test_a_rectangular_roof_is_filled_by_quads_up_to_its_four_sides():
+    """Whole cells and trimmed ones are the same, and cover everything."""
+    cmap = nets.roof()
+    whole = lay_pattern(cmap, PatternSettings(kind="quad"))
+    cut = lay_pattern(cmap, PatternSettings(kind="quad", boundary="trim"))
+    assert whole.n_cells == cut.n_cells
+    assert cut.whole.all()
+    corners = nets.nearest(cmap.surface, [[0, 0, 0], [30, 0, 0], [30, 20, 0], [0, 20, 0]])
+    away = np.linalg.norm(whole.vertices[None] - cmap.surface.vertices[corners][:, None], axis=2)
+    assert away.min(axis=1).max() < 1e-9
+    assert whole.distortion < 0.05
+
+
+@pytest.mark.parametrize("case", ["dome", "pentagon", "opening"])
+def test_trimmed_cells_cover_the_surface(case):
+    cmap = CASES[case]()
+    pattern = lay_pattern(cmap, PatternSettings(boundary="trim"))
+    z, following = pattern.corners, pattern.faces.next()
+    plain = pattern.index == 0  # at a singularity the polygon of the plane does not close
+    area = np.add.reduceat((z.conj() * z[following]).imag / 2, pattern.faces.offsets[:-1])
+    p, q, r = cmap.corners().T
+    domain = float((((q - p).conj() * (r - p)).imag / 2).sum())
+    assert (area[plain] > 0).all()
+    one = float(np.median(area[pattern.whole]))
+    singular = sum((6 - k) / 6 for k in pattern.index[~plain])
+    assert area[plain].sum() + one * singular == pytest.approx(domain, rel=2e-3)
+
+
+@pytest.mark.parametrize("case", ["three", "openings"])
+def test_cells_are_regular_in_the_domain_but_for_the_distortion_told(case):
+    cmap = CASES[case]()
+    pattern = lay_pattern(cmap, PatternSettings())
+    plain = np.repeat(pattern.index == 0, pattern.faces.lengths)
+    side = abs(pattern.corners[pattern.faces.next()] - pattern.corners)[plain]
+    assert side.max() / side.min() < (1 + pattern.distortion) ** 3 + 0.05
+
+
+def shuffled(cmap: ConformalMap, seed: int) -> ConformalMap:
+    """The same net with its faces in another order, begun at other corners."""
+    rng = np.random.default_rng(seed)
+    net, surface = cmap.net, cmap.surface
+    m = len(surface.faces)
+    order, first = rng.permutation(m), rng.integers(0, 3, m)
+    place = np.empty(m, dtype=np.int64)
+    place[order] = np.arange(m)
+    corner = (first[:, None] + np.arange(3)) % 3
+
+    def moved(table: np.ndarray) -> np.ndarray:
+        return np.take_along_axis(table[order], corner, axis=1)
+
+    across = moved(net.across)
+    new = Net(
+        moved(net.corners),
+        np.where(across >= 0, place[across], -1),
+        moved(net.crossing),
+        net.angle,
+        net.translation,
+        net.inverse,
+    )
+    return replace(cmap, surface=replace(surface, faces=moved(surface.faces)), domain=new)
+
+
+@pytest.mark.parametrize("case", ["dome", "pentagon", "opening"])
+def test_nothing_depends_on_the_numbering_of_faces(case):
+    cmap = CASES[case]()
+    one, two = (lay_pattern(c, PatternSettings()) for c in (cmap, shuffled(cmap, 1)))
+    assert one.n_cells == two.n_cells
+
+    away = np.linalg.norm(places_of_cells(one)[:, None] - places_of_cells(two)[None], axis=2)
+    assert away.min(axis=1).max() < 1e-5 * one.edge_length
+
+
+def test_an_annulus_as_a_net_has_the_same_cells():
+    """Nothing of cells depends on sheets: only labels do."""
+    cmap = annuli.flat_cone(np.pi / 3, 1.0, 3.0, 36, 12)
+    net = cmap.net
+    other = replace(cmap, domain=replace(net, winding=None))
+    one, two = (lay_pattern(c, PatternSettings(edge_length=0.12, align="none")) for c in (cmap, other))
+    assert abs(one.n_cells - two.n_cells) < 0.1 * one.n_cells
+    assert euler(two) == 0
+
+
+@pytest.mark.parametrize("case", ["dome", "pentagon", "opening", "closed"])
+def test_lifted_and_laid_down_again(case):
+    cmap = CASES[case]()
+    faces = np.arange(0, len(cmap.surface.faces), 7)
+    weights = np.random.default_rng(0).dirichlet(np.ones(3), len(faces))
+    z = (weights * cmap.corners()[faces]).sum(axis=1)
+    up = lift(cmap, z)
+    assert up.inside.all()
+    down = flatten(cmap, up.points)
+    assert down.distance.max() < 1e-9
+    again = lift(cmap, down.uv)
+    np.testing.assert_allclose(again.points, up.points, atol=1e-7)
+
+
+def places_of_cells(pattern: Pattern) -> np.ndarray:
+    """(c, 3) means of the corners."""
+    total = np.add.reduceat(pattern.vertices[pattern.faces.values], pattern.faces.offsets[:-1], axis=0)
+    return total / pattern.faces.lengths[:, None]
+
+
+@pytest.mark.parametrize("boundary", ["whole", "trim"])
+def test_beside_windows_the_pattern_is_what_it_would_be_without_them(boundary):
+    """Cells over openings are left out or cut; all whole cells are cells of the full pattern."""
+    settings = PatternSettings(around=30, boundary=boundary)
+    wall, full = lay_pattern(nets.cut_tower(), settings), lay_pattern(nets.filled_tower(), settings)
+    assert nets.cut_tower().kind == "cylinder"
+    away = np.linalg.norm(
+        places_of_cells(wall)[wall.whole][:, None] - places_of_cells(full)[full.whole][None], axis=2
+    )
+    assert away.min(axis=1).max() < 1e-9 * 30
+    assert wall.whole.sum() < full.whole.sum()
+    assert wall.around == full.around
+    assert wall.distortion == full.distortion
+    if boundary == "trim":
+        assert euler(wall) == -3
+        z, following = wall.corners, wall.faces.next()
+        area = float((z.conj() * z[following]).imag.sum() / 2)
+        p, q, r = nets.cut_tower().corners().T
+        assert area == pytest.approx(float((((q - p).conj() * (r - p)).imag / 2).sum()), rel=2e-3)
+
+
+@pytest.mark.parametrize("boundary", ["whole", "trim"])
+def test_a_cell_around_a_small_opening_is_left_out_and_told(boundary):
+    """Wherever the opening lies, no cell covers it."""
+    told = 0
+    for shift in (0.0, 0.25, 0.5, 0.75):
+        settings = PatternSettings(edge_length=2.0, boundary=boundary, phase=(shift, shift), align="none")
+        pattern = lay_pattern(nets.tower(1, wide=1), settings)
+        inside = any("opening lies inside" in note for note in pattern.notes)
+        told += inside
+        if inside or boundary == "trim":
+            assert euler(pattern) == -1
+        else:
+            assert euler(pattern) <= -1
+    assert told or boundary == "trim"
+
+
+def test_a_quantum_that_does_not_suit_the_pattern_is_refused():
+    with pytest.raises(NotAdaptedError, match="multiple of π/2"):
+        lay_pattern(CASES["pentagon"](), PatternSettings(kind="quad"))

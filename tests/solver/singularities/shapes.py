@@ -1,0 +1,76 @@
+"""Small surfaces with curvature: a tube with a waist, a dome, a closed ellipsoid, a straight tube."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import ConvexHull
+
+from hexwrap_solver.arrays import Floats, Ints
+from hexwrap_solver.surface.topology import boundary_loops, twins, vertex_normals
+from hexwrap_solver.surface.types import Surface
+
+
+def surface_of(vertices: Floats, faces: Ints) -> Surface:
+    """Whatever its topology; unused vertices left out."""
+    used = np.unique(faces)
+    new = np.full(len(vertices), -1)
+    new[used] = np.arange(len(used))
+    vertices, faces = vertices[used], new[faces]
+    n = len(vertices)
+    twin = twins(faces, n)
+    loops = boundary_loops(faces, twin) if (twin < 0).any() else []
+    return Surface(vertices, faces, tuple(loops), np.arange(n), np.arange(n), vertex_normals(vertices, faces))
+
+
+def tube(radius: Floats, height: float, around: int = 40) -> Surface:
+    """Of revolution, rings of these radii; every second ring is turned by half a step."""
+    rows = len(radius)
+    turn = (np.arange(around) + 0.5 * (np.arange(rows) % 2)[:, None]) / around * 2 * np.pi
+    z = np.broadcast_to(np.linspace(0, height, rows)[:, None], turn.shape)
+    vertices = np.stack([radius[:, None] * np.cos(turn), radius[:, None] * np.sin(turn), z], axis=2)
+    number = np.arange(rows * around).reshape(rows, around)
+    faces = []
+    for i in range(rows - 1):
+        low, high = number[i], number[i + 1]
+        low_next, high_next = np.roll(low, -1), np.roll(high, -1)
+        if i % 2:
+            faces += [np.stack([low, low_next, high_next], 1), np.stack([low, high_next, high], 1)]
+        else:
+            faces += [np.stack([low, low_next, high], 1), np.stack([low_next, high_next, high], 1)]
+    return surface_of(vertices.reshape(-1, 3), np.concatenate(faces))
+
+
+def waist() -> Surface:
+    """Three times as wide at its ends as in the middle."""
+    x = np.linspace(-1, 1, 31)
+    return tube(np.sqrt(1 + 8 * x**2), 7.0)
+
+
+def straight() -> Surface:
+    return tube(np.ones(17), 4.0)
+
+
+def ellipsoid(n: int = 1200) -> Surface:
+    i = np.arange(n) + 0.5
+    fall, turn = np.arccos(1 - 2 * i / n), np.pi * (1 + 5**0.5) * i
+    points = np.stack([np.cos(turn) * np.sin(fall), np.sin(turn) * np.sin(fall), np.cos(fall)], axis=1)
+    faces = ConvexHull(points).simplices.astype(np.int64)
+    a, b, c = (points[corner] for corner in faces.T)
+    inward = (np.cross(b - a, c - a) * (a + b + c)).sum(axis=1) < 0
+    faces[inward] = faces[inward][:, ::-1]
+    return surface_of(points * [2.0, 1.4, 1.0], faces)
+
+
+def dome(n: int = 1800) -> Surface:
+    whole = ellipsoid(n)
+    low = (whole.vertices[whole.faces][:, :, 2] > 0.05).all(axis=1)
+    return surface_of(whole.vertices, whole.faces[low])
+
+
+def renumbered(surface: Surface, seed: int) -> tuple[Surface, Ints]:
+    """The same surface in another order, and the new number of each vertex."""
+    rng = np.random.default_rng(seed)
+    order = rng.permutation(len(surface.vertices))
+    new = np.argsort(order)
+    faces = new[surface.faces][rng.permutation(len(surface.faces))]
+    return surface_of(surface.vertices[order], faces), new

@@ -1,0 +1,89 @@
+"""Meshes in parts: what hangs together, and what joins within a tolerance."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hexwrap_solver.arrays import Ragged
+from hexwrap_solver.surface import SentMesh, surface_from_mesh
+from hexwrap_solver.surface.pieces import joined, only, pieces, together
+from tests.solver.surface.shapes import mesh, tube
+
+
+def halves(shift: float = 0.0, finer: bool = False) -> list[SentMesh]:
+    """A tube in two halves, one moved outwards by shift; finer: with twice the rows in it."""
+    vertices, quads = tube(rings=7, around=16)
+    at = vertices[quads].mean(axis=1)
+    lower = at[:, 1] > 0
+    moved = vertices + np.array([0.0, -shift, 0.0])
+    other, faces = (moved, quads[~lower]) if not finer else _finer(moved, quads[~lower])
+    return [mesh(vertices, quads[lower]), mesh(other, faces)]
+
+
+def _finer(vertices: np.ndarray, quads: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Each quad in two, one above the other."""
+    a, b, c, d = quads.T
+    n = len(vertices)
+    k = len(quads)
+    left, right = (vertices[a] + vertices[d]) / 2, (vertices[b] + vertices[c]) / 2
+    e, f = n + np.arange(k), n + k + np.arange(k)
+    whole = np.concatenate([vertices, left, right])
+    return whole, np.concatenate([np.stack([a, b, f, e], 1), np.stack([e, f, c, d], 1)])
+
+
+def test_a_tube_is_one_piece_with_two_loops() -> None:
+    vertices, quads = tube()
+    (piece,) = pieces(mesh(vertices, quads))
+    assert piece.loops == 2
+    np.testing.assert_array_equal(piece.faces, np.arange(len(quads)))
+
+
+def test_pieces_are_found_by_their_edges_and_sorted_by_area() -> None:
+    vertices, quads = tube()
+    far = vertices[:3] + 100
+    faces = [*quads.tolist(), [len(vertices), len(vertices) + 1, len(vertices) + 2]]
+    sent = mesh(np.vstack([vertices, far]), faces)
+    large, small = pieces(sent)
+    assert (large.loops, small.loops) == (2, 1)
+    assert len(small.faces) == 1
+    left = only(sent, large.faces)
+    assert left.vertices is sent.vertices  # so that indices mean what they meant
+    assert len(surface_from_mesh(left).loops) == 2
+
+
+@pytest.mark.parametrize("shift", [0.0, 1e-4, 9e-4])
+@pytest.mark.parametrize("finer", [False, True])
+def test_halves_become_a_tube_within_the_tolerance(shift: float, finer: bool) -> None:
+    sent, owner = together(halves(shift, finer))
+    assert len(pieces(sent)) == (2 if shift or finer else 1)
+    whole, source, joint = joined(sent, 1e-3)
+    (piece,) = pieces(whole)
+    assert piece.loops == 2
+    assert joint.gap == pytest.approx(shift, abs=1e-12)
+    assert len(source) == whole.faces.n_rows
+    assert set(owner[source].tolist()) == {0, 1}
+    assert len(surface_from_mesh(whole).loops) == 2
+
+
+@pytest.mark.parametrize("finer", [False, True])
+def test_gaps_beyond_the_tolerance_stay(finer: bool) -> None:
+    sent, _ = together(halves(2e-3, finer))
+    whole, _, joint = joined(sent, 1e-3)
+    assert joint.count == 0
+    assert whole is sent
+
+
+def test_a_seam_closes_within_the_tolerance() -> None:
+    vertices, quads = tube()
+    n = len(vertices)
+    seam = np.flatnonzero(np.isin(quads, quads[0]).any(axis=1))
+    cut = quads.copy()
+    first = np.unique(quads[seam])
+    moved = vertices[first] + 5e-4
+    new = np.arange(n, n + len(first))
+    cut[seam[0]] = new[np.searchsorted(first, quads[seam[0]])]
+    torn = SentMesh(np.vstack([vertices, moved]), Ragged.from_table(cut))
+    whole, _, joint = joined(torn, 1e-3)
+    assert joint.gap == pytest.approx(5e-4 * np.sqrt(3))
+    assert [piece.loops for piece in pieces(whole)] == [2]
