@@ -21,13 +21,14 @@ from hexwrap_server.output import step
 from hexwrap_server.output.blocks import Blocks
 from hexwrap_server.output.flat import ZONES, groups, sheet_size
 from hexwrap_server.output.glb import quaternions
-from hexwrap_server.output.meta import Meta, Origin
+from hexwrap_server.output.meta import Meta
 from hexwrap_server.output.units import UNITS
 from hexwrap_server.output.writers import write
 from hexwrap_solver.arrays import Floats, Ragged
 from hexwrap_solver.panels import make_components
 from hexwrap_solver.panels.types import ComponentSettings
 from hexwrap_solver.pipeline import Solution
+from hexwrap_solver.surface.types import Origin
 from tests.server.analytic import cylinder
 
 # ifcopenshell's rules leave files open.
@@ -258,8 +259,10 @@ def test_glb_opens_in_the_viewers_own_three(solution: Solution, tmp_path: Path) 
 
 
 def test_3dm_keeps_unit_surface_and_what_the_input_said(solution: Solution) -> None:
-    origin = Origin("Süd", "Bau A::Hülle", {"Brandschutz": "F30", "Nr": "7"})
-    data = write("panels.3dm", solution, Meta("tower", unit="ft", origin=origin))
+    origin = Origin("Süd", "Bau A::Hülle", (("Brandschutz", "F30"), ("Nr", "7")))
+    known = replace(solution.map.surface, unit="ft", origin=origin)
+    known_map = replace(solution.map, surface=known)
+    data = write("panels.3dm", replace(solution, map=known_map), Meta("tower"))
     model = rhino3dm.File3dm.FromByteArray(data)
     assert model.Settings.ModelUnitSystem == rhino3dm.UnitSystem.Feet
     layers = {layer.Index: layer.Name for layer in model.Layers}

@@ -177,6 +177,8 @@ def test_sizes_of_the_mesh_go_beside_a_nurbs_surface_only(tmp_path: Path) -> Non
 
 def test_values_may_begin_with_a_minus() -> None:
     words = [
+        "--loop",
+        "1=isometric",
         "--angle",
         "-13,-4,0=120",
         "--angle",
@@ -190,6 +192,7 @@ def test_values_may_begin_with_a_minus() -> None:
     asked = task("sample:tower", make_parser().parse_args(["solve", "sample:tower", "-o", "x.obj", *words]))
     assert [entry.point for entry in asked.wanted.boundary.angles] == [(-13, -4, 0), (-0.5, 1, 2)]
     assert asked.wanted.boundary.mode == "angles"
+    assert [(entry.loop, entry.mode) for entry in asked.wanted.boundary.loops] == [(1, "isometric")]
     assert asked.wanted.pattern is not None
     assert asked.wanted.pattern.phase == (-1e-3, -2)
 

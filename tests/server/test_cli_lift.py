@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from hexwrap_server.cli.main import main
+from hexwrap_server.errors import DrawingError
 from hexwrap_server.input.curves import READERS, read_drawing, refined, write_curves
 from hexwrap_server.input.finished_map import map_in_result
-from hexwrap_server.input.readers.drawing import Curve, DrawingError
+from hexwrap_server.input.readers.drawing import Curve
 from hexwrap_server.jobs.lift_curves import flatten_curves, lift_curves, one_piece
 from hexwrap_server.output.writers import Meta, write
 from hexwrap_solver.conformal.types import Deck

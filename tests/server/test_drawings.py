@@ -14,9 +14,10 @@ import rhino3dm
 from ezdxf.document import Drawing as Document
 from scipy.spatial import cKDTree
 
+from hexwrap_server.errors import DrawingError
 from hexwrap_server.input.curves import read_drawing
 from hexwrap_server.input.readers import drawing_dxf, rhino_model
-from hexwrap_server.input.readers.drawing import FLATNESS, Drawing, DrawingError
+from hexwrap_server.input.readers.drawing import FLATNESS, Drawing
 from hexwrap_server.input.readers.drawing_3dm import read_3dm_drawing
 from hexwrap_server.input.readers.drawing_csv import read_csv
 from hexwrap_server.input.readers.drawing_dxf import read_dxf

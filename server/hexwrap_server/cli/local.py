@@ -9,6 +9,7 @@ from typing import Any
 
 from hexwrap_server import samples
 from hexwrap_server.cli.options import asked_body
+from hexwrap_server.errors import UsageError
 from hexwrap_server.input.json_text import loads
 from hexwrap_server.input.readers.text import as_utf8
 from hexwrap_server.input.requests import SentSurface, Wanted
@@ -23,10 +24,6 @@ from hexwrap_solver.surface.types import SurfaceSettings
 #: Nobody but the user waits here, so only what no memory would hold is refused.
 MAX_VERTICES, MAX_PANELS = 20_000_000, 5_000_000
 SAMPLE = "sample:"
-
-
-class UsageError(Exception):
-    """What was typed makes no sense; the sentence says why."""
 
 
 @dataclass(frozen=True)

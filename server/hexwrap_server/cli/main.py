@@ -21,9 +21,10 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from hexwrap_server import __version__, samples
 from hexwrap_server.cli.demo import ALL, DemoError, run_demo
 from hexwrap_server.cli.inspect import print_content
-from hexwrap_server.cli.local import Task, UsageError, only_map, solve_here, task
+from hexwrap_server.cli.local import Task, only_map, solve_here, task
 from hexwrap_server.cli.options import add_request_options, as_options, is_option_at_fault
 from hexwrap_server.cli.summary import print_summary
+from hexwrap_server.errors import FormError, StartError, UsageError
 from hexwrap_server.input import form
 from hexwrap_server.input.curves import READERS, read_drawing, write_curves
 from hexwrap_server.input.curves import WRITERS as CURVE_WRITERS
@@ -34,7 +35,6 @@ from hexwrap_server.output import wire
 from hexwrap_server.output.meta import GROUPS
 from hexwrap_server.output.text import length
 from hexwrap_server.output.writers import WRITERS, Meta, check_wanted, write
-from hexwrap_server.problems import FormError
 from hexwrap_server.settings import Settings, add_arguments
 from hexwrap_solver.errors import HexwrapError
 from hexwrap_solver.pipeline import Solution
@@ -168,8 +168,7 @@ def _kinds() -> list[str]:
 
 
 def _serve(asked: argparse.Namespace) -> int:
-    from hexwrap_server.http.app import PortTakenError, serve  # the web framework takes a second to import
-    from hexwrap_server.jobs.store import DamagedError, FolderInUseError
+    from hexwrap_server.http.app import serve  # the web framework takes a second to import
 
     try:
         settings = Settings.from_arguments(asked)
@@ -177,7 +176,7 @@ def _serve(asked: argparse.Namespace) -> int:
         raise UsageError(str(error)) from None
     try:
         serve(settings)
-    except (PortTakenError, FolderInUseError, DamagedError, OSError) as error:
+    except (StartError, OSError) as error:
         return _refuse(1, str(error))
     return 0
 

@@ -9,10 +9,10 @@ from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from hexwrap_server import __version__
+from hexwrap_server.errors import InternalError
 from hexwrap_server.http import head
 from hexwrap_server.http.answers import problem_response
 from hexwrap_server.http.metrics import Metrics
-from hexwrap_server.jobs.worker import InternalError
 
 #: Methods that are told apart; a client may make up others without end, and each would be counted for ever.
 METHODS = frozenset({"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"})

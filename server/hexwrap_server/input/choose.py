@@ -131,7 +131,7 @@ def _nearly(part: Part, others: Sequence[Part], meant: Sequence[Found], toleranc
     for other in others:
         if not len(other.rim):
             continue
-        distance, _ = tree.query(other.rim)
+        distance = np.asarray(tree.query(other.rim)[0])
         k = int(np.argmin(distance))
         if tolerance < distance[k] < NEARLY * tolerance:
             told.append(

@@ -15,7 +15,8 @@ from pathlib import Path
 import numpy as np
 import rhino3dm
 
-from hexwrap_server.input.readers.drawing import Curve, Drawing, DrawingError
+from hexwrap_server.errors import DrawingError
+from hexwrap_server.input.readers.drawing import Curve, Drawing
 from hexwrap_server.input.readers.drawing_3dm import read_3dm_drawing
 from hexwrap_server.input.readers.drawing_csv import read_csv
 from hexwrap_server.input.readers.drawing_dxf import read_dxf

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from hexwrap_server.cli.local import UsageError
+from hexwrap_server.errors import UsageError
 from hexwrap_solver.arrays import Floats, Ints
 from hexwrap_solver.conformal.net import Net
 from hexwrap_solver.conformal.types import ConformalMap, Deck, Unrolled
@@ -56,14 +56,6 @@ def _in_dictionary(result: dict[str, Any]) -> Getter:
         return value
 
     return get
-
-
-def with_corners(mesh: dict[str, Any], found: dict[str, Any]) -> dict[str, Any]:
-    """The ``map`` of a Result with ``corners``: (m, 3, 2) where the corners of each face stand."""
-    if found.get("corners") is None:
-        corners = _map(_in_dictionary({"mesh": mesh, "map": found})).corners()
-        found = found | {"corners": np.stack([corners.real, corners.imag], axis=-1)}
-    return found
 
 
 def _known(get: Getter, name: str) -> Any:

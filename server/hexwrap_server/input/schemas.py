@@ -11,11 +11,11 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from hexwrap_server.errors import FormError
 from hexwrap_server.input.arrays import Fault, faces, numbers, table
 from hexwrap_server.input.faults import escaped
 from hexwrap_server.input.form import Body, read, values
 from hexwrap_server.input.requests import SentSurface, Wanted
-from hexwrap_server.problems import FormError
 from hexwrap_solver.conformal.types import BoundaryCondition
 from hexwrap_solver.setting import Setting
 from hexwrap_solver.surface.types import MeshSettings, NurbsSurface, SentMesh, SurfaceSettings

@@ -9,7 +9,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterable
 
-from hexwrap_server.jobs.disk import StorageError
+from hexwrap_server.errors import StorageError
 from hexwrap_server.jobs.store import Job, Store
 
 log = logging.getLogger("hexwrap.ledger")

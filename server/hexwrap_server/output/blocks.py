@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexwrap_server.output.colours import UNSIZED, size_colours
+from hexwrap_server.output.colours import UNSIZED, class_colours
 from hexwrap_server.output.layers import size_name
 from hexwrap_solver.arrays import Floats, Ints, Ragged
 from hexwrap_solver.panels.components import triangulated
@@ -94,8 +94,7 @@ def frames(panels: Panels) -> Floats:
 
 def colours_of(panels: Panels) -> list[str]:
     """``#rrggbb`` of every size, and last that of panels without one, so that size −1 finds it."""
-    n = len(panels.class_length)
-    return [*(size_colours(n) if n else []), UNSIZED]
+    return [*(class_colours(panels) if len(panels.class_length) else []), UNSIZED]
 
 
 def _alike(local: Ragged, panels: Panels) -> tuple[Ints, Ints, Ints]:

@@ -17,21 +17,10 @@ Group = Literal["size", "ring", "zone"]
 
 
 @dataclass(frozen=True)
-class Origin:
-    """The object of a Rhino file that the surface came from. layer: its full path. texts: its user
-    strings."""
-
-    name: str = ""
-    layer: str = ""
-    texts: Mapping[str, str] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
 class Meta:
     """name: of the job, any text. timings: seconds per stage.
 
-    unit: of all lengths (``m``, ``cm``, ``mm``, ``ft``, ``in``), None where nobody said. origin: of the
-    surface.
+    unit: of all lengths (``m``, ``cm``, ``mm``, ``ft``, ``in``); None: the surface's own, if it has one.
     sheet: width and height of the sheets of ``flat.dxf`` in model units; None: 3 × 1.5 m, or, where panels
     are larger than that, a size that holds about six by four of the largest. group: what shares a sheet
     there.
@@ -42,7 +31,6 @@ class Meta:
     timings: Mapping[str, float] = field(default_factory=dict)
     sheet: tuple[float, float] | None = None
     unit: str | None = None
-    origin: Origin = field(default_factory=Origin)
     group: Group = "size"
     storey: float | None = None
 

@@ -146,10 +146,10 @@ def _transform(motion: Floats) -> rhino3dm.Transform:
 
 def _add_surface(model: rhino3dm.File3dm, surface: Surface, meta: Meta) -> None:
     """The mesh that was solved, with what the file that it came from says of it."""
-    attributes = _attributes(_layer(model, "surface", SURFACE), one_line(meta.origin.name or meta.name))
-    if meta.origin.layer:
-        attributes.SetUserString("layer", one_line(meta.origin.layer))
-    for key, value in meta.origin.texts.items():
+    attributes = _attributes(_layer(model, "surface", SURFACE), one_line(surface.origin.name or meta.name))
+    if surface.origin.layer:
+        attributes.SetUserString("layer", one_line(surface.origin.layer))
+    for key, value in surface.origin.attributes:
         attributes.SetUserString(key, value)
     model.Objects.AddMesh(_mesh(surface.vertices.tolist(), surface.faces.tolist()), attributes)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from hexwrap_server.input.requests import Wanted
 from hexwrap_server.output.arrays_npz import result_npz
@@ -44,7 +45,7 @@ WITHOUT_PANELS = {"domain.svg", "domain.dxf", "result.json", "result.npz"}
 
 def write(name: str, solution: Solution, meta: Meta) -> bytes:
     """The file of that name. Raises KeyError for an unknown name, HexwrapError where it cannot be made."""
-    return WRITERS[name](solution, meta)
+    return WRITERS[name](solution, replace(meta, unit=meta.unit or solution.map.surface.unit))
 
 
 def check_wanted(name: str, wanted: Wanted) -> None:

@@ -11,7 +11,8 @@ from typing import Any
 
 import rhino3dm
 
-from hexwrap_server.http.hops.components import RESULT_TYPES, HopsError, Parameter
+from hexwrap_server.errors import HopsError
+from hexwrap_server.http.hops.components import RESULT_TYPES, Parameter
 
 
 def read_inputs(parameters: tuple[Parameter, ...], values: object) -> tuple[dict[str, Any], list[int]]:

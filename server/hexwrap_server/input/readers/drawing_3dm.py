@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import rhino3dm
 
-from hexwrap_server.input.readers.drawing import Drawing, DrawingError, curve, too_many
+from hexwrap_server.errors import DrawingError
+from hexwrap_server.input.readers.drawing import Drawing, curve, too_many
 from hexwrap_server.input.readers.rhino_curves import rhino_curve, xyz
 from hexwrap_server.input.readers.rhino_model import Model, Placed, TooManyObjectsError
 

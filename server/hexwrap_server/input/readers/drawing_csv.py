@@ -5,7 +5,8 @@ from __future__ import annotations
 import csv
 import re
 
-from hexwrap_server.input.readers.drawing import Drawing, DrawingError, curve
+from hexwrap_server.errors import DrawingError
+from hexwrap_server.input.readers.drawing import Drawing, curve
 from hexwrap_server.input.readers.text import as_utf8
 
 _LINE_ENDS = re.compile(r"\r\n|\r|\n")

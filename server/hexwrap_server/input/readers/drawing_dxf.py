@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hexwrap_server.errors import DrawingError
 from hexwrap_server.input.readers.drawing import (
     DEEPEST,
     FLATNESS,
     MOST_OBJECTS,
     Drawing,
-    DrawingError,
     curve,
     too_many,
 )
