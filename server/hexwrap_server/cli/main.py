@@ -202,7 +202,7 @@ def _solve(asked: argparse.Namespace) -> int:
         storey=asked.storey,
     )
     console = Console(quiet=asked.quiet, soft_wrap=True)
-    parts = ("mesh", "map", "pattern", "panels", "sizes", "quality", "timings")
+    parts = ("unit", "mesh", "map", "pattern", "panels", "sizes", "quality", "timings")
     print_summary(console, meta.name, {name: wire.part(solution, name, timings) for name in parts})
     for out, kind in kinds.items():
         save(out, write(kind, solution, meta))
@@ -239,7 +239,8 @@ def _lift(asked: argparse.Namespace) -> int:
     carried = carry(cmap, drawing.curves, asked.step)
     if not carried.curves:
         return _refuse(1, "no point of the drawing lies in the domain; see domain.dxf for where that is.")
-    save(asked.output, write_curves(ending, carried.curves))
+    unit = None if asked.flatten else cmap.surface.unit
+    save(asked.output, write_curves(ending, carried.curves, unit))
     console = Console(quiet=asked.quiet, soft_wrap=True, highlight=False)
     for note in drawing.notes():
         console.print(note)

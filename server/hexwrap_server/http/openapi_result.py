@@ -92,6 +92,7 @@ _QUALITY = _all(
 )
 #: Whatever ``?include=`` picks of it, and without that all of it.
 RESULT = record(
+    unit=nullable({"enum": ["m", "cm", "mm", "ft", "in"]}),
     mesh=_MESH,
     map=_MAP,
     pattern=nullable(_PATTERN),

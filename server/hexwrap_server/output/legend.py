@@ -14,6 +14,7 @@ import numpy as np
 
 from hexwrap_server.output import colours, text
 from hexwrap_server.output.meta import Meta
+from hexwrap_server.output.units import behind
 from hexwrap_solver.arrays import Floats
 from hexwrap_solver.panels.types import Panels
 
@@ -29,8 +30,8 @@ LETTERS, LINES = 18, 4
 INK, GREY = "#23262b", "#70757d"
 
 
-def compose(image: Floats, panels: Panels, meta: Meta) -> bytes:
-    """PNG of the image (h, w, 3) in 0..1 with the legend on its right."""
+def compose(image: Floats, panels: Panels, meta: Meta, unit: str | None = None) -> bytes:
+    """PNG of the image (h, w, 3) in 0..1 with the legend on its right. unit: of the lengths."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
     from PIL import Image
@@ -41,7 +42,7 @@ def compose(image: Floats, panels: Panels, meta: Meta) -> bytes:
     axes = figure.add_axes((0, 0, 1, 1))
     axes.set(xlim=(0, WIDTH), ylim=(height, 0))
     axes.set_axis_off()
-    _legend(axes, height, panels, meta)
+    _legend(axes, height, panels, meta, behind(unit))
     with warnings.catch_warnings():  # a name in a script that the bundled font lacks shows boxes, no warning
         warnings.simplefilter("ignore", UserWarning)
         canvas.draw()
@@ -70,7 +71,7 @@ def _title(axes: Axes, top: float, name: str) -> None:
         shown.set_fontsize(size * min(1.0, (WIDTH - 12) / max(width, 1.0)))
 
 
-def _legend(axes: Axes, height: int, panels: Panels, meta: Meta) -> None:
+def _legend(axes: Axes, height: int, panels: Panels, meta: Meta, unit: str) -> None:
     n_sizes = len(panels.class_length)
     rows = n_sizes if n_sizes <= ROWS else 10
     cut = int(np.sum(panels.size < 0))
@@ -78,12 +79,11 @@ def _legend(axes: Axes, height: int, panels: Panels, meta: Meta) -> None:
     _title(axes, top - 96, text.one_line(meta.name))
     named = panels.n_sizes
     sizes = {0: "", 1: ", 1 size"}.get(named, f", {named:,} sizes")
-    unit = f", edges in {meta.unit}" if meta.unit else ""
-    axes.text(0, top - 48, f"{panels.n_panels:,} panels{sizes}{unit}", size=15, color=GREY, va="center")
+    axes.text(0, top - 48, f"{panels.n_panels:,} panels{sizes}", size=17, color=GREY, va="center")
     if n_sizes <= ROWS:
-        _swatches(axes, top, panels)
+        _swatches(axes, top, panels, unit)
     else:
-        _bar(axes, top, rows * ROW - 20, panels)
+        _bar(axes, top, rows * ROW - 20, panels, unit)
     if cut:
         y = top + ROW * (rows + 0.5)
         _swatch(axes, y, panels, colours.UNSIZED)
@@ -91,13 +91,13 @@ def _legend(axes: Axes, height: int, panels: Panels, meta: Meta) -> None:
         axes.text(WIDTH - 60, y, f"{cut:,}", size=17, color=GREY, va="center", ha="right")
 
 
-def _swatches(axes: Axes, top: float, panels: Panels) -> None:
+def _swatches(axes: Axes, top: float, panels: Panels, unit: str) -> None:
     """One row per size: colour, edge length, how many."""
     counts, words = panels.class_count.tolist(), text.lengths(panels.class_length.tolist())
     for i, colour in enumerate(colours.class_colours(panels)):
         y = top + ROW * (i + 0.5)
         _swatch(axes, y, panels, colour, int(panels.class_sides[i]))
-        axes.text(64, y, words[i], size=17, color=INK, va="center")
+        axes.text(64, y, words[i] + unit, size=17, color=INK, va="center")
         axes.text(WIDTH - 60, y, f"{counts[i]:,}", size=17, color=GREY, va="center", ha="right")
 
 
@@ -109,7 +109,7 @@ def _swatch(axes: Axes, y: float, panels: Panels, colour: str, sides: int = 0) -
     axes.add_patch(RegularPolygon((22, y), p, radius=20, orientation=np.pi / p, color=colour))
 
 
-def _bar(axes: Axes, top: float, length: float, panels: Panels) -> None:
+def _bar(axes: Axes, top: float, length: float, panels: Panels, unit: str) -> None:
     """A bar from the shortest edge to the longest, for many sizes."""
     steps = colours.gradient(np.linspace(0, 1, 256))[:, None]
     axes.imshow(steps, extent=(2, 42, top + length, top), aspect="auto", interpolation="bilinear")
@@ -117,4 +117,4 @@ def _bar(axes: Axes, top: float, length: float, panels: Panels) -> None:
     at = np.linspace(0, panels.n_sizes - 1, 5).round().astype(int)
     words = text.lengths(panels.class_length[at].tolist())
     for share, word in zip(np.linspace(0, 1, 5).tolist(), words, strict=True):
-        axes.text(64, top + share * length, word, size=17, color=INK, va="center")
+        axes.text(64, top + share * length, word + unit, size=17, color=INK, va="center")

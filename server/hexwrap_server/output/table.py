@@ -14,13 +14,13 @@ from hexwrap_solver.panels.types import Panels
 from hexwrap_solver.pattern.types import Pattern
 from hexwrap_solver.pipeline import Solution
 
-#: Columns that hold lengths begin with one of these.
+#: Columns of lengths begin so.
 LENGTHS = ("edge_length", "limit", "center_", "surface_distance", "gap_")
 
 
 def panels_csv(solution: Solution, meta: Meta) -> bytes:
-    """UTF-8, comma separated, a heading row. Lengths in model units, named in the headings where known;
-    angles in radians.
+    """UTF-8, comma separated, a heading row. Lengths in model units, which the headings name where they are
+    known (``edge_length [mm]``); angles in radians.
 
     ``neighbours`` names the panels across each edge in order, ``-`` where there is none; gaps are to
     those neighbours, along the surface (``tangential``) and across it (``normal``).

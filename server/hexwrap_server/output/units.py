@@ -33,3 +33,8 @@ def unit_of(name: str | None) -> Unit:
 def heading(name: str, unit: str | None, power: int = 1) -> str:
     """The heading of a column of lengths, areas (power 2) …, with the unit where there is one."""
     return name if unit is None else f"{name} [{unit}{'' if power == 1 else power}]"
+
+
+def behind(unit: str | None) -> str:
+    """The unit behind a number, with a blank before it, or nothing."""
+    return f" {unit}" if unit else ""

@@ -20,7 +20,7 @@ from hexwrap_solver.pipeline import Solution
 from hexwrap_solver.surface.types import Surface
 
 #: The parts of a Result, in its order.
-PARTS = ("mesh", "map", "pattern", "panels", "sizes", "quality", "components", "support", "timings")
+PARTS = ("unit", "mesh", "map", "pattern", "panels", "sizes", "quality", "components", "support", "timings")
 #: Asked for beside parts: ``map`` then has ``corners``, whatever its kind.
 CORNERS = "corners"
 
@@ -41,6 +41,8 @@ def part(solution: Solution, name: str, timings: dict[str, float]) -> Any:
     match name:
         case "mesh":
             return mesh(solution.map.surface)
+        case "unit":
+            return solution.map.surface.unit
         case "map":
             return conformal(solution.map)
         case "pattern":
