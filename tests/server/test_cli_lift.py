@@ -178,7 +178,7 @@ def test_a_result_without_its_mesh_is_told(tmp_path: Path, capsys: pytest.Captur
     ("options", "status", "words"),
     [
         (["far.csv", "-o", "x.dxf"], 1, "no point of the drawing lies in the domain"),
-        (["none.csv", "-o", "x.dxf"], 2, "there is no such file"),
+        (["none.csv", "-o", "x.dxf"], 2, "no such file"),
         (["far.csv", "-o", "x.png"], 2, "the ending must be one of"),
         (["far.csv", "-o", "x.dxf", "--step", "0"], 2, "must be greater than 0"),
         (["far.csv", "-o", "x.dxf", "--flatten"], 2, "needs points in space"),

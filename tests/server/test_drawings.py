@@ -198,7 +198,7 @@ def test_what_is_left_out_is_told_with_count_and_kind() -> None:
 @pytest.mark.parametrize("form", ["asc", "bin"])
 def test_dxf_cut_short_is_refused(part: float, form: str) -> None:
     data = dxf(square, form=form)
-    with pytest.raises(DrawingError, match=r"cut short|damaged"):
+    with pytest.raises(DrawingError, match=r"truncated|damaged"):
         read_dxf(data[: int(part * len(data))])
 
 

@@ -127,7 +127,7 @@ def stop_server(process: subprocess.Popen[bytes]) -> None:
 
 
 def who_answers(port: int) -> str:
-    """``hexwrap``, ``other`` or ``nobody``."""
+    """``hexwrap``, ``other`` or ``nobody``: who answers."""
     with _client(port) as client:
         try:
             health = client.get("/health", timeout=3.0).json()

@@ -230,7 +230,7 @@ def _lift(asked: argparse.Namespace) -> int:
         raise UsageError(f"--step {asked.step:g}: must be greater than 0.")
     _check_folders([asked.output])
     if not Path(asked.points).is_file():
-        raise UsageError(f"{asked.points}: there is no such file.")
+        raise UsageError(f"{asked.points}: no such file.")
     drawing = read_drawing(Path(asked.points))
     cmap = map_in_result(Path(asked.input))
     if cmap is None:
@@ -238,7 +238,7 @@ def _lift(asked: argparse.Namespace) -> int:
     carry = flatten_curves if asked.flatten else lift_curves
     carried = carry(cmap, drawing.curves, asked.step)
     if not carried.curves:
-        return _refuse(1, "no point of the drawing lies in the domain; see domain.dxf for where that is.")
+        return _refuse(1, "no point of the drawing lies in the domain, which domain.dxf shows.")
     unit = None if asked.flatten else cmap.surface.unit
     save(asked.output, write_curves(ending, carried.curves, unit))
     console = Console(quiet=asked.quiet, soft_wrap=True, highlight=False)
@@ -300,7 +300,7 @@ def _check_folders(outputs: Sequence[str]) -> None:
     """Before the work, not after it."""
     for out in outputs:
         if not Path(out).resolve().parent.is_dir():
-            raise UsageError(f"-o {out}: there is no folder {Path(out).resolve().parent}.")
+            raise UsageError(f"-o {out}: the folder {Path(out).resolve().parent} does not exist.")
         if Path(out).is_dir():
             raise UsageError(f"-o {out}: this is a folder; name a file.")
 

@@ -199,7 +199,7 @@ def _entry(option: Option, text: str) -> dict[str, object]:
 
 
 def _put(body: dict[str, Any], path: Path, value: object) -> None:
-    """Set a field, without changing the sections of the body that was given; what is no section stays, to be
+    """Set a field without changing the sections of the given body; a section of the wrong type stays, to be
     refused."""
     for step in path[:-1]:
         section = body.get(step)

@@ -189,7 +189,7 @@ async def _on_http_exception(request: Request, error: Exception) -> Response:
     title, detail = {
         404: (
             "No such address",
-            f"There is nothing at {request.url.path[:200]}; the routes are listed at /docs.",
+            f"Nothing is at {request.url.path[:200]}; the routes are listed at /docs.",
         ),
         405: ("Method not allowed", f"{request.method} is not possible at {request.url.path[:200]}."),
     }.get(error.status_code, (str(error.detail), str(error.detail)))
@@ -209,7 +209,7 @@ def _allowed(request: Request) -> list[str]:
 
 def _takes(route: BaseRoute, asked: Scope) -> bool:
     if isinstance(route, Mount) and asked["method"] != "GET":
-        return False  # a folder of files matches whatever the method
+        return False  # a folder of files matches any method
     return route.matches(asked)[0] is Match.FULL
 
 

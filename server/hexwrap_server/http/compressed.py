@@ -100,7 +100,7 @@ def takes_gzip(headers: Headers) -> bool:
 
 
 def _quality(parameters: list[str]) -> float:
-    """1 where there is none; one that is no number means nothing that could be relied on."""
+    """1 where there is none; what is not a number counts as 0."""
     for parameter in parameters:
         name, _, value = parameter.partition("=")
         if name.strip() == "q":

@@ -14,7 +14,7 @@ from hexwrap_server.http import head
 from hexwrap_server.http.answers import problem_response
 from hexwrap_server.http.metrics import Metrics
 
-#: Methods that are told apart; a client may make up others without end, and each would be counted for ever.
+#: Methods that are counted separately; a client may invent others, and each would be counted for ever.
 METHODS = frozenset({"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"})
 FAULT = "The server could not answer because of a fault in hexwrap, not in the request; please report it."
 log = logging.getLogger("hexwrap.http")

@@ -220,7 +220,7 @@ async def get_file(
 ) -> Response:
     """The finished work as a file."""
     if name not in FILES:
-        raise not_found("file", f"There is no file '{name[:64]}'; there are {', '.join(FILES)}.")
+        raise not_found("file", f"Unknown file '{name[:64]}'; choose one of {', '.join(FILES)}.")
     service = service_of(request)
     size = None if sheet is None else _sheet(sheet)
     job = service.manager.get(id)

@@ -61,7 +61,7 @@ async def sample(name: str) -> Response:
     """A bundled surface as a complete request body."""
     if name not in samples.names():
         raise not_found(
-            "sample", f"There is no sample '{name[:64]}'; there are {', '.join(samples.names())}."
+            "sample", f"Unknown sample '{name[:64]}'; choose one of {', '.join(samples.names())}."
         )
     return Response(orjson.dumps(samples.load(name)), media_type=JSON)
 

@@ -31,7 +31,7 @@ class Body:
                 400,
                 "not-gzip",
                 "The body is not gzip",
-                "Content-Encoding says gzip, but the body is broken or cut short.",
+                "Content-Encoding says gzip, but the body is damaged or truncated.",
             ) from None
         if len(whole) > limit:
             raise body_too_large(max_mib)

@@ -22,7 +22,7 @@ Getter = Callable[[str], Any]
 
 
 def map_in_result(path: Path) -> ConformalMap | None:
-    """The map, or None where the file is no result. Raises UsageError for a result that is broken."""
+    """The map, or None where the file is not a result. Raises UsageError for a result that is broken."""
     get = _getter(path)
     if get is None:
         return None
@@ -59,7 +59,7 @@ def _in_dictionary(result: dict[str, Any]) -> Getter:
 
 
 def _known(get: Getter, name: str) -> Any:
-    """None where there is no such value."""
+    """None where the value is missing."""
     try:
         return get(name)
     except (KeyError, IndexError):

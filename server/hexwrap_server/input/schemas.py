@@ -23,7 +23,7 @@ from hexwrap_solver.surface.types import MeshSettings, NurbsSurface, SentMesh, S
 
 @dataclass(frozen=True)
 class NurbsForm:
-    """The part of a NURBS surface that is no large array."""
+    """The part of a NURBS surface besides its large arrays."""
 
     degree: Annotated[tuple[int, int], Setting("degrees in u and v", ge=1, le=25)]
     closed: Annotated[tuple[bool, bool], Setting("whether it closes up in u and in v")] = (False, False)

@@ -169,5 +169,5 @@ def _class(place: str) -> Any:
     module, _, name = place.partition(":")
     kind = getattr(import_module(module), name) if module.startswith(_PACKAGES) else None
     if not (isinstance(kind, type) and is_dataclass(kind)):
-        raise ValueError(f"{place} is no dataclass of this version")
+        raise ValueError(f"{place} is not a dataclass of this version")
     return kind

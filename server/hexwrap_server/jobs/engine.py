@@ -44,11 +44,11 @@ class Engine(Protocol):
     async def start(self) -> None: ...
 
     async def stop(self) -> None:
-        """Kill whatever runs; afterwards no process of the engine is left."""
+        """Kill all running processes of the engine."""
         ...
 
     async def wait_for_place(self, seconds: float, told: Callable[[str], None]) -> None:
-        """Until there is any place where a call could run. told: what it waits for, if it has to.
+        """Until there is any place where a call could run. told: called with what it waits for, if it has to.
 
         Raises WorkError after seconds.
         """

@@ -1,4 +1,4 @@
-"""The queue: jobs come in, works are run, everybody who waits is told."""
+"""The queue: jobs come in, works are run, everybody who waits is notified."""
 
 from __future__ import annotations
 
@@ -161,7 +161,7 @@ class JobManager:
         item = self._live.get(id)
         job = item.jobs[id] if item else self._ledger.get(id) or self.store.job(id)
         if job is None:
-            raise not_found("job", f"There is no job '{id[:64]}' here; it may have been forgotten.")
+            raise not_found("job", f"No job '{id[:64]}' is kept here; it may have expired.")
         return job
 
     async def latest(self, limit: int, before: str | None = None) -> list[dict[str, Any]]:
@@ -336,9 +336,11 @@ class JobManager:
         self._settle(item.work.identity)
         try:
             ended = [_failed(job, error) for job in item.jobs.values()]
-        except Exception:  # whatever cannot be told must not keep the jobs from ending
-            log.exception("a problem cannot be told")
-            fault = InternalError(f"The job failed, and its problem cannot be told ({error}); report it.")
+        except Exception:  # a problem that cannot be written must not keep the jobs from ending
+            log.exception("a problem cannot be written as JSON")
+            fault = InternalError(
+                f"The job failed, and its problem cannot be written as JSON ({error}); report it."
+            )
             ended = [_failed(job, fault) for job in item.jobs.values()]
         self._end(ended)
 

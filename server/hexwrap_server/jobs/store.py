@@ -1,7 +1,7 @@
 """What survives the server: jobs and works in SQLite, surfaces, results and solutions as files beside it.
 
 A *work* is what has to be computed, known by the SHA-256 of all it depends on; a *job* is one client's wish
-for it. Every transition is written here before anybody is told. The write-ahead log keeps what was written
+for it. Each transition is written here before it is announced. The write-ahead log keeps what was written
 when the process is killed at any moment.
 """
 
@@ -340,7 +340,7 @@ class Store:
         return found
 
     def prune_files(self, kept: Kept, stage_bytes: float) -> None:
-        """Delete the files that nobody needs any more. Touches many files."""
+        """Delete files that are no longer needed. Touches many files."""
         prune(self.results, 0.0, keep=lambda name: name.partition(".")[0] in kept.works)
         prune(self.surfaces, 0.0, keep=lambda name: name.partition(".")[0] in kept.surfaces)
         prune(self.stages, stage_bytes, oldest=kept.oldest)
@@ -410,7 +410,7 @@ def _is_packed(data: bytes) -> bool:
 
 
 def _locked(path: Path) -> sqlite3.Connection:
-    """A lock that every system frees when the process ends, in whatever way."""
+    """A lock that every system frees when the process ends, even by a crash."""
     try:
         lock = sqlite3.connect(path, timeout=0, check_same_thread=False, isolation_level=None)
     except sqlite3.DatabaseError as error:

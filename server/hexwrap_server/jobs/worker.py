@@ -127,7 +127,7 @@ class WorkerProcess:
             watch.join()
 
     def stop(self) -> None:
-        """Kill the worker, whatever it does. Safe from any thread."""
+        """Kill the worker at once. Safe from any thread."""
         self._stopped = True
         process = self._process
         if process is not None:

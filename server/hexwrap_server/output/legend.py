@@ -102,7 +102,7 @@ def _swatches(axes: Axes, top: float, panels: Panels, unit: str) -> None:
 
 
 def _swatch(axes: Axes, y: float, panels: Panels, colour: str, sides: int = 0) -> None:
-    """A polygon of so many corners, or as many as most panels have, standing on a side."""
+    """A polygon with this number of corners (None: as most panels have), standing on a side."""
     from matplotlib.patches import RegularPolygon
 
     p = sides or int(np.bincount(panels.polygons.lengths, minlength=7)[3:7].argmax()) + 3

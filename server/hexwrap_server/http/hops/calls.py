@@ -54,7 +54,7 @@ def read_call(report: Report, body: Body, settings: Settings, folder: str) -> Ca
         raise HopsError("The body must be an object with 'pointer' and 'values'.")
     pointer = "/" + pointer.split("//")[-1].partition("/")[2] if "//" in pointer else pointer
     if pointer not in COMPONENTS:
-        raise HopsError(f"There is no component at '{pointer[:100]}'; there are {', '.join(COMPONENTS)}.")
+        raise HopsError(f"No component is at '{pointer[:100]}'; choose one of {', '.join(COMPONENTS)}.")
     values, branch = read_inputs(COMPONENTS[pointer].inputs, sent.get("values"))
     if pointer == LIFT:
         curves = tuple(rhino_curve(curve) for curve in values["Curves"])

@@ -1,4 +1,4 @@
-"""What a drawing holds, whatever file it came in."""
+"""What a drawing of any format holds."""
 
 from __future__ import annotations
 

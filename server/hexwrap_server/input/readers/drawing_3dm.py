@@ -15,7 +15,7 @@ def read_3dm_drawing(data: bytes) -> Drawing:
     """Visible points, point clouds and curves, blocks resolved. Raises DrawingError."""
     model = Model.read(data)
     if model is None:
-        raise DrawingError("The drawing is no Rhino file, or it is cut short.")
+        raise DrawingError("The drawing is not a Rhino file, or is truncated.")
     try:
         objects = model.objects()
     except TooManyObjectsError:

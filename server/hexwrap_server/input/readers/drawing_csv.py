@@ -15,7 +15,7 @@ _SEPARATOR = re.compile(r"sep=(.)", re.IGNORECASE)
 _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 #: 1.234.567,8 and 1,234,567.8
 _GROUPED = re.compile(r"[+-]?\d{1,3}(?:([.,])\d{3})(?:\1\d{3})*([.,])\d+")
-#: What looks like a number although it is none was meant to be one, and is no heading.
+#: What looks almost like a number was meant to be one, and is not a heading.
 _NEARLY = re.compile(r"[+-]?[.,]?\d")
 
 
