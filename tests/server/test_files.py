@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 import re
 import xml.etree.ElementTree as ET
 from dataclasses import replace
@@ -27,6 +28,7 @@ from hexwrap_server.output.writers import WRITERS, Meta, NotMadeError, SheetErro
 from hexwrap_solver.arrays import Ragged
 from hexwrap_solver.panels.types import Components, Support
 from hexwrap_solver.pipeline import Solution
+from hexwrap_solver.surface.types import Origin
 from tests.server.analytic import cylinder
 
 ODD = Meta("Türme 塔 <&\"'> \n$x^2$")
@@ -155,7 +157,14 @@ def test_3dm_has_a_coloured_layer_per_size_and_data_on_every_panel(solution: Sol
     model = rhino3dm.File3dm.FromByteArray(write("panels.3dm", solution, ODD))
     layers = {layer.Index: layer for layer in model.Layers}
     names = [layer.Name for layer in layers.values()]
-    assert names == ["panels", "size-00 (0.8600)", "size-01 (0.8800)", "size-02 (0.9000)", "labels"]
+    assert names == [
+        "panels",
+        "size-00 (0.8600)",
+        "size-01 (0.8800)",
+        "size-02 (0.9000)",
+        "labels",
+        "surface",
+    ]
     assert len({layer.Color for layer in layers.values() if layer.Name.startswith("size")}) == 3
     curves = [o for o in model.Objects if o.Geometry.ObjectType == rhino3dm.ObjectType.Curve]
     assert [o.Attributes.Name for o in curves] == labels_of(solution)
@@ -169,6 +178,50 @@ def test_3dm_has_a_coloured_layer_per_size_and_data_on_every_panel(solution: Sol
         )
     dots = [o for o in model.Objects if o.Geometry.ObjectType == rhino3dm.ObjectType.TextDot]
     assert [o.Geometry.Text for o in dots] == labels_of(solution)
+
+
+def named(solution: Solution, unit: str | None) -> Solution:
+    """The same, as if it came from a Rhino file."""
+    origin = Origin("tower", "Facade::Outer", (("material", "glass"),))
+    surface = replace(solution.map.surface, unit=unit, origin=origin)
+    return replace(solution, map=replace(solution.map, surface=surface))
+
+
+def test_what_came_in_goes_out(solution: Solution) -> None:
+    """Unit, layers, name and user strings of the source, and the source itself, exact far from the origin."""
+    made = named(solution, "mm")
+    far = replace(made.map.surface, vertices=made.map.surface.vertices + 5e6)
+    made = replace(made, map=replace(made.map, surface=far))
+    model = rhino3dm.File3dm.FromByteArray(write("panels.3dm", made, ODD))
+    assert model.Settings.ModelUnitSystem == rhino3dm.UnitSystem.Millimeters
+    paths = {layer.Index: layer.FullPath for layer in model.Layers}
+    assert "Facade::Outer::panels" in paths.values()
+    panels = [o for o in model.Objects if o.Geometry.ObjectType == rhino3dm.ObjectType.Curve]
+    for item in panels:
+        assert paths[item.Attributes.LayerIndex].startswith("Facade::Outer::panels::size")
+        assert item.Attributes.GetUserString("material") == "glass"
+        assert item.Attributes.GetUserString("source") == "tower"
+        assert item.Attributes.GroupCount == 1
+    assert [group.Name for group in model.Groups] == ["tower panels"]
+    (surface,) = [o for o in model.Objects if o.Geometry.ObjectType == rhino3dm.ObjectType.Mesh]
+    assert surface.Attributes.Name == "tower"
+    assert surface.Attributes.GetUserString("material") == "glass"
+    assert paths[surface.Attributes.LayerIndex] == "Facade::Outer::surface"
+    points = [surface.Geometry.Vertices.Point3dAt(i) for i in range(len(surface.Geometry.Vertices))]
+    assert [[p.X, p.Y, p.Z] for p in points] == far.vertices.tolist()
+
+
+@pytest.mark.parametrize(("unit", "code"), [("m", 6), ("mm", 4), ("ft", 2), ("in", 1), ("cm", 5), (None, 0)])
+def test_units_in_drawings_tables_and_arrays(solution: Solution, unit: str | None, code: int) -> None:
+    made = named(solution, unit)
+    for name in ("panels.dxf", "flat.dxf"):
+        assert f"$INSUNITS\n 70\n{code}\n" in write(name, made, ODD).decode().replace("\r\n", "\n")
+    heading = write("panels.csv", made, ODD).decode().splitlines()[0]
+    assert ("edge_length [" in heading) == (unit is not None)
+    assert f"edge_length [{unit}]" in heading or unit is None
+    assert "planarity," in heading  # a ratio
+    assert json.loads(write("result.json", made, ODD))["unit"] == unit
+    assert str(np.load(io.BytesIO(write("result.npz", made, ODD)))["unit"]) == (unit or "")
 
 
 def test_3dm_carries_components_and_support(solution: Solution) -> None:
@@ -190,7 +243,7 @@ def test_3dm_carries_components_and_support(solution: Solution) -> None:
     data = write("panels.3dm", replace(solution, components=components, support=support), ODD)
     model = rhino3dm.File3dm.FromByteArray(data)
     meshes = [o.Geometry for o in model.Objects if o.Geometry.ObjectType == rhino3dm.ObjectType.Mesh]
-    assert len(meshes) == n + 1
+    assert len(meshes) == n + 2  # and the surface itself
     assert all(mesh.IsClosed for mesh in meshes[:n])
     corner = meshes[0].Vertices.Point3dAt(1)
     assert (corner.X, corner.Y, corner.Z) == (1e6 + 1, 0, 0)

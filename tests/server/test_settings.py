@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from hexwrap_server.errors import FolderInUseError
 from hexwrap_server.http.service import open_store
-from hexwrap_server.jobs.store import FolderInUseError
 from hexwrap_server.settings import Settings, add_arguments, flag, readme_table, variable
 
 PAGE = Path(__file__).parents[2] / "docs" / "service.md"

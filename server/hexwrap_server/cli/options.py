@@ -7,9 +7,9 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from hexwrap_server.errors import FormError
 from hexwrap_server.input.faults import Path, pointer
 from hexwrap_server.input.form import Body, Leaf, is_nullable, leaves
-from hexwrap_server.problems import FormError
 
 #: Flags that are neither the setting's name nor, for the first setting of a section, the section's.
 FLAGS: dict[Path, str] = {
@@ -199,7 +199,7 @@ def _entry(option: Option, text: str) -> dict[str, object]:
 
 
 def _put(body: dict[str, Any], path: Path, value: object) -> None:
-    """Set a field, without changing the sections of the body that was given; what is no section stays, to be
+    """Set a field without changing the sections of the given body; a section of the wrong type stays, to be
     refused."""
     for step in path[:-1]:
         section = body.get(step)

@@ -17,9 +17,9 @@ from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 import pydantic
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, FiniteFloat, ValidationError
 
+from hexwrap_server.errors import FormError
 from hexwrap_server.input.faults import Path, faults, pointer
 from hexwrap_server.input.requests import Wanted
-from hexwrap_server.problems import FormError
 from hexwrap_solver.conformal.types import ANGLE_UNITS
 from hexwrap_solver.setting import Setting
 

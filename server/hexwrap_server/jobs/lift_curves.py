@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexwrap_server.cli.local import UsageError
+from hexwrap_server.errors import UsageError
 from hexwrap_server.input.curves import refined
 from hexwrap_server.input.readers.drawing import Curve
 from hexwrap_server.output.unrolled import plane

@@ -56,7 +56,7 @@ def flat_dxf(solution: Solution, meta: Meta) -> bytes:
     labels = pattern.labels()
     names = [labels[face] for face in panels.face.tolist()]
     places = pack(outlines.extent, panels.size, meta.sheet, names)
-    document = drawing(panels, meta.name, "sheets", "labels", "neighbours")
+    document = drawing(panels, meta.name, solution.map.surface.unit, "sheets", "labels", "neighbours")
     space = document.modelspace()
     width, height = places.size
     step = 1.1 * width

@@ -13,6 +13,7 @@ import numpy as np
 
 from hexwrap_server.output import colours, text
 from hexwrap_server.output.meta import Meta
+from hexwrap_server.output.units import behind
 from hexwrap_solver.arrays import Floats
 from hexwrap_solver.panels.types import Panels
 
@@ -26,8 +27,8 @@ ROWS = 24
 INK, GREY = "#23262b", "#70757d"
 
 
-def compose(image: Floats, panels: Panels, meta: Meta) -> bytes:
-    """PNG of the image (h, w, 3) with the legend on its right."""
+def compose(image: Floats, panels: Panels, meta: Meta, unit: str | None = None) -> bytes:
+    """PNG of the image (h, w, 3) with the legend on its right. unit: of the lengths."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -40,7 +41,7 @@ def compose(image: Floats, panels: Panels, meta: Meta) -> bytes:
     axes = figure.add_axes((width / (width + WIDTH), 0, WIDTH / (width + WIDTH), 1))
     axes.set(xlim=(0, WIDTH), ylim=(height, 0))
     axes.set_axis_off()
-    _legend(axes, height, panels, meta)
+    _legend(axes, height, panels, meta, behind(unit))
     out = io.BytesIO()
     with warnings.catch_warnings():  # a name in a script that the bundled font lacks shows boxes, no warning
         warnings.simplefilter("ignore", UserWarning)
@@ -48,7 +49,7 @@ def compose(image: Floats, panels: Panels, meta: Meta) -> bytes:
     return out.getvalue()
 
 
-def _legend(axes: Axes, height: int, panels: Panels, meta: Meta) -> None:
+def _legend(axes: Axes, height: int, panels: Panels, meta: Meta, unit: str) -> None:
     n_sizes = len(panels.class_length)
     rows = n_sizes if n_sizes <= ROWS else 10
     cut = int(np.sum(panels.size < 0))
@@ -60,9 +61,9 @@ def _legend(axes: Axes, height: int, panels: Panels, meta: Meta) -> None:
     sizes = {0: "", 1: ", 1 size"}.get(named, f", {named:,} sizes")
     axes.text(0, top - 48, f"{panels.n_panels:,} panels{sizes}", size=17, color=GREY, va="center")
     if n_sizes <= ROWS:
-        _swatches(axes, top, panels)
+        _swatches(axes, top, panels, unit)
     else:
-        _bar(axes, top, rows * ROW - 20, panels)
+        _bar(axes, top, rows * ROW - 20, panels, unit)
     if cut:
         y = top + ROW * (rows + 0.5)
         _swatch(axes, y, panels, colours.UNSIZED)
@@ -70,25 +71,25 @@ def _legend(axes: Axes, height: int, panels: Panels, meta: Meta) -> None:
         axes.text(WIDTH - 60, y, f"{cut:,}", size=17, color=GREY, va="center", ha="right")
 
 
-def _swatches(axes: Axes, top: float, panels: Panels) -> None:
+def _swatches(axes: Axes, top: float, panels: Panels, unit: str) -> None:
     """One row per size: colour, edge length, how many."""
     counts, words = panels.class_count.tolist(), text.lengths(panels.class_length.tolist())
     for i, colour in enumerate(colours.class_colours(panels)):
         y = top + ROW * (i + 0.5)
         _swatch(axes, y, panels, colour, int(panels.class_sides[i]))
-        axes.text(64, y, words[i], size=17, color=INK, va="center")
+        axes.text(64, y, words[i] + unit, size=17, color=INK, va="center")
         axes.text(WIDTH - 60, y, f"{counts[i]:,}", size=17, color=GREY, va="center", ha="right")
 
 
 def _swatch(axes: Axes, y: float, panels: Panels, colour: str, sides: int = 0) -> None:
-    """A polygon of so many corners, or as many as most panels have, standing on a side."""
+    """A polygon with this number of corners (None: as most panels have), standing on a side."""
     from matplotlib.patches import RegularPolygon
 
     p = sides or int(np.bincount(panels.polygons.lengths, minlength=7)[3:7].argmax()) + 3
     axes.add_patch(RegularPolygon((22, y), p, radius=20, orientation=np.pi / p, color=colour))
 
 
-def _bar(axes: Axes, top: float, length: float, panels: Panels) -> None:
+def _bar(axes: Axes, top: float, length: float, panels: Panels, unit: str) -> None:
     """A bar from the shortest edge to the longest, for many sizes."""
     steps = colours.gradient(np.linspace(0, 1, 256))[:, None]
     axes.imshow(steps, extent=(2, 42, top + length, top), aspect="auto", interpolation="bilinear")
@@ -96,4 +97,4 @@ def _bar(axes: Axes, top: float, length: float, panels: Panels) -> None:
     at = np.linspace(0, panels.n_sizes - 1, 5).round().astype(int)
     words = text.lengths(panels.class_length[at].tolist())
     for share, word in zip(np.linspace(0, 1, 5).tolist(), words, strict=True):
-        axes.text(64, top + share * length, word, size=17, color=INK, va="center")
+        axes.text(64, top + share * length, word + unit, size=17, color=INK, va="center")

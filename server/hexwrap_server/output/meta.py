@@ -1,4 +1,4 @@
-"""What the writers are told besides the solution, and how they say that there is nothing to write."""
+"""What writers get besides the solution, and their errors."""
 
 from __future__ import annotations
 

@@ -123,7 +123,7 @@ class Sun:
     direction: Floats
 
     def reaches(self, points: Floats, blur: float, bias: float) -> Floats:
-        """(n,) share of the sun, 0..1, that reaches the points, with edges blurred over so many samples."""
+        """(n,) share of the sun, 0..1, that reaches the points, with edges blurred over this many samples."""
         seen = self.camera.see(points)
         at, limit = self.camera.project(seen), 1.0 / (seen[:, 2] - bias)
         share = np.zeros(len(points))

@@ -17,6 +17,7 @@ from scipy.linalg.blas import dgemv, dsyrk, dtrsm, dtrsv
 from scipy.linalg.lapack import dpotrf
 
 from hexwrap_solver.arrays import Floats, Ints
+from hexwrap_solver.errors import ConvergenceError
 from hexwrap_solver.linalg.dissection import Dissection, dissect
 from hexwrap_solver.linalg.workspace import borrow
 
@@ -25,6 +26,9 @@ from hexwrap_solver.linalg.workspace import borrow
 LARGE = 8000
 #: Adding one slice costs as much as adding this many entries one by one.
 ENTRIES_PER_SLICE = 600
+#: A factor of more numbers than this, for all and for each unknown, is not begun: meshes of a surface need
+#: some 60 for each of a million vertices.
+MOST, MOST_EACH = 50_000_000, 300
 
 
 class _Front(NamedTuple):
@@ -67,7 +71,13 @@ class Factorisation:
         low, high = np.minimum(one, other), np.maximum(one, other)
         self._fronts, visits, stacks = _analyse(tree, low, high)
         size, self._diagonal_at, self._off_diagonal_at = self._addresses(low, high)
-        memory = borrow(size + sum(stacks), self)
+        needed = size + sum(stacks)
+        if needed > MOST + MOST_EACH * self.n:
+            raise ConvergenceError(
+                f"The equations of {self.n} unknowns would take {8e-9 * needed:.1f} GB to solve: the mesh "
+                "joins distant places by single edges or vertices; remesh it more evenly."
+            )
+        memory = borrow(needed, self)
         self._factor, *self._stacks = np.split(memory, np.cumsum([size, *stacks])[:-1])
         self._visits = visits
         self._blocks = [self._block(front) for front in self._fronts]
