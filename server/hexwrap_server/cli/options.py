@@ -20,6 +20,7 @@ FLAGS: dict[Path, str] = {
     ("panels", "weights", "angle"): "--weight-angle",
     ("panels", "weights", "edge"): "--weight-edge",
     ("panels", "weights", "surface"): "--weight-surface",
+    ("surface", "features", "angle"): "--fold",
 }
 #: Settings of which a request gives one.
 SIZES: tuple[Path, Path] = (("pattern", "around"), ("pattern", "edge_length"))

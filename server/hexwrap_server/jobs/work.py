@@ -21,9 +21,8 @@ from hexwrap_server.jobs.worker import Report
 from hexwrap_server.output import wire
 from hexwrap_server.output.writers import WRITERS, Meta
 from hexwrap_solver import pipeline
-from hexwrap_solver.arrays import Ragged
-from hexwrap_solver.surface import SentMesh, surface_from_mesh, surface_from_nurbs, with_openings
-from hexwrap_solver.surface.brep import mesh_brep
+from hexwrap_solver.surface import surface_from_mesh, with_openings
+from hexwrap_solver.surface.brep import surface_from_brep, surface_from_patch
 from hexwrap_solver.surface.types import Origin, Surface, SurfaceSettings
 
 #: Finished solutions that a worker keeps for lift, flatten and files.
@@ -79,14 +78,13 @@ def take_in(sent: SentSurface, asked: SurfaceSettings | None = None) -> Surface:
     """asked: instead of the settings that were sent along. Raises SurfaceError."""
     settings = asked or sent.settings or SurfaceSettings()
     if sent.mesh is not None:
-        surface = with_openings(surface_from_mesh(sent.mesh), settings.openings)
+        surface = surface_from_mesh(sent.mesh, settings)
     elif sent.brep is not None:
-        meshed = mesh_brep(sent.brep, settings.mesh)
-        mesh = SentMesh(meshed.vertices, Ragged.from_table(meshed.faces), meshed.normals)
-        surface = with_openings(surface_from_mesh(mesh), settings.openings)
+        surface = surface_from_brep(sent.brep, settings)
     else:
         assert sent.nurbs is not None
-        surface = surface_from_nurbs(sent.nurbs, settings.mesh)
+        surface = surface_from_patch(sent.nurbs, settings, sent.tolerance)
+    surface = with_openings(surface, settings.openings)
     unit = settings.unit or sent.unit
     if (unit, sent.origin, sent.told) == (None, Origin(), ()):
         return surface

@@ -208,7 +208,7 @@ def _nearest(surface: Surface, points: Floats, entries: Ints, field: list[Field]
         )
     boundary = np.concatenate(surface.loops)
     at = surface.vertices[boundary]
-    distance, nearest = cKDTree(at).query(points[entries])
+    distance, nearest = (np.asarray(x) for x in cKDTree(at).query(points[entries]))
     steps = [np.linalg.norm(np.diff(surface.vertices[loop], axis=0), axis=1).max() for loop in surface.loops]
     allowed = max(*steps, FAR * float(np.linalg.norm(np.ptp(at, axis=0))))
     far = np.flatnonzero(distance > allowed)

@@ -34,7 +34,7 @@ def check_edge(cmap: ConformalMap, settings: PatternSettings) -> None:
 def too_many(cmap: ConformalMap, settings: PatternSettings, cells: float) -> PatternError:
     """Why that many cells would be needed, and what to do."""
     edge, limit = settings.edge_length, settings.max_cells
-    data = {"cells": int(cells), "limit": limit}
+    data: dict[str, object] = {"cells": int(cells), "limit": limit}
     if edge is not None and edge * _nearest(cmap, edge) != edge:
         return PatternError(
             f"The model is {model(cmap)}, so that about {cells:,.0f} cells with edges of "
