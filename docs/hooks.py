@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import ast
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,13 @@ def on_files(files: Any, config: Any) -> Any:
     for name, made in pages().items():
         files.append(File.generated(config, f"reference/{name}", content=made))
     return files
+
+
+def on_page_markdown(markdown: str, page: Any, config: Any, files: Any) -> str:
+    """Links to the source, which lies outside the site, become plain words."""
+    if "/" in page.file.src_uri:
+        return markdown
+    return re.sub(r"\[([^\]]*)\]\(\.\./[^)]*\)", r"\1", markdown)
 
 
 def pages() -> dict[str, str]:

@@ -40,7 +40,7 @@ keywords:
 
 
 def version() -> str:
-    """The project's version, from the solver's source, which is not imported: it needs more than this does."""
+    """The project's version, from the solver's source, which is not imported: it needs more than this."""
     source = (DIST.parents[1] / "solver" / "hexwrap_solver" / "__init__.py").read_text(encoding="utf-8")
     (found,) = re.findall(r'^__version__ = "(.+)"$', source, re.MULTILINE)
     return str(found)
