@@ -29,9 +29,8 @@ from hexwrap_solver.conformal.types import (
 from hexwrap_solver.errors import ConvergenceError, SingularitiesError
 from hexwrap_solver.surface.holes import fill_openings
 from hexwrap_solver.surface.types import Surface
+from hexwrap_solver.tolerances import ANGLE
 
-#: Cone angles this near to a multiple of the quantum are one, radians.
-NOISE = 1e-9
 #: A cone angle this near to a multiple of π/6 is made one, radians, where the map does not come out with the
 #: angle as it is: its apex would lie so far away that coordinates lose the digits in which they differ.
 NEARLY = 1e-7
@@ -88,7 +87,7 @@ def check_cones(surface: Surface, cones: Cones) -> None:
         )
     if len(np.unique(cones.vertex)) < len(cones):
         raise SingularitiesError("Two singularities stand at one vertex of the mesh; place them apart.")
-    sharp = np.flatnonzero(cones.curvature >= 2 * np.pi - NOISE)
+    sharp = np.flatnonzero(cones.curvature >= 2 * np.pi - ANGLE)
     if len(sharp):
         raise SingularitiesError(
             f"Singularity {sharp[0]} has index {cones.index[sharp[0]]}, which would leave nothing of the "
@@ -174,7 +173,7 @@ def _part(progress: Progress, begin: float) -> Progress:
 
 
 def _rounding_notes(surface: Surface, free: list[int], found: Floats, rounded: Floats) -> tuple[str, ...]:
-    changed = np.flatnonzero(np.abs(found - rounded) > NOISE)
+    changed = np.flatnonzero(np.abs(found - rounded) > ANGLE)
     if not len(changed):
         return ()
     if len(surface.loops) == 2 == len(free):

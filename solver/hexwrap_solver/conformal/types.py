@@ -14,6 +14,7 @@ from hexwrap_solver.conformal.net import Net
 from hexwrap_solver.errors import SettingError
 from hexwrap_solver.setting import Setting
 from hexwrap_solver.surface.types import Surface
+from hexwrap_solver.tolerances import is_whole_turn, is_zero
 
 AngleUnit = Literal["rad", "deg", "pi"]
 #: Radians of one unit.
@@ -69,7 +70,9 @@ class LoopCondition:
 class BoundaryCondition:
     """Paper, section 3.1.
 
-    mode ``straight``: every boundary angle is π. ``angles``: the listed ones, π elsewhere.
+    mode ``auto``: straight or isometric, whichever suits the sizes of the cells better, or the listed angles
+    where there are any (``explore.best_boundary_map``; alone, ``conformal_map`` takes straight, and isometric
+    for a disk). ``straight``: every boundary angle is π. ``angles``: the listed ones, π elsewhere.
     ``isometric``: boundary lengths kept up to scale, each loop's curvature rounded to a multiple of quantum.
     Openings (loops from the third on) on which no angle is listed are isometric in every mode: they cannot
     be straight, for they turn by −2π.
@@ -78,7 +81,10 @@ class BoundaryCondition:
     each loop). angle_unit: in which problems give angles; the same condition whatever it is.
     """
 
-    mode: Annotated[BoundaryMode, Setting("what the boundary becomes in the domain")] = "straight"
+    mode: Annotated[
+        Literal["auto"] | BoundaryMode,
+        Setting("what the boundary becomes in the domain; auto: straight or isometric"),
+    ] = "auto"
     angles: Annotated[
         tuple[BoundaryAngle, ...], Setting("target angles at boundary vertices, for mode angles", most=10_000)
     ] = ()
@@ -97,10 +103,12 @@ class BoundaryCondition:
         """The condition for a pattern of this kind (None: no pattern), without what has no effect on the map:
         equal for equal maps."""
         name = self.quantum if self.quantum != "auto" else (kind or "none")
+        mode = "angles" if self.mode == "auto" and self.angles else self.mode
         return replace(
             self,
+            mode=mode,
             quantum=QUANTUM_OF.get(name, "none"),
-            angles=self.angles if self.mode == "angles" else (),
+            angles=self.angles if mode == "angles" else (),
         )
 
 
@@ -171,7 +179,7 @@ class Deck:
     @property
     def is_translation(self) -> bool:
         """K a multiple of 2π (cylinders, and flat rings): g has no fixed point."""
-        return abs(self.reduced) < 1e-9
+        return is_whole_turn(self.angle)
 
     @property
     def reduced(self) -> float:
@@ -292,7 +300,7 @@ class ConformalMap:
     def kind(self) -> Literal["cylinder", "cone", "net"]:
         if isinstance(self.domain, Net):
             return "net"
-        return "cylinder" if abs(self.domain.deck.angle) < 1e-9 else "cone"
+        return "cylinder" if is_zero(self.domain.deck.angle) else "cone"
 
     @property
     def unrolled(self) -> Unrolled:

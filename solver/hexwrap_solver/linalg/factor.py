@@ -226,7 +226,26 @@ def _distinct(keys: Ints) -> Ints:
 
 def _analyse(tree: Dissection, low: Ints, high: Ints) -> tuple[list[_Front], list[int], list[int]]:
     """Fronts in elimination order (deepest level first), with the boundaries that elimination creates; the
-    order in which to visit them; and the sizes of the two stacks of updates."""
+    order in which to visit them; and the sizes of the two stacks of updates.
+
+    Node k of the tree has the front nodes − 1 − k, so that children come before parents and front i's own
+    unknowns are [start[i], start[i + 1]) in the order of elimination. Eliminating them joins all unknowns
+    that they touch and that are not eliminated yet: the front's boundary. By the choice of separators
+    these lie in ancestors of the node. So
+
+        boundary(i) = (neighbours of own(i) in the matrix  ∪  boundaries of both children)  −  own(i),
+
+    which is found level by level, for all fronts of a level at once: a set of pairs (front, unknown) is one
+    sorted array of keys front · n + unknown; the union sorts two such arrays together and drops what occurs
+    twice. What a front hands on to its parent are the keys whose unknown the parent does not own, with the
+    parent's number in front. An entry of the matrix between unknowns low < high belongs to the front that
+    owns low; it starts a boundary entry where another front owns high. (The entries of one front's own
+    block need no key: the block is dense.)
+
+    Of each front's boundary, those owned by the parent come first, as its unknowns are eliminated before
+    all of its own boundary: so one number, ``split``, says where the part that goes into the parent's own
+    rows (``into_own``) ends and the part that goes into its boundary (``into_rest``) begins.
+    """
     n = len(tree.order)
     nodes = len(tree.start) - 1
     size = np.diff(tree.start)
