@@ -39,7 +39,7 @@ def coarse_numbers(geometry: Geometry, tolerance: float | None) -> list[str]:
         return []
     return [
         f"The mesh is far from the origin and has coordinates of single precision, exact to {grain:.2g} "
-        f"only, coarser than the file's tolerance of {tolerance:g}: move it to the origin before it is meshed."
+        f"only, coarser than the file's tolerance of {tolerance:g}: move it to the origin, then mesh it."
     ]
 
 
