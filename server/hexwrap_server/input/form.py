@@ -22,6 +22,7 @@ from hexwrap_server.input.faults import Path, faults, pointer
 from hexwrap_server.input.requests import Wanted
 from hexwrap_solver.conformal.types import ANGLE_UNITS
 from hexwrap_solver.setting import Setting
+from hexwrap_solver.surface.checks import LARGEST, SMALLEST
 
 T = TypeVar("T")
 
@@ -201,10 +202,17 @@ def _accepted(annotation: Any, setting: Setting) -> Any:
     if part is int:
         return Annotated[int, bounds, BeforeValidator(_whole_number)]
     if part is float:
-        return Annotated[FiniteFloat, bounds]
+        return Annotated[FiniteFloat, bounds, AfterValidator(_moderate)]
     if part is str:
         return Annotated[str, pydantic.Field(max_length=setting.most)]
     return part
+
+
+def _moderate(value: float) -> float:
+    """Neither so large nor so small that its square or its inverse is no number."""
+    if value and not SMALLEST <= abs(value) <= LARGEST:
+        raise ValueError(f"must be 0, or between {SMALLEST:g} and {LARGEST:g} in size")
+    return value
 
 
 def _whole_number(value: object) -> object:

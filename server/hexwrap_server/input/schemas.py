@@ -18,6 +18,7 @@ from hexwrap_server.input.form import Body, read, values
 from hexwrap_server.input.requests import SentSurface, Wanted
 from hexwrap_solver.conformal.types import BoundaryCondition
 from hexwrap_solver.setting import Setting
+from hexwrap_solver.surface.nurbs_checks import HIGHEST_DEGREE
 from hexwrap_solver.surface.types import MeshSettings, NurbsSurface, SentMesh, SurfaceSettings
 
 
@@ -25,7 +26,7 @@ from hexwrap_solver.surface.types import MeshSettings, NurbsSurface, SentMesh, S
 class NurbsForm:
     """The part of a NURBS surface besides its large arrays."""
 
-    degree: Annotated[tuple[int, int], Setting("degrees in u and v", ge=1, le=25)]
+    degree: Annotated[tuple[int, int], Setting("degrees in u and v", ge=1, le=HIGHEST_DEGREE)]
     closed: Annotated[tuple[bool, bool], Setting("whether it closes up in u and in v")] = (False, False)
 
 
