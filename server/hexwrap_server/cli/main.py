@@ -32,6 +32,7 @@ from hexwrap_server.input.finished_map import map_in_result
 from hexwrap_server.jobs.lift_curves import flatten_curves, lift_curves
 from hexwrap_server.jobs.worker import Report
 from hexwrap_server.output import wire
+from hexwrap_server.output.meta import GROUPS
 from hexwrap_server.output.text import length
 from hexwrap_server.output.writers import WRITERS, Meta, check_wanted, write
 from hexwrap_server.settings import Settings, add_arguments
@@ -42,7 +43,8 @@ from hexwrap_solver.surface.types import SurfaceSettings
 #: What an ending stands for where the name of the file says no more.
 ENDINGS = {
     ".obj": "panels.obj", ".3dm": "panels.3dm", ".dxf": "panels.dxf", ".csv": "panels.csv",
-    ".svg": "domain.svg", ".png": "panels.png", ".json": "result.json", ".npz": "result.npz",
+    ".ifc": "panels.ifc", ".glb": "panels.glb", ".svg": "domain.svg",
+    ".png": "panels.png", ".json": "result.json", ".npz": "result.npz",
 }  # fmt: skip
 #: Settings of a surface that choose among what a file holds.
 INSPECTED = ("object", "layer", "unit")
@@ -107,6 +109,13 @@ def make_parser() -> argparse.ArgumentParser:
     solve.add_argument(
         "--sheet", type=float, nargs=2, metavar=("WIDTH", "HEIGHT"), help="size of the sheets of flat.dxf"
     )
+    solve.add_argument(
+        "--group", choices=GROUPS, default="size",
+        help="what shares a sheet of flat.dxf: all sizes, a ring, or a side of the building (zone)",
+    )  # fmt: skip
+    solve.add_argument(
+        "--storey", type=float, metavar="HEIGHT", help="height of the storeys of panels.ifc (default: none)"
+    )
     solve.add_argument("-q", "--quiet", action="store_true", help="print nothing but errors")
     add_request_options(solve)
     solve.set_defaults(command=_solve)
@@ -155,7 +164,7 @@ def make_parser() -> argparse.ArgumentParser:
 
 
 def _kinds() -> list[str]:
-    return [*ENDINGS, "flat.dxf", "domain.dxf"]
+    return [*ENDINGS, "flat.dxf", "domain.dxf", "cutting-list.csv"]
 
 
 def _serve(asked: argparse.Namespace) -> int:
@@ -179,11 +188,19 @@ def _solve(asked: argparse.Namespace) -> int:
         raise UsageError(
             f"--sheet {asked.sheet[0]:g} {asked.sheet[1]:g}: both sides must be finite and greater than 0."
         )
+    if asked.storey is not None and not 0 < asked.storey < inf:
+        raise UsageError(f"--storey {asked.storey:g}: must be finite and greater than 0.")
     todo = task(asked.input, asked)
     for kind in kinds.values():
         check_wanted(kind, todo.wanted)
     solution, timings = solve_with_progress(todo, asked.quiet)
-    meta = Meta(todo.name or "hexwrap", timings, tuple(asked.sheet) if asked.sheet else None)
+    meta = Meta(
+        todo.name or "hexwrap",
+        timings,
+        tuple(asked.sheet) if asked.sheet else None,
+        group=asked.group,
+        storey=asked.storey,
+    )
     console = Console(quiet=asked.quiet, soft_wrap=True)
     parts = ("unit", "mesh", "map", "pattern", "panels", "sizes", "quality", "timings")
     print_summary(console, meta.name, {name: wire.part(solution, name, timings) for name in parts})

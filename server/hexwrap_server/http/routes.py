@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator
-from typing import Annotated
+from typing import Annotated, Literal
 
 from fastapi import APIRouter, Path, Query, Request
 from isal import igzip
@@ -33,6 +33,9 @@ FILES = {
     "panels.3dm": "model/vnd.3dm",
     "panels.dxf": "image/vnd.dxf",
     "panels.csv": "text/csv; charset=utf-8",
+    "panels.ifc": "application/x-step",
+    "panels.glb": "model/gltf-binary",
+    "cutting-list.csv": "text/csv; charset=utf-8",
     "flat.dxf": "image/vnd.dxf",
     "domain.svg": "image/svg+xml",
     "domain.dxf": "image/vnd.dxf",
@@ -206,6 +209,14 @@ async def get_file(
             description="flat.dxf: width and height of its sheets in model units, such as 2500x1250",
         ),
     ] = None,
+    group: Annotated[
+        Literal["size", "ring", "zone"],
+        Query(description="flat.dxf: what shares a sheet: all sizes, a ring, or a side of the building"),
+    ] = "size",
+    storey: Annotated[
+        float | None,
+        Query(gt=0, allow_inf_nan=False, description="panels.ifc: height of the storeys in model units"),
+    ] = None,
 ) -> Response:
     """The finished work as a file."""
     if name not in FILES:
@@ -218,8 +229,9 @@ async def get_file(
         data = await asyncio.to_thread(igzip.decompress, await service.manager.result(job))
     else:
         path = str(service.store.solution_path(job.identity))
+        options = {"sheet": size, "group": group, "storey": storey}
         data = await service.errand(
-            "hexwrap_server.jobs.work:write_file", path, name, job.name, job.timings, size
+            "hexwrap_server.jobs.work:write_file", path, name, job.name, job.timings, options
         )
     headers = {"Content-Disposition": f'attachment; filename="{name}"'}
     return Response(data, 200, headers, FILES[name])

@@ -21,8 +21,8 @@ from hexwrap_server.input.readers.drawing_3dm import read_3dm_drawing
 from hexwrap_server.input.readers.drawing_csv import read_csv
 from hexwrap_server.input.readers.drawing_dxf import read_dxf
 from hexwrap_server.input.readers.drawing_json import read_json
-from hexwrap_server.output import units
 from hexwrap_server.output.drawing import encode
+from hexwrap_server.output.units import unit_of
 from hexwrap_solver.arrays import Floats
 
 
@@ -88,7 +88,7 @@ def _write_dxf(curves: list[Curve], unit: str | None) -> bytes:
     from ezdxf.filemanagement import new
 
     document = new("R2010")
-    document.header["$INSUNITS"] = units.DXF[unit]
+    document.header["$INSUNITS"] = unit_of(unit).dxf
     space = document.modelspace()
     for curve in curves:
         if len(curve.points) == 1:
@@ -100,7 +100,7 @@ def _write_dxf(curves: list[Curve], unit: str | None) -> bytes:
 
 def _write_3dm(curves: list[Curve], unit: str | None) -> bytes:
     model = rhino3dm.File3dm()
-    model.Settings.ModelUnitSystem = getattr(rhino3dm.UnitSystem, units.RHINO[unit])
+    model.Settings.ModelUnitSystem = getattr(rhino3dm.UnitSystem, unit_of(unit).rhino)
     for curve in curves:
         points = [rhino3dm.Point3d(*p, *[0.0] * (3 - len(p))) for p in _drawn(curve).tolist()]
         if len(points) == 1:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from isal import igzip
 
@@ -19,7 +20,7 @@ from hexwrap_server.jobs.cache import CachingRunner, StageCache
 from hexwrap_server.jobs.disk import read_whole, write_whole
 from hexwrap_server.jobs.worker import Report
 from hexwrap_server.output import wire
-from hexwrap_server.output.writers import WRITERS, Meta
+from hexwrap_server.output.writers import Meta, write
 from hexwrap_solver import pipeline
 from hexwrap_solver.surface import surface_from_mesh, with_openings
 from hexwrap_solver.surface.brep import surface_from_brep, surface_from_patch
@@ -98,15 +99,10 @@ def result_parts(report: Report, path: str, names: list[str], timings: dict[str,
 
 
 def write_file(
-    report: Report,
-    path: str,
-    name: str,
-    title: str,
-    timings: dict[str, float],
-    sheet: tuple[float, float] | None,
+    report: Report, path: str, name: str, title: str, timings: dict[str, float], options: dict[str, Any]
 ) -> bytes:
-    """The finished work as a file. Raises HexwrapError where it cannot be made."""
-    return WRITERS[name](solution_at(path), Meta(name=title or "hexwrap", timings=timings, sheet=sheet))
+    """The finished work as a file. options: further fields of ``Meta``. Raises HexwrapError."""
+    return write(name, solution_at(path), Meta(title or "hexwrap", timings, **options))
 
 
 @cache

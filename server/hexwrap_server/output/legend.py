@@ -6,8 +6,9 @@ matplotlib is loaded when a picture is made: it takes half a second that most pr
 from __future__ import annotations
 
 import io
+import textwrap
 import warnings
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -24,29 +25,50 @@ if TYPE_CHECKING:
 WIDTH, ROW, DPI = 420, 54, 100
 #: More sizes than this are shown as a bar of colours.
 ROWS = 24
+#: Letters of the title in a line, and lines before it becomes smaller.
+LETTERS, LINES = 18, 4
 INK, GREY = "#23262b", "#70757d"
 
 
 def compose(image: Floats, panels: Panels, meta: Meta, unit: str | None = None) -> bytes:
-    """PNG of the image (h, w, 3) with the legend on its right. unit: of the lengths."""
+    """PNG of the image (h, w, 3) in 0..1 with the legend on its right. unit: of the lengths."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
+    from PIL import Image
 
-    height, width = image.shape[:2]
-    figure = Figure(figsize=((width + WIDTH) / DPI, height / DPI), dpi=DPI, facecolor="white")
-    FigureCanvasAgg(figure)
-    picture = figure.add_axes((0, 0, width / (width + WIDTH), 1))
-    picture.imshow(np.rint(255 * image).astype(np.uint8), interpolation="none", aspect="auto")
-    picture.set_axis_off()
-    axes = figure.add_axes((width / (width + WIDTH), 0, WIDTH / (width + WIDTH), 1))
+    height = image.shape[0]
+    figure = Figure(figsize=(WIDTH / DPI, height / DPI), dpi=DPI, facecolor="white")
+    canvas: Any = FigureCanvasAgg(figure)
+    axes = figure.add_axes((0, 0, 1, 1))
     axes.set(xlim=(0, WIDTH), ylim=(height, 0))
     axes.set_axis_off()
     _legend(axes, height, panels, meta, behind(unit))
-    out = io.BytesIO()
     with warnings.catch_warnings():  # a name in a script that the bundled font lacks shows boxes, no warning
         warnings.simplefilter("ignore", UserWarning)
-        figure.savefig(out, format="png", dpi=DPI)
+        canvas.draw()
+    legend = np.asarray(canvas.buffer_rgba())[:height, :WIDTH, :3]
+    pixels = np.concatenate([np.rint(255 * image).astype(np.uint8), legend], axis=1)
+    out = io.BytesIO()
+    Image.fromarray(pixels).save(out, "png", compress_level=4, dpi=(DPI, DPI))
     return out.getvalue()
+
+
+def _title(axes: Axes, top: float, name: str) -> None:
+    """The name above the legend, its last line at ``top``, in as many lines as it needs."""
+    lines = textwrap.wrap(name, LETTERS, break_on_hyphens=False) or [""]
+    size = 25
+    if len(lines) > LINES:
+        lines, size = textwrap.wrap(name, int(LETTERS * 25 / 15), break_on_hyphens=False), 15
+    step = size * 1.35 * DPI / 72
+    canvas: Any = axes.figure.canvas
+    renderer = canvas.get_renderer()
+    for k, line in enumerate(reversed(lines)):
+        place: dict[str, Any] = {"color": INK, "va": "center", "weight": "bold"}
+        shown = axes.text(0, top - k * step, line.replace("$", r"\$"), size=size, **place)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)
+            width = shown.get_window_extent(renderer).width
+        shown.set_fontsize(size * min(1.0, (WIDTH - 12) / max(width, 1.0)))
 
 
 def _legend(axes: Axes, height: int, panels: Panels, meta: Meta, unit: str) -> None:
@@ -54,9 +76,7 @@ def _legend(axes: Axes, height: int, panels: Panels, meta: Meta, unit: str) -> N
     rows = n_sizes if n_sizes <= ROWS else 10
     cut = int(np.sum(panels.size < 0))
     top = (height - ROW * (rows + (cut > 0))) / 2
-    title = text.one_line(meta.name)
-    title = title if len(title) <= 28 else title[:27] + "…"
-    axes.text(0, top - 96, title.replace("$", r"\$"), size=25, color=INK, va="center", weight="bold")
+    _title(axes, top - 96, text.one_line(meta.name))
     named = panels.n_sizes
     sizes = {0: "", 1: ", 1 size"}.get(named, f", {named:,} sizes")
     axes.text(0, top - 48, f"{panels.n_panels:,} panels{sizes}", size=17, color=GREY, va="center")

@@ -1,4 +1,8 @@
-"""``panels.3dm``: closed polylines with a layer per size, labels as text dots, panel data as user strings."""
+"""``panels.3dm``: closed polylines with a layer per size, labels as text dots, panel data as user strings.
+
+Where components were asked for, a block per size with an instance per panel; the surface on a layer of its
+own.
+"""
 
 from __future__ import annotations
 
@@ -8,13 +12,14 @@ from typing import Any
 import numpy as np
 import rhino3dm
 
-from hexwrap_server.output import units
+from hexwrap_server.output.blocks import Blocks, Shape
 from hexwrap_server.output.layers import size_layers
 from hexwrap_server.output.meta import Meta, panels_of
 from hexwrap_server.output.table import columns
 from hexwrap_server.output.text import one_line
-from hexwrap_solver.arrays import Ints, Ragged
-from hexwrap_solver.panels.types import Components, Support
+from hexwrap_server.output.units import unit_of
+from hexwrap_solver.arrays import Floats, Ints, Ragged
+from hexwrap_solver.panels.types import Components, Panels, Support
 from hexwrap_solver.pipeline import Solution
 
 #: The columns of ``panels.csv`` that every polyline carries as user strings.
@@ -39,7 +44,7 @@ def panels_3dm(solution: Solution, meta: Meta) -> bytes:
     surface = solution.map.surface
     model = rhino3dm.File3dm()
     model.ApplicationName = "hexwrap"
-    model.Settings.ModelUnitSystem = getattr(rhino3dm.UnitSystem, units.RHINO[surface.unit])
+    model.Settings.ModelUnitSystem = getattr(rhino3dm.UnitSystem, unit_of(meta.unit).rhino)
     model.Strings["hexwrap"] = one_line(meta.name)
     known = {key: values for key, values in columns(solution).items() if key in KEYS}
     names = [str(label) for label in known["label"]]
@@ -64,7 +69,7 @@ def panels_3dm(solution: Solution, meta: Meta) -> bytes:
     for name, centre in zip(names, panels.center.tolist(), strict=True):
         model.Objects.AddTextDot(name, rhino3dm.Point3d(*centre), _attributes(labels, name))
     if solution.components is not None:
-        _add_components(model, solution.components, names, root)
+        _add_components(model, panels, solution.components, names, root)
     if solution.support is not None:
         _add_support(model, solution.support, root)
     attributes = _attributes(_layer(model, "surface", SURFACE, root), surface.origin.name)
@@ -116,20 +121,51 @@ def _mesh(vertices: list[Any], faces: list[Any]) -> rhino3dm.Mesh:
 
 
 def _add_components(
-    model: rhino3dm.File3dm, components: Components, names: list[str], root: int | None
+    model: rhino3dm.File3dm, panels: Panels, components: Components, names: list[str], root: int | None
 ) -> None:
+    """A block per size, its outline and body in the panel's own plane; an instance for each panel like it.
+
+    Panels without a block get outline and body of their own.
+    """
     top = _layer(model, "components", COMPONENTS, root)
-    outlines = _layer(model, "outlines", COMPONENTS, top)
-    for name, points in zip(names, components.outline.to_lists(), strict=True):
-        model.Objects.AddPolyline(_closed(points), _attributes(outlines, name))
-    if components.solid_vertices is None or components.solid_faces is None:
-        return
-    solids = _layer(model, "solids", COMPONENTS, top)
-    for name, points, corners in zip(
-        names, components.solid_vertices.to_lists(), components.solid_faces.to_lists(), strict=True
-    ):
-        triangles = np.asarray(corners).reshape(-1, 3).tolist()
-        model.Objects.AddMesh(_mesh(points, triangles), _attributes(solids, name))
+    blocks = Blocks.of(panels, components)
+    layers = {size: _layer(model, x.name, x.colour, top) for size, x in size_layers(panels).items()}
+    sizes = blocks.size.tolist()
+    defined = []
+    for number, (panel, size) in enumerate(zip(blocks.made_from.tolist(), sizes, strict=True)):
+        name = blocks.name(number)
+        parts = _parts(blocks.shape(panel), len(blocks.outline[panel]))
+        looks = tuple(_attributes(layers[size], name) for _ in parts)
+        index = model.InstanceDefinitions.Add(name, "", "", "", rhino3dm.Point3d(0, 0, 0), parts, looks)
+        defined.append(model.InstanceDefinitions[index].Id)
+    motions = np.zeros((panels.n_panels, 4, 4))
+    motions[:, :3, :3] = np.swapaxes(blocks.axes, 1, 2)
+    motions[:, :3, 3] = blocks.origin
+    motions[:, 3, 3] = 1
+    for panel, (block, size) in enumerate(zip(blocks.block.tolist(), panels.size.tolist(), strict=True)):
+        attributes = _attributes(layers[size], names[panel])
+        if block >= 0:
+            motion = _transform(motions[panel])
+            model.Objects.AddInstanceObject(rhino3dm.InstanceReference(defined[block], motion), attributes)
+            continue
+        for part in _parts(blocks.shape(panel), len(blocks.outline[panel])):
+            part.Transform(_transform(motions[panel]))
+            add = model.Objects.AddMesh if isinstance(part, rhino3dm.Mesh) else model.Objects.AddCurve
+            add(part, attributes)
+
+
+def _parts(shape: Shape, corners: int) -> tuple[rhino3dm.GeometryBase, ...]:
+    """Outline, and the body where there is one."""
+    outline = rhino3dm.PolylineCurve(_closed(shape.points[:corners].tolist()))
+    return (outline, _mesh(shape.points.tolist(), shape.triangles.tolist())) if shape.closed else (outline,)
+
+
+def _transform(motion: Floats) -> rhino3dm.Transform:
+    made = rhino3dm.Transform(1.0)
+    for i, row in enumerate(motion.tolist()):
+        for j, value in enumerate(row):
+            setattr(made, f"M{i}{j}", value)
+    return made
 
 
 def _add_support(model: rhino3dm.File3dm, support: Support, root: int | None) -> None:

@@ -8,6 +8,7 @@ import io
 import numpy as np
 
 from hexwrap_server.output.meta import Meta, panels_of
+from hexwrap_server.output.units import heading
 from hexwrap_solver.arrays import Floats, Ints
 from hexwrap_solver.panels.types import Panels
 from hexwrap_solver.pattern.types import Pattern
@@ -28,8 +29,7 @@ def panels_csv(solution: Solution, meta: Meta) -> bytes:
     known = columns(solution)
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\r\n")  # RFC 4180
-    unit = solution.map.surface.unit
-    writer.writerow([f"{name} [{unit}]" if unit and name.startswith(LENGTHS) else name for name in known])
+    writer.writerow(heading(name, meta.unit if name.startswith(LENGTHS) else None) for name in known)
     writer.writerows(zip(*known.values(), strict=True))
     return text.getvalue().encode()
 
