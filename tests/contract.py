@@ -26,6 +26,8 @@ def _deck(result: Json):
 
 def corners(result: Json) -> np.ndarray:
     """(m, 3) complex places of the corners of every mesh face."""
+    if result["map"]["kind"] == "net":
+        return np.array(result["map"]["corners"]) @ [1, 1j]
     uv = np.array(result["map"]["uv"])
     uv = uv[:, 0] + 1j * uv[:, 1]
     return _deck(result)(uv[np.array(result["mesh"]["faces"])], np.array(result["map"]["sheet"]))
@@ -69,6 +71,8 @@ def check_map(result: Json) -> list[str]:
     for f, face in enumerate(faces):
         for k in range(3):
             where[tuple(sorted((int(face[k]), int(face[(k + 1) % 3]))))].append((f, k))
+    if m["kind"] == "net":
+        return bad + _check_net(result, z, where)
     sheet = np.array(m["sheet"])
     for (a, b), places in where.items():
         if len(places) == 2:
@@ -118,6 +122,40 @@ def check_map(result: Json) -> list[str]:
     return bad
 
 
+def _check_net(result: Json, z: np.ndarray, where: dict[tuple[int, int], list[tuple[int, int]]]) -> list[str]:
+    """Motions across edges turn by multiples of the quantum; angle sums, Gauss–Bonnet, lengths."""
+    bad = []
+    m = result["map"]
+    vertices, faces = np.array(result["mesh"]["vertices"]), np.array(result["mesh"]["faces"])
+    quantum = np.pi / 2 if result["pattern"] and result["pattern"]["kind"] == "quad" else np.pi / 3
+    inner = np.array([places for places in where.values() if len(places) == 2])
+    (f, k), (h, j) = inner[:, 0].T, inner[:, 1].T
+    one, two = z[f, (k + 1) % 3] - z[f, k], z[h, j] - z[h, (j + 1) % 3]
+    turn = np.angle(one / two) / quantum
+    if (worst := np.abs(turn - np.rint(turn)).max()) > 1e-7 or np.abs(np.abs(one / two) - 1).max() > 1e-7:
+        bad.append(f"a motion across an edge turns by {worst:.2e} quanta off a multiple")
+    angle = np.angle((np.roll(z, -2, 1) - z) / (np.roll(z, -1, 1) - z))
+    wanted = np.full(len(vertices), 2 * np.pi)
+    for cone in m["cones"]:
+        wanted[cone["vertex"]] -= cone["index"] * quantum
+    for loop, angles in zip(result["mesh"]["loops"], m["boundary_angles"], strict=True):
+        wanted[loop] = angles
+    total = np.bincount(faces.ravel(), angle.ravel(), minlength=len(vertices))
+    if (worst := np.abs(total - wanted).max()) > 1e-6:
+        bad.append(f"angle sums are off by {worst:.2e}")
+    curvature = sum(float(np.sum(np.pi - np.array(a))) for a in m["boundary_angles"])
+    curvature += quantum * sum(cone["index"] for cone in m["cones"])
+    if abs(curvature - 2 * np.pi * (2 - len(result["mesh"]["loops"]))) > 1e-6:
+        bad.append(f"Gauss–Bonnet: curvatures add up to {curvature}")
+    u = np.array(m["log_scale"])
+    ends = np.stack([faces, np.roll(faces, -1, 1)])
+    want = np.exp(u[ends].sum(0) / 2) * np.linalg.norm(vertices[ends[0]] - vertices[ends[1]], axis=2)
+    have = np.abs(np.roll(z, -1, 1) - z)
+    if m["flips"] == 0 and (worst := np.abs(have / want - 1).max()) > 1e-6:
+        bad.append(f"an edge's length differs from e^((u_i+u_j)/2)·l by {worst:.2e}")
+    return bad
+
+
 def check_pattern(result: Json, whole: bool = True) -> list[str]:
     """A closed mesh of cells, neighbours symmetric, counter-clockwise from outside."""
     bad = []
@@ -146,8 +184,8 @@ def check_pattern(result: Json, whole: bool = True) -> list[str]:
     x = np.array(p["vertices"])
     n = np.array(p["normals"])
     against = 0
-    for face, is_whole in zip(faces, p["whole"], strict=True):
-        if is_whole and len(face) != sides:
+    for face, is_whole, index in zip(faces, p["whole"], p["index"], strict=True):
+        if is_whole and len(face) != sides - index:
             bad.append(f"a whole cell has {len(face)} corners")
             break
         q = x[face]

@@ -14,7 +14,7 @@ from hexwrap_server.samples import make
 from hexwrap_solver.surface import NurbsSurface, surface_from_nurbs
 from hexwrap_solver.surface.nurbs import domain, evaluate, evaluate_points
 
-FIGURES = ["cone", "diagrid", "entrance", "facade", "isometric", "ring", "tower", "waist"]
+FIGURES = ["cone", "diagrid", "entrance", "facade", "isometric", "ring", "singular", "tower", "waist"]
 
 
 def surface_of(name: str) -> NurbsSurface:

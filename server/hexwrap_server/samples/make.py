@@ -150,7 +150,17 @@ def body(name: str, surface: NurbsSurface, max_edge: float | None = None, **requ
 
 def requests() -> list[tuple[NurbsSurface, dict[str, Any]]]:
     """Every sample: its surface and its request body."""
-    return [_tower(), _facade(), _waist(), _cone(), _isometric(), _entrance(), _diagrid(), _ring()]
+    return [
+        _tower(),
+        _facade(),
+        _waist(),
+        _cone(),
+        _isometric(),
+        _entrance(),
+        _diagrid(),
+        _ring(),
+        _singular(),
+    ]
 
 
 def _tower() -> tuple[NurbsSurface, dict[str, Any]]:
@@ -238,6 +248,18 @@ def _ring() -> tuple[NurbsSurface, dict[str, Any]]:
     surface = canopy()
     return surface, body(
         "ring", surface, boundary={"mode": "isometric"}, pattern={"kind": "hex", "around": 72}
+    )
+
+
+def _singular() -> tuple[NurbsSurface, dict[str, Any]]:
+    """The tower again, with three heptagons that make its hexagons nearly equal."""
+    surface = tower()
+    return surface, body(
+        "singular",
+        surface,
+        boundary={"mode": "isometric"},
+        singularities={"count": "auto"},
+        pattern={"kind": "hex", "around": 48, "boundary": "trim"},
     )
 
 

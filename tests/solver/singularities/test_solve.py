@@ -31,7 +31,7 @@ CASES = {
     "trimmed": (shapes.waist, "isometric", None, ASIDE, {"around": 16, "boundary": "trim"}),
     "octagon": (shapes.waist, "isometric", None, (SingularityAt(-2, vertex=620),), {"around": 16}),
     "quads": (shapes.waist, "isometric", None, ASIDE, {"kind": "quad", "around": 16}),
-    "triangles": (shapes.waist, "isometric", None, ASIDE, {"kind": "triangle", "around": 24}),
+    "triangles": (shapes.waist, "isometric", None, ASIDE, {"kind": "triangle", "around": 44}),
     "closed": (shapes.ellipsoid, "straight", None, (), {"edge_length": 0.2}),
     "both ends aligned": (shapes.waist, "straight", None, PAIRS, {"around": 20, "align": "both"}),
 }
@@ -63,7 +63,9 @@ def test_the_pattern_has_the_singularities_of_the_map(case):
 def test_interior_nodes_are_regular(case):
     _, solution = case
     laid = solution.pattern
-    if laid.kind == "triangle":
+    if (
+        laid.kind == "triangle" or not laid.whole.all()
+    ):  # cut cells share nodes with others along the boundary
         return
     inner = np.ones(len(laid.vertices), dtype=bool)
     edge = laid.neighbours.values < 0
