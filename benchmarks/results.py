@@ -1,8 +1,8 @@
-"""The README's results: what rationalization reaches on the samples, per boundary condition.
+"""The table of results: what rationalization reaches on the samples, per boundary condition.
 
     python benchmarks/results.py [--write]
 
-Everything is measured on the finished panels. ``--write`` puts the table between the README's markers.
+Everything is measured on the finished panels. ``--write`` puts the table into docs/results.md.
 """
 
 from __future__ import annotations
@@ -27,12 +27,10 @@ from hexwrap_solver.pattern import lay_pattern
 from hexwrap_solver.pattern.types import Pattern, PatternSettings
 
 SAMPLES = ("tower", "facade", "waist", "entrance")
-README = Path(__file__).parent.parent / "README.md"
+PAGE = Path(__file__).parent.parent / "docs" / "results.md"
 BEGIN, END = "<!-- results: made by the panels' benchmark -->", "<!-- end of results -->"
 
 HEAD = """
-### Results
-
 Gaps between neighbours in mm, mean / worst: by the paper's shortest-edge rule, with `inscribed` (the
 default) and `best`, each panel at its own length; then `inscribed` in 11 sizes. Uncovered is the cells'
 area left open.
@@ -59,14 +57,14 @@ COLUMNS = (
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--write", action="store_true", help="write the table into the README")
+    parser.add_argument("--write", action="store_true", help="write the table into docs/results.md")
     table = HEAD + "".join(
         f"{line}\n" for line in (line_of(COLUMNS), line_of(["---"] * len(COLUMNS)), *rows())
     )
     if parser.parse_args().write:
-        text = README.read_text(encoding="utf-8")
+        text = PAGE.read_text(encoding="utf-8")
         before, rest = text.split(BEGIN)
-        README.write_text(f"{before}{BEGIN}{table}{END}{rest.split(END)[1]}", encoding="utf-8")
+        PAGE.write_text(f"{before}{BEGIN}{table}{END}{rest.split(END)[1]}", encoding="utf-8")
     print(table)
 
 

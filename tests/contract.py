@@ -27,14 +27,15 @@ def _deck(result: Json):
 def corners(result: Json) -> np.ndarray:
     """(m, 3) complex places of the corners of every mesh face."""
     if result["map"]["kind"] == "net":
-        return np.array(result["map"]["corners"]) @ [1, 1j]
+        z = np.array(result["map"]["corners"])
+        return z[..., 0] + 1j * z[..., 1]
     uv = np.array(result["map"]["uv"])
     uv = uv[:, 0] + 1j * uv[:, 1]
     return _deck(result)(uv[np.array(result["mesh"]["faces"])], np.array(result["map"]["sheet"]))
 
 
 def check_mesh(result: Json) -> list[str]:
-    """An oriented annulus with the loops as the contract describes them."""
+    """An oriented surface of genus 0 with the loops as the contract describes them."""
     bad = []
     mesh = result["mesh"]
     faces = np.array(mesh["faces"])
@@ -43,12 +44,14 @@ def check_mesh(result: Json) -> list[str]:
     if max(half.values()) > 1:
         bad.append("an oriented edge occurs twice")
     edges = {tuple(sorted(e)) for e in half}
-    if n - len(edges) + len(faces) != 0:
-        bad.append(f"Euler characteristic {n - len(edges) + len(faces)}")
+    if n - len(edges) + len(faces) != 2 - len(mesh["loops"]):
+        bad.append(f"Euler characteristic {n - len(edges) + len(faces)} with {len(mesh['loops'])} loops")
     boundary = {e for e in half if (e[1], e[0]) not in half}
     listed = {(a, b) for loop in mesh["loops"] for a, b in zip(loop, loop[1:] + loop[:1], strict=True)}
     if listed != boundary:
         bad.append("loops are not the boundary with the surface on their left")
+    if len(mesh["loops"]) != 2:
+        return bad
     sent = [mesh["input_vertex"][v] for loop in mesh["loops"] for v in loop]
     real = [s for s in sent if s >= 0]
     first = {mesh["input_vertex"][v] for v in mesh["loops"][0]}
@@ -58,7 +61,8 @@ def check_mesh(result: Json) -> list[str]:
 
 
 def check_map(result: Json) -> list[str]:
-    """Positive faces, edges shared up to one power of g, angle sums, Gauss–Bonnet, edge lengths."""
+    """Positive faces, edges shared up to one power of g (on nets: up to a motion that turns by a multiple of
+    the quantum), angle sums, Gauss–Bonnet, edge lengths."""
     bad = []
     m = result["map"]
     vertices = np.array(result["mesh"]["vertices"])
@@ -71,10 +75,11 @@ def check_map(result: Json) -> list[str]:
     for f, face in enumerate(faces):
         for k in range(3):
             where[tuple(sorted((int(face[k]), int(face[(k + 1) % 3]))))].append((f, k))
-    if m["kind"] == "net":
-        return bad + _check_net(result, z, where)
-    sheet = np.array(m["sheet"])
-    for (a, b), places in where.items():
+    net = m["kind"] == "net"
+    if net:
+        bad += _check_motions(z, faces, where, result["pattern"])
+    sheet = None if net else np.array(m["sheet"])
+    for (a, b), places in [] if net else where.items():
         if len(places) == 2:
             (f, k), (h, j) = places
             step = (
@@ -90,26 +95,25 @@ def check_map(result: Json) -> list[str]:
     angle = np.angle((np.roll(z, -2, 1) - z) / (np.roll(z, -1, 1) - z))
     total = np.bincount(faces.ravel(), angle.ravel(), minlength=len(vertices))
     loops = [np.array(loop) for loop in result["mesh"]["loops"]]
-    inside = np.setdiff1d(np.arange(len(vertices)), np.concatenate(loops))
-    if len(inside) and (worst := np.abs(total[inside] - 2 * np.pi).max()) > 1e-6:
-        bad.append(f"interior angle sums miss 2π by {worst:.2e}")
+    inside = np.setdiff1d(np.arange(len(vertices)), np.concatenate([*loops, []]))
+    wanted = np.full(len(vertices), 2 * np.pi)
+    for cone in m["cones"]:
+        wanted[cone["vertex"]] -= cone["index"] * _quantum(result["pattern"])
+    if len(inside) and (worst := np.abs(total - wanted)[inside].max()) > 1e-6:
+        bad.append(f"interior angle sums miss 2π, or 2π − k·quantum at cones, by {worst:.2e}")
     for loop, angles in zip(loops, m["boundary_angles"], strict=True):
         if (worst := np.abs(total[loop] - np.array(angles)).max()) > 1e-6:
             bad.append(f"boundary angle sums differ from boundary_angles by {worst:.2e}")
     kappa = [float(np.sum(np.pi - np.array(a))) for a in m["boundary_angles"]]
-    if abs(kappa[0] + kappa[1]) > 1e-6:
-        bad.append(f"Gauss–Bonnet: loop sums {kappa}")
+    curved = sum(kappa) + sum(2 * np.pi - wanted)
+    # Openings that were cut out of a wall have the angles that the wall has there.
+    if abs(curved - 2 * np.pi * (2 - len(loops))) > 1e-6:
+        bad.append(f"Gauss–Bonnet: loop sums {kappa}, cones {m['cones']}")
+    if net:
+        return bad + _check_lengths(m, vertices, faces, z)
     if abs(kappa[0] - m["cone_angle"]) > 1e-6 or abs(m["deck"]["angle"] - m["cone_angle"]) > 1e-9:
         bad.append(f"K is {m['cone_angle']}, loop 0 sums to {kappa[0]}, deck has {m['deck']['angle']}")
-    if m["flips"] == 0:
-        u = np.array(m["log_scale"])
-        for k in range(3):
-            i, j = faces[:, k], faces[:, (k + 1) % 3]
-            want = np.exp((u[i] + u[j]) / 2) * np.linalg.norm(vertices[i] - vertices[j], axis=1)
-            have = np.abs(z[:, (k + 1) % 3] - z[:, k])
-            if (worst := np.abs(have / want - 1).max()) > 1e-6:
-                bad.append(f"an edge's length differs from e^((u_i+u_j)/2)·l by {worst:.2e}")
-                break
+    bad += _check_lengths(m, vertices, faces, z)
     # one turn: a loop's edges add up to g
     boundary = {}
     for places in where.values():
@@ -117,43 +121,41 @@ def check_map(result: Json) -> list[str]:
             f, k = places[0]
             boundary[int(faces[f][k])] = int(sheet[f][(k + 1) % 3] - sheet[f][k])
     turns = [sum(boundary[int(v)] for v in loop) for loop in loops]
-    if sorted(turns) != [-1, 1]:
+    if sorted(turns[:2]) != [-1, 1] or any(turns[2:]):
         bad.append(f"the loops turn {turns} times, wanted ±1")
     return bad
 
 
-def _check_net(result: Json, z: np.ndarray, where: dict[tuple[int, int], list[tuple[int, int]]]) -> list[str]:
-    """Motions across edges turn by multiples of the quantum; angle sums, Gauss–Bonnet, lengths."""
+def _quantum(pattern: Json | None) -> float:
+    return np.pi / 2 if pattern is not None and pattern["kind"] == "quad" else np.pi / 3
+
+
+def _check_motions(z: np.ndarray, faces: np.ndarray, where: dict, pattern: Json | None) -> list[str]:
+    """Across an interior edge the two images differ by a motion that turns by a multiple of the quantum."""
+    pairs = np.array([places for places in where.values() if len(places) == 2]).reshape(-1, 4)
+    f, k, h, j = pairs.T
+    here, there = z[f, (k + 1) % 3] - z[f, k], z[h, j] - z[h, (j + 1) % 3]
     bad = []
-    m = result["map"]
-    vertices, faces = np.array(result["mesh"]["vertices"]), np.array(result["mesh"]["faces"])
-    quantum = np.pi / 2 if result["pattern"] and result["pattern"]["kind"] == "quad" else np.pi / 3
-    inner = np.array([places for places in where.values() if len(places) == 2])
-    (f, k), (h, j) = inner[:, 0].T, inner[:, 1].T
-    one, two = z[f, (k + 1) % 3] - z[f, k], z[h, j] - z[h, (j + 1) % 3]
-    turn = np.angle(one / two) / quantum
-    if (worst := np.abs(turn - np.rint(turn)).max()) > 1e-7 or np.abs(np.abs(one / two) - 1).max() > 1e-7:
-        bad.append(f"a motion across an edge turns by {worst:.2e} quanta off a multiple")
-    angle = np.angle((np.roll(z, -2, 1) - z) / (np.roll(z, -1, 1) - z))
-    wanted = np.full(len(vertices), 2 * np.pi)
-    for cone in m["cones"]:
-        wanted[cone["vertex"]] -= cone["index"] * quantum
-    for loop, angles in zip(result["mesh"]["loops"], m["boundary_angles"], strict=True):
-        wanted[loop] = angles
-    total = np.bincount(faces.ravel(), angle.ravel(), minlength=len(vertices))
-    if (worst := np.abs(total - wanted).max()) > 1e-6:
-        bad.append(f"angle sums are off by {worst:.2e}")
-    curvature = sum(float(np.sum(np.pi - np.array(a))) for a in m["boundary_angles"])
-    curvature += quantum * sum(cone["index"] for cone in m["cones"])
-    if abs(curvature - 2 * np.pi * (2 - len(result["mesh"]["loops"]))) > 1e-6:
-        bad.append(f"Gauss–Bonnet: curvatures add up to {curvature}")
-    u = np.array(m["log_scale"])
-    ends = np.stack([faces, np.roll(faces, -1, 1)])
-    want = np.exp(u[ends].sum(0) / 2) * np.linalg.norm(vertices[ends[0]] - vertices[ends[1]], axis=2)
-    have = np.abs(np.roll(z, -1, 1) - z)
-    if m["flips"] == 0 and (worst := np.abs(have / want - 1).max()) > 1e-6:
-        bad.append(f"an edge's length differs from e^((u_i+u_j)/2)·l by {worst:.2e}")
+    if (faces[f, k] != faces[h, (j + 1) % 3]).any():
+        bad.append("faces that share an edge do not run along it in opposite senses")
+    if (worst := np.abs(np.abs(here) / np.abs(there) - 1).max()) > 1e-6:
+        bad.append(f"the two images of an edge differ in length by {worst:.2e}")
+    steps = np.angle(here / there) / _quantum(pattern)
+    if (worst := np.abs(steps - np.rint(steps)).max()) > 1e-6:
+        bad.append(f"a motion across an edge turns by {worst:.2e} quanta more than a multiple")
     return bad
+
+
+def _check_lengths(m: Json, vertices: np.ndarray, faces: np.ndarray, z: np.ndarray) -> list[str]:
+    """Edges have the length e^((u_i + u_j)/2)·l_ij where nothing was flipped."""
+    u = np.array(m["log_scale"])
+    for k in range(3) if m["flips"] == 0 else ():
+        i, j = faces[:, k], faces[:, (k + 1) % 3]
+        want = np.exp((u[i] + u[j]) / 2) * np.linalg.norm(vertices[i] - vertices[j], axis=1)
+        have = np.abs(z[:, (k + 1) % 3] - z[:, k])
+        if (worst := np.abs(have / want - 1).max()) > 1e-6:
+            return [f"an edge's length differs from e^((u_i+u_j)/2)·l by {worst:.2e}"]
+    return []
 
 
 def check_pattern(result: Json, whole: bool = True) -> list[str]:
@@ -175,18 +177,24 @@ def check_pattern(result: Json, whole: bool = True) -> list[str]:
             bad.append(f"neighbours[{f}][{k}] is {p['neighbours'][f][k]}, the mesh says {other}")
             break
     used = {v for face in faces for v in face}
+    degree = Counter(v for face in faces for v in face)
+    rim = {v for (a, b) in half if (b, a) not in half for v in (a, b)}
+    regular = {"hex": 3, "triangle": 6, "quad": 4}[p["kind"]]
+    if all(p["whole"]) and any(degree[v] != regular for v in used - rim):
+        bad.append(f"nodes inside that are not of degree {regular}")
     edges = {tuple(sorted(e)) for e in half}
     if used != set(range(len(p["vertices"]))):
         bad.append("vertices that belong to no cell")
-    if whole and len(used) - len(edges) + len(faces) != 0:
-        bad.append(f"the pattern's Euler characteristic is {len(used) - len(edges) + len(faces)}")
+    euler, loops = len(used) - len(edges) + len(faces), len(result["mesh"]["loops"])
+    if whole and euler != 2 - loops:
+        bad.append(f"the pattern's Euler characteristic is {euler}, the surface has {loops} loops")
     sides = {"hex": 6, "triangle": 3, "quad": 4}[p["kind"]]
     x = np.array(p["vertices"])
     n = np.array(p["normals"])
     against = 0
     for face, is_whole, index in zip(faces, p["whole"], p["index"], strict=True):
         if is_whole and len(face) != sides - index:
-            bad.append(f"a whole cell has {len(face)} corners")
+            bad.append(f"a whole cell of index {index} has {len(face)} corners")
             break
         q = x[face]
         area = np.cross(q - q[0], np.roll(q, -1, 0) - q[0]).sum(0)

@@ -1,4 +1,4 @@
-"""What the README says is so: its commands, options, links and pictures."""
+"""What the README and the pages in docs say is so: commands, tables, links and pictures."""
 
 from __future__ import annotations
 
@@ -9,9 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from hexwrap_server import samples
+from docs import tables
 from hexwrap_server.cli.main import make_parser
-from hexwrap_server.cli.options import table
 from hexwrap_server.input.schemas import parse_request
 from hexwrap_server.jobs.work import run_stages
 from hexwrap_server.output.writers import WRITERS
@@ -19,9 +18,13 @@ from hexwrap_solver.pipeline import PlainRunner
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-BLOCKS = re.findall(r"^```\n(.*?)^```", README, re.MULTILINE | re.DOTALL)
+PAGES = {
+    path: path.read_text(encoding="utf-8") for path in (ROOT / "README.md", *(ROOT / "docs").glob("*.md"))
+}
+SAID = "\n".join(PAGES.values())
+BLOCKS = re.findall(r"^```\n(.*?)^```", SAID, re.MULTILINE | re.DOTALL)
 COMMANDS = [line for block in BLOCKS for line in block.splitlines() if line.startswith("hexwrap ")]
-COMMANDS += [c for c in re.findall(r"`(hexwrap [^`]*)`", README) if " -o " in c or "--sample" in c]
+COMMANDS += [c for c in re.findall(r"`(hexwrap [^`]*)`", SAID) if " -o " in c or "--sample" in c]
 
 
 def test_the_test_command_is_the_one_that_ci_runs() -> None:
@@ -29,15 +32,19 @@ def test_the_test_command_is_the_one_that_ci_runs() -> None:
     assert f"`{ci[-1]}`" in README
 
 
-def test_every_option_is_in_the_table() -> None:
-    assert table() in README
+@pytest.mark.parametrize("name", tables.TABLES)
+def test_tables_are_made_from_the_code(name: str) -> None:
+    assert PAGES[ROOT / name] == tables.filled(name), "run python docs/tables.py"
 
 
-def test_every_file_and_sample_is_named() -> None:
-    assert all(f"`{name}`" in README for name in WRITERS)
-    listed = re.search("<!-- samples -->(.*)<!-- end of samples -->", README)
-    assert listed is not None
-    assert listed[1] == ", ".join(f"`{name}`" for name in samples.names())
+def test_every_file_is_named() -> None:
+    page = PAGES[ROOT / "docs" / "files.md"]
+    assert all(f"`{name}`" in page for name in WRITERS)
+
+
+def test_the_readme_leads_to_every_page_and_is_short() -> None:
+    assert all(f"docs/{path.name}" in README for path in PAGES if path.parent.name == "docs")
+    assert len(README.splitlines()) < 120
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -47,10 +54,15 @@ def test_documented_commands_are_understood(command: str) -> None:
 
 
 def test_links_and_pictures_exist() -> None:
-    targets = re.findall(r'\]\(([^)]+)\)|src="([^"]+)"', README)
-    local = [target for pair in targets for target in pair if target and not target.startswith("http")]
-    assert len(local) > 10
-    assert [target for target in local if not (ROOT / target).exists()] == []
+    found = [
+        (path, target)
+        for path, text in PAGES.items()
+        for pair in re.findall(r'\]\(([^)]+)\)|src="([^"]+)"', text)
+        for target in pair
+        if target and not target.startswith("http")
+    ]
+    assert len(found) > 10
+    assert [target for path, target in found if not (path.parent / target).exists()] == []
 
 
 def test_the_curl_example_is_solved() -> None:

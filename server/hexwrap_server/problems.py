@@ -1,20 +1,14 @@
-"""Every answer that is no success is a problem (RFC 9457).
-
-HexwrapError            (hexwrap_solver.errors) refused by the solver: 422
-├── FormError           the body does not have the form it should: 400, 413 or 422
-├── HttpError           about the request as such: no such job, host not allowed, queue full …
-└── WorkError           (worker) no result: limits 422, a dead worker or a full disk 503, a bug 500
-"""
+"""Errors → problem documents (RFC 9457), the body of every answer that is no success."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any, ClassVar, get_type_hints
+from typing import Any, get_type_hints
 
 import orjson
 
+from hexwrap_server.errors import FormError, HttpError, JobFailedError
 from hexwrap_solver.errors import (
     BoundaryError,
     GaussBonnetError,
@@ -39,10 +33,6 @@ from hexwrap_solver.surface.errors import (
 from hexwrap_solver.surface.types import MeshSettings, NurbsSurface, SentMesh, SurfaceSettings
 
 MEDIA_TYPE = "application/problem+json"
-#: Statuses of the errors that are not 422.
-STATUS = {"not-json": 400, "gone": 410, "worker-died": 503, "storage": 503, "cluster": 503, "internal": 500}
-#: A pointer into the arrays of a sent mesh.
-_ELEMENT = re.compile(r"(?:/surface)?/(vertices|faces)/(\d+)")
 #: Where a request says what an error of the solver is about.
 PLACES: dict[type[HexwrapError], str] = {
     SurfaceError: "/surface",
@@ -69,8 +59,6 @@ _SURFACE: dict[type, str] = {
     NurbsSurface: "/surface/nurbs",
     MeshSettings: "/surface/mesh",
 }
-#: More faults than these are not listed, the first ones tell enough.
-MOST_LISTED = 100
 
 
 def place_of(error: HexwrapError) -> str | None:
@@ -83,63 +71,14 @@ def place_of(error: HexwrapError) -> str | None:
     return "".join((section, *(f"/{step}" for step in error.field)))
 
 
-class FormError(HexwrapError):
-    """The body is not what the route takes. faults: (JSON pointer, what is wrong there)."""
-
-    slug: ClassVar[str] = "invalid-request"
-    title: ClassVar[str] = "The request does not have the right form"
-
-    def __init__(self, faults: Sequence[tuple[str, str]] | str = ()) -> None:
-        if isinstance(faults, str):  # rebuilt after the way between processes; the rest is in __dict__
-            super().__init__(faults)
-            self.faults: list[tuple[str, str]] = []
-            return
-        pointer, detail = faults[0]
-        more = f" ({len(faults) - 1} more faults are listed in 'errors'.)" if len(faults) > 1 else ""
-        super().__init__(f"{pointer or 'The body'}: {detail.rstrip('.')}.{more}")
-        self.faults = list(faults[:MOST_LISTED])
-
-    @classmethod
-    def at(cls, pointer: str, detail: str, kind: type[HexwrapError] | None = None) -> FormError:
-        """One fault. kind: the solver's error for the same fault; a client need not tell the two apart.
-
-        A fault in the arrays of the mesh names its vertex or face by index too.
-        """
-        error = cls([(pointer, detail)])
-        element = _ELEMENT.match(pointer)
-        if element:
-            setattr(error, element[1], [int(element[2])])
-        if kind is not None:
-            error.__dict__.update(slug=kind.slug, title=kind.title)
-        return error
-
-
-class HttpError(HexwrapError):
-    """A refusal by the service itself."""
-
-    def __init__(
-        self,
-        status: int,
-        slug: str,
-        title: str,
-        detail: str,
-        headers: dict[str, str] | None = None,
-        errors: Sequence[dict[str, Any]] = (),
-    ) -> None:
-        super().__init__(detail)
-        self.status = status
-        self.own_slug = slug
-        self.own_title = title
-        self.headers = headers or {}
-        self.errors = list(errors)
-
-
 def problem(error: HexwrapError) -> dict[str, Any]:
     """The members of a problem document."""
-    if isinstance(error, HttpError):
-        return _document(error.own_slug, error.own_title, error.status, error.detail, error.errors)
+    if isinstance(error, JobFailedError):
+        return error.document
     faults = error.faults if isinstance(error, FormError) else []
     errors = [{"pointer": pointer, "detail": detail} for pointer, detail in faults]
+    if isinstance(error, HttpError):
+        errors = error.errors
     place = vars(error).get("place", place_of(error))
     if not errors and place is not None:
         errors = [{"pointer": place, "detail": error.detail}]
@@ -147,7 +86,13 @@ def problem(error: HexwrapError) -> dict[str, Any]:
     for name in ("vertices", "faces", "edges"):
         if getattr(error, name):
             data[name] = getattr(error, name)
-    return _document(error.slug, error.title, STATUS.get(error.slug, 422), error.detail, errors) | data
+    return {
+        "type": f"/problems/{error.slug}",
+        "title": error.title,
+        "status": getattr(error, "status", 422),
+        "detail": error.detail,
+        "errors": errors,
+    } | data
 
 
 @contextmanager
@@ -163,12 +108,6 @@ def body_is_the_surface(is_file: bool = False) -> Iterator[None]:
         if place is not None and place.startswith("/surface"):
             vars(error)["place"] = "" if is_file else place.removeprefix("/surface")
         raise
-
-
-def _document(
-    slug: str, title: str, status: int, detail: str, errors: list[dict[str, Any]]
-) -> dict[str, Any]:
-    return {"type": f"/problems/{slug}", "title": title, "status": status, "detail": detail, "errors": errors}
 
 
 def dumped(document: object) -> bytes:
@@ -197,7 +136,3 @@ def plain(document: dict[str, Any]) -> dict[str, Any]:
     """A document as a client reads it: no numpy numbers, no NaN."""
     read: dict[str, Any] = orjson.loads(dumped(document))
     return read
-
-
-def not_found(what: str, detail: str) -> HttpError:
-    return HttpError(404, "not-found", f"No such {what}", detail)

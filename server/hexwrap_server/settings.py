@@ -51,6 +51,16 @@ class Settings:
     max_vertices: int = _setting(1_000_000, "most vertices of a surface")
     max_panels: int = _setting(200_000, "most panels of a job")
     max_points: int = _setting(1_000_000, "most points of one lift or flatten request")
+    readers: int = field(
+        default_factory=lambda: min(4, max(2, _processors())),
+        metadata={
+            "help": "processes that read large bodies and files, one each",
+            "metavar": "N",
+            "shown": "processors, 2 to 4",
+        },
+    )
+    read_seconds: float = _setting(30.0, "longest reading of a body or file, in seconds")
+    read_mib: float = _setting(2048.0, "most memory of a process that reads, in MiB")
     max_queue: int = _setting(100, "most jobs that wait; more are answered 503")
     job_seconds: float = _setting(900.0, "longest run of a job, in seconds")
     job_mib: float = _setting(8192.0, "most memory of a worker process, in MiB")

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 import rhino3dm
 
-from hexwrap_server.http.hops.components import COMPONENTS, LIFT, PANELS, HopsError
+from hexwrap_server.errors import HopsError
+from hexwrap_server.http.hops.components import COMPONENTS, LIFT, PANELS
 from hexwrap_server.http.hops.values import read_inputs
 from tests.server.live import Live, running
 

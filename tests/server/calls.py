@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from hexwrap_server import logs
-from hexwrap_server.jobs import later
 from hexwrap_server.jobs.worker import Report
 from hexwrap_solver.errors import RequestError
 
@@ -59,20 +58,6 @@ def refuse_with(report: Report, data: dict[str, Any], *arguments: Any) -> None:
 
 def stumble(report: Report) -> None:
     raise KeyError("a bug")
-
-
-def put_off(report: Report, mark: str) -> bool:
-    """Makes a file when the answer is sent; whether it is there by now."""
-    later.put_off(Path(mark).touch)
-    return Path(mark).exists()
-
-
-def put_off_a_fault(report: Report) -> None:
-    later.put_off(lambda: stumble(report))
-
-
-def exists(report: Report, mark: str) -> bool:
-    return Path(mark).exists()
 
 
 def die(report: Report) -> None:

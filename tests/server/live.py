@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import asyncio
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Coroutine, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import httpx
 import uvicorn
@@ -16,7 +17,9 @@ from hexwrap_server.http.app import create_app, open_listener
 from hexwrap_server.http.service import Service
 from hexwrap_server.jobs.engine import Engine
 from hexwrap_server.settings import Settings
+from tests.server.patience import PATIENCE, until
 
+T = TypeVar("T")
 OVER = ("done", "failed", "cancelled")
 
 
@@ -24,6 +27,11 @@ class Live(httpx.Client):
     """A client of a running server, and the server's inside."""
 
     service: Service
+    loop: asyncio.AbstractEventLoop
+
+    def run(self, story: Coroutine[Any, Any, T]) -> T:
+        """What a coroutine comes to in the event loop of the server."""
+        return asyncio.run_coroutine_threadsafe(story, self.loop).result(PATIENCE)
 
 
 @contextmanager
@@ -43,44 +51,39 @@ def running(data: Path, own: Engine | None = None, **settings: Any) -> Iterator[
         while not server.started and thread.is_alive():
             time.sleep(0.01)
         port = listener.getsockname()[1]
-        with Live(base_url=f"http://127.0.0.1:{port}", timeout=60, trust_env=False) as client:
+        with Live(base_url=f"http://127.0.0.1:{port}", timeout=PATIENCE, trust_env=False) as client:
             client.service = app.state.service
+            client.loop = app.state.service.loop
             yield client
     finally:
         server.should_exit = True
-        thread.join(20)
+        thread.join(PATIENCE)
         listener.close()
 
 
-def until_at(client: httpx.Client, id: str, stage: str = "surface", seconds: float = 60) -> None:
+def until_at(client: httpx.Client, id: str, stage: str = "surface") -> None:
     """Until the job runs and is at a stage. To be seen there it has to stay there."""
-    deadline = time.monotonic() + seconds
-    while True:
+
+    def is_there() -> bool:
         job = client.get(f"/v1/jobs/{id}").json()
         assert job["status"] not in OVER, f"over before it was seen at its {stage}: {job}"
-        if (job["status"], job["stage"]) == ("running", stage):
-            return
-        assert time.monotonic() < deadline, f"not at its {stage} after {seconds} s: {job}"
-        time.sleep(0.02)
+        return (job["status"], job["stage"]) == ("running", stage)
+
+    until(is_there, f"job {id} at its {stage}")
 
 
-def over_first(client: httpx.Client, ids: list[str], seconds: float = 60) -> dict[str, Any]:
+def over_first(client: httpx.Client, ids: list[str]) -> dict[str, Any]:
     """The first of some jobs that is over."""
-    deadline = time.monotonic() + seconds
-    while time.monotonic() < deadline:
-        for id in ids:
-            job: dict[str, Any] = client.get(f"/v1/jobs/{id}").json()
-            if job["status"] in OVER:
-                return job
-        time.sleep(0.02)
-    raise AssertionError(f"none of {ids} is over after {seconds} s")
+
+    def over() -> dict[str, Any] | None:
+        jobs: list[dict[str, Any]] = [client.get(f"/v1/jobs/{id}").json() for id in ids]
+        return next((job for job in jobs if job["status"] in OVER), None)
+
+    job = until(over, "the end of a job")
+    assert job is not None
+    return job
 
 
-def finished(client: httpx.Client, id: str, seconds: float = 60) -> dict[str, Any]:
+def finished(client: httpx.Client, id: str) -> dict[str, Any]:
     """The job when it is over."""
-    deadline = time.monotonic() + seconds
-    while time.monotonic() < deadline:
-        job: dict[str, Any] = client.get(f"/v1/jobs/{id}", params={"wait": 10}).json()
-        if job["status"] in OVER:
-            return job
-    raise AssertionError(f"job {id} is not over after {seconds} s")
+    return over_first(client, [id])

@@ -6,7 +6,6 @@ import os
 import socket
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,10 +13,20 @@ from pathlib import Path
 import httpx
 import psutil
 
+from tests.server.patience import PATIENCE, until
+
 PROGRAM = """
-import sys
+import asyncio, pathlib, sys, time
 from hexwrap_server.http.app import serve
 from hexwrap_server.settings import Settings
+longest, run = [0.0], asyncio.Handle._run
+def timed(handle):
+    start = time.thread_time()
+    run(handle)
+    if time.thread_time() - start > longest[0]:
+        longest[0] = time.thread_time() - start
+        pathlib.Path(sys.argv[2], "longest").write_text(str(longest[0]))
+asyncio.Handle._run = timed
 serve(Settings.from_environment({"port": int(sys.argv[1]), "data": sys.argv[2], "workers": int(sys.argv[3])}))
 """
 
@@ -40,19 +49,26 @@ def served(
         environment = os.environ | variables | {"PYTHONPATH": paths}
         process = subprocess.Popen(command, env=environment, stderr=log, start_new_session=group)
     try:
-        deadline = time.monotonic() + 60
-        while True:
-            assert process.poll() is None, (data / "log").read_text()
-            assert time.monotonic() < deadline
-            try:
-                httpx.get(f"http://127.0.0.1:{port}/health", trust_env=False)
-                break
-            except httpx.TransportError:
-                time.sleep(0.05)
+        until(lambda: answers(process, data, port), "the server")
         yield process
     finally:
         process.kill()
         process.wait()
+
+
+def answers(process: subprocess.Popen[bytes], data: Path, port: int) -> bool:
+    assert process.poll() is None, (data / "log").read_text()
+    try:
+        httpx.get(f"http://127.0.0.1:{port}/health", trust_env=False, timeout=PATIENCE)
+    except httpx.TransportError:
+        return False
+    return True
+
+
+def longest_step(data: Path) -> float:
+    """Seconds of processor time of the longest step of a served server's event loop: so long nobody else was
+    answered, on a machine without other work."""
+    return float((data / "longest").read_text())
 
 
 def children(process: subprocess.Popen[bytes]) -> list[psutil.Process]:

@@ -9,9 +9,10 @@ import numpy as np
 import orjson
 import pytest
 
-from hexwrap_server.input.json_text import NotJsonError, loads
+from hexwrap_server.errors import FormError, NotJsonError
+from hexwrap_server.input.json_text import loads
 from hexwrap_server.input.schemas import parse_points, parse_request
-from hexwrap_server.problems import FormError, problem
+from hexwrap_server.problems import problem
 from hexwrap_solver.conformal.types import BoundaryCondition
 from tests.server.bodies import request, tube
 

@@ -18,6 +18,8 @@ from hexwrap_server.input.schemas import parse_request
 from hexwrap_server.output.writers import WRITERS
 
 TUBE_ROWS, TUBE_COLUMNS = 9, 24
+#: Corners of three triangles on one edge.
+FINS = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, -1, 0]]
 
 
 @pytest.fixture
@@ -126,7 +128,7 @@ def refusal(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[i
         (["--angle", "12"], "give VERTEX=ANGLE or X,Y,Z=ANGLE"),
         (["--around", "8", "--edge-length", "2"], "give either 'around' or 'edge_length'"),
         (["-o", "x.docx"], "ending must be one of"),
-        (["-o", "no/such/folder/x.obj"], "there is no folder"),
+        (["-o", "no/such/folder/x.obj"], "does not exist"),
         (["--sheet", "0", "1"], "greater than 0"),
         (["--sheet", "inf", "1"], "finite"),
         (["--sheet", "1", "nan"], "finite"),
@@ -177,6 +179,8 @@ def test_sizes_of_the_mesh_go_beside_a_nurbs_surface_only(tmp_path: Path) -> Non
 
 def test_values_may_begin_with_a_minus() -> None:
     words = [
+        "--loop",
+        "1=isometric",
         "--angle",
         "-13,-4,0=120",
         "--angle",
@@ -190,6 +194,7 @@ def test_values_may_begin_with_a_minus() -> None:
     asked = task("sample:tower", make_parser().parse_args(["solve", "sample:tower", "-o", "x.obj", *words]))
     assert [entry.point for entry in asked.wanted.boundary.angles] == [(-13, -4, 0), (-0.5, 1, 2)]
     assert asked.wanted.boundary.mode == "angles"
+    assert [(entry.loop, entry.mode) for entry in asked.wanted.boundary.loops] == [(1, "isometric")]
     assert asked.wanted.pattern is not None
     assert asked.wanted.pattern.phase == (-1e-3, -2)
 
@@ -225,7 +230,7 @@ def test_ports_that_there_are_not_are_status_2(port: str, capsys: pytest.Capture
     ("given", "words"),
     [
         ("none.obj", "cannot be read"),
-        ("sample:no", "there is no sample 'no'; there are"),
+        ("sample:no", "unknown sample 'no'; choose one of"),
         (".", "cannot be read"),
     ],
 )
@@ -246,11 +251,15 @@ def test_unknown_options_are_status_2() -> None:
 @pytest.mark.parametrize(
     ("name", "text", "words"),
     [
-        ("open.json", '{"vertices": [[0,0,0],[1,0,0],[0,1,0]], "faces": [[0,1,2]]}', "loop"),
+        (
+            "fins.json",
+            json.dumps({"vertices": FINS, "faces": [[0, 1, 2], [0, 1, 3], [0, 1, 4]]}),
+            "two faces",
+        ),
         ("broken.json", '{"surface": ', "not JSON"),
         ("field.json", '{"surface": {"vertices": [], "faces": []}, "patern": {}}', "/patern"),
         ("surface.xyz", "0 0 0", ".xyz"),
-        ("noise.ply", "ply?", "cannot be read"),
+        ("noise.ply", "ply?", "not a PLY file"),
     ],
 )
 def test_what_cannot_be_solved_is_status_1(

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from hexwrap_server.cli.main import main
+from hexwrap_server.errors import DrawingError
 from hexwrap_server.input.curves import READERS, read_drawing, refined, write_curves
 from hexwrap_server.input.finished_map import map_in_result
-from hexwrap_server.input.readers.drawing import Curve, DrawingError
+from hexwrap_server.input.readers.drawing import Curve
 from hexwrap_server.jobs.lift_curves import flatten_curves, lift_curves, one_piece
 from hexwrap_server.output.writers import Meta, write
 from hexwrap_solver.conformal.types import Deck
@@ -177,7 +178,7 @@ def test_a_result_without_its_mesh_is_told(tmp_path: Path, capsys: pytest.Captur
     ("options", "status", "words"),
     [
         (["far.csv", "-o", "x.dxf"], 1, "no point of the drawing lies in the domain"),
-        (["none.csv", "-o", "x.dxf"], 2, "there is no such file"),
+        (["none.csv", "-o", "x.dxf"], 2, "no such file"),
         (["far.csv", "-o", "x.png"], 2, "the ending must be one of"),
         (["far.csv", "-o", "x.dxf", "--step", "0"], 2, "must be greater than 0"),
         (["far.csv", "-o", "x.dxf", "--flatten"], 2, "needs points in space"),

@@ -16,6 +16,7 @@ import httpx
 import pytest
 
 from tests.server.bodies import tube
+from tests.server.patience import PATIENCE
 from tests.server.process import children, free_port, is_gone, served
 
 #: What may become of a job whose worker or server was killed.
@@ -50,20 +51,22 @@ class Load:
             size = self._chance.choice([12, 12, 24, 120])
             body = {"surface": tube(size, size // 2, height=10 + i % 7), "pattern": {"around": 8 + i % 5}}
             with contextlib.suppress(httpx.TransportError):
-                answer = httpx.post(f"{self._base}/v1/jobs", json=body, trust_env=False, timeout=20)
+                answer = httpx.post(f"{self._base}/v1/jobs", json=body, trust_env=False, timeout=PATIENCE)
                 if answer.status_code == 202:
                     self.accepted.append(answer.json()["id"])
 
     def _look(self) -> None:
         while not self._over.wait(0.1):
             with contextlib.suppress(httpx.TransportError):
-                for job in httpx.get(f"{self._base}/v1/jobs", trust_env=False, timeout=20).json()["jobs"]:
+                for job in httpx.get(f"{self._base}/v1/jobs", trust_env=False, timeout=PATIENCE).json()[
+                    "jobs"
+                ]:
                     if job["status"] == "done" and job["id"] not in self.done:
                         self.done[job["id"]] = fingerprint(self._base, job["id"])
 
 
 def fingerprint(base: str, id: str) -> str:
-    answer = httpx.get(f"{base}/v1/jobs/{id}/result", trust_env=False, timeout=20)
+    answer = httpx.get(f"{base}/v1/jobs/{id}/result", trust_env=False, timeout=PATIENCE)
     assert answer.status_code == 200
     assert answer.json()["quality"]["scale_ratio"] >= 1
     return hashlib.sha256(answer.content).hexdigest()
@@ -85,7 +88,7 @@ def lives(data: Path, port: int, kills: int, chance: random.Random) -> Iterator[
                 else:
                     server.kill()
                     server.wait()
-                    gone_by = time.monotonic() + 5
+                    gone_by = time.monotonic() + PATIENCE
                     while not all(map(is_gone, workers)):
                         assert time.monotonic() < gone_by, "workers outlived their server"
                         time.sleep(0.05)
@@ -111,9 +114,9 @@ def torment(data: Path, kills: int, seed: int) -> None:
 
 
 def settled(base: str, id: str) -> dict[str, Any]:
-    deadline = time.monotonic() + 120
+    deadline = time.monotonic() + PATIENCE
     while time.monotonic() < deadline:
-        answer = httpx.get(f"{base}/v1/jobs/{id}?wait=10", trust_env=False, timeout=30)
+        answer = httpx.get(f"{base}/v1/jobs/{id}?wait=10", trust_env=False, timeout=PATIENCE)
         assert answer.status_code == 200, f"accepted job {id} was lost"
         job: dict[str, Any] = answer.json()
         if job["status"] in ("done", "failed", "cancelled"):

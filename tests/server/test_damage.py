@@ -12,10 +12,12 @@ from typing import Any
 
 import pytest
 
+from hexwrap_server.errors import DamagedError, FolderInUseError
 from hexwrap_server.input.requests import Wanted
-from hexwrap_server.jobs.store import DamagedError, FolderInUseError, Job, Store, Work
+from hexwrap_server.jobs.store import Job, Store, Work
 from tests.server.bodies import request
 from tests.server.live import Live, finished, running
+from tests.server.patience import PATIENCE
 
 Damage = Callable[[bytes], bytes]
 
@@ -127,7 +129,7 @@ def test_failed_work_starts_from_the_first_attempt_again(tmp_path: Path) -> None
 def test_list_of_jobs_that_is_none_is_told(tmp_path: Path) -> None:
     (tmp_path / "hexwrap.sqlite3").write_bytes(b"no list at all" * 300)
     command = [sys.executable, "-m", "hexwrap_server.cli", "serve", "--port", "0", "--data", str(tmp_path)]
-    told = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    told = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
     assert told.returncode == 1
     assert "hexwrap.sqlite3 cannot be used" in told.stderr
     assert "Traceback" not in told.stderr

@@ -14,9 +14,10 @@ import rhino3dm
 from ezdxf.document import Drawing as Document
 from scipy.spatial import cKDTree
 
+from hexwrap_server.errors import DrawingError
 from hexwrap_server.input.curves import read_drawing
 from hexwrap_server.input.readers import drawing_dxf, rhino_model
-from hexwrap_server.input.readers.drawing import FLATNESS, Drawing, DrawingError
+from hexwrap_server.input.readers.drawing import FLATNESS, Drawing
 from hexwrap_server.input.readers.drawing_3dm import read_3dm_drawing
 from hexwrap_server.input.readers.drawing_csv import read_csv
 from hexwrap_server.input.readers.drawing_dxf import read_dxf
@@ -197,7 +198,7 @@ def test_what_is_left_out_is_told_with_count_and_kind() -> None:
 @pytest.mark.parametrize("form", ["asc", "bin"])
 def test_dxf_cut_short_is_refused(part: float, form: str) -> None:
     data = dxf(square, form=form)
-    with pytest.raises(DrawingError, match=r"cut short|damaged"):
+    with pytest.raises(DrawingError, match=r"truncated|damaged"):
         read_dxf(data[: int(part * len(data))])
 
 

@@ -8,7 +8,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import AsyncIterator, Coroutine
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -17,9 +16,16 @@ from typing import Any, TypeVar
 import psutil
 import pytest
 
+from hexwrap_server.errors import (
+    InternalError,
+    MemoryLimitError,
+    ShuttingDownError,
+    TimeLimitError,
+    WorkerDiedError,
+)
 from hexwrap_server.jobs.engine import ProcessEngine, nobody
-from hexwrap_server.jobs.worker import InternalError, MemoryLimitError, TimeLimitError, WorkerDiedError
 from hexwrap_solver.errors import RequestError
+from tests.server.patience import PATIENCE, until
 
 T = TypeVar("T")
 CALLS = "tests.server.calls:"
@@ -37,15 +43,16 @@ async def engine(workers: int = 1) -> AsyncIterator[ProcessEngine]:
         assert not any(psutil.pid_exists(pid) for pid in pids)
 
 
-async def call(e: ProcessEngine, name: str, *arguments: Any, seconds: float = 30, mib: float = 4096) -> Any:
+async def call(
+    e: ProcessEngine, name: str, *arguments: Any, seconds: float = PATIENCE, mib: float = 4096
+) -> Any:
     return await e.run(CALLS + name, *arguments, report=nobody, seconds=seconds, mib=mib)
 
 
 async def made(mark: Path) -> None:
-    deadline = time.monotonic() + 10
-    while not mark.exists():
-        assert time.monotonic() < deadline
-        await asyncio.sleep(0.01)
+    async with asyncio.timeout(PATIENCE):
+        while not mark.exists():
+            await asyncio.sleep(0.01)
 
 
 def run(story: Coroutine[Any, Any, T]) -> T:
@@ -78,7 +85,7 @@ def test_progress_arrives_in_order_and_printing_does_no_harm() -> None:
 
     async def story() -> None:
         async with engine() as e:
-            said = await e.run(CALLS + "talk", report=lambda *a: heard.append(a), seconds=9, mib=4096)
+            said = await e.run(CALLS + "talk", report=lambda *a: heard.append(a), seconds=PATIENCE, mib=4096)
             assert said == "talked"
 
     run(story())
@@ -101,31 +108,14 @@ def test_refusals_keep_their_data_and_the_worker() -> None:
     run(story())
 
 
-def test_what_is_put_off_is_done_after_the_answer_and_before_the_next(tmp_path: Path) -> None:
-    async def story() -> None:
-        async with engine() as e:
-            for mark in (tmp_path / "at once", tmp_path / "in a pause"):
-                assert not await call(e, "put_off", str(mark))
-                if mark.name == "at once":
-                    assert await call(e, "exists", str(mark))
-            await made(tmp_path / "in a pause")
-            worker = await call(e, "pid")
-            await call(e, "put_off_a_fault")
-            assert await call(e, "pid") == worker
-
-    run(story())
-
-
 def test_limits_end_one_call_and_the_next_one_runs() -> None:
     async def story() -> None:
         async with engine() as e:
-            start = time.monotonic()
             with pytest.raises(TimeLimitError, match=r"after 0\.3 s"):
-                await call(e, "sleep", 60, seconds=0.3)
+                await call(e, "sleep", 3600, seconds=0.3)
             with pytest.raises(MemoryLimitError, match="300 MiB"):
                 await call(e, "hoard", 500, mib=300)
             assert await call(e, "echo", 1) == 1
-            assert time.monotonic() - start < 15
 
     run(story())
 
@@ -152,6 +142,35 @@ def test_worker_that_dies_while_it_waits_fails_no_call() -> None:
                 idle.wait()
                 assert e.is_ready
                 assert await call(e, "echo", "next") == "next"
+
+    run(story())
+
+
+def test_worker_that_is_killed_while_it_waits_is_replaced_and_no_zombie_stays() -> None:
+    async def story() -> None:
+        async with engine(2) as e:
+            await asyncio.gather(*e._starting)
+            before = e.pids
+            for pid in before:
+                psutil.Process(pid).kill()
+            async with asyncio.timeout(PATIENCE):
+                while len(e.pids) < 2 or set(e.pids) & set(before):
+                    await asyncio.sleep(0.05)
+            assert not any(psutil.pid_exists(pid) for pid in before)
+
+    run(story())
+
+
+def test_calls_that_run_or_wait_are_told_when_the_engine_gives_up(tmp_path: Path) -> None:
+    async def story() -> None:
+        async with engine() as e:
+            busy = asyncio.create_task(call(e, "sleep", 3600, str(tmp_path / "started")))
+            await made(tmp_path / "started")
+            waiting = [asyncio.create_task(call(e, "echo", i)) for i in range(3)]
+            await asyncio.sleep(0)
+            e.give_up()
+            told = await asyncio.gather(busy, *waiting, return_exceptions=True)
+            assert [type(error) for error in told] == [ShuttingDownError] * 4
 
     run(story())
 
@@ -184,19 +203,16 @@ def test_workers_leave_it_to_their_parent_when_to_end(number: signal.Signals) ->
     run(story())
 
 
-@pytest.mark.parametrize("busy", [("sleep", 60), ("crunch", 6000)])
+@pytest.mark.parametrize("busy", [("sleep", 3600), ("crunch", 20_000)])
 def test_cancelling_kills_within_moments(tmp_path: Path, busy: tuple[str, float]) -> None:
     async def story() -> None:
         async with engine() as e:
             pid = await call(e, "pid")
             task = asyncio.create_task(call(e, *busy, str(tmp_path / "started")))
             await made(tmp_path / "started")
-            await asyncio.sleep(0.2)
-            start = time.monotonic()
             task.cancel()
             with pytest.raises(asyncio.CancelledError):
-                await task
-            assert time.monotonic() - start < 2
+                await task  # which would take an hour
             assert not psutil.pid_exists(pid)
             assert await call(e, "echo", "next") == "next"
 
@@ -258,10 +274,7 @@ def test_workers_notice_that_their_parent_was_killed() -> None:
         assert len(pids) == 2
         parent.send_signal(getattr(signal, "SIGKILL", signal.SIGTERM))
         parent.wait()
-        deadline = time.monotonic() + 5
-        while any(psutil.pid_exists(pid) for pid in pids):
-            assert time.monotonic() < deadline, "workers outlived their parent"
-            time.sleep(0.05)
+        until(lambda: not any(psutil.pid_exists(pid) for pid in pids), "the end of the workers")
 
 
 def test_log_lines_of_workers_are_json_and_name_the_job(capfd: pytest.CaptureFixture[str]) -> None:

@@ -17,15 +17,17 @@ from typing import Any
 import httpx
 import pytest
 
+from hexwrap_server.errors import FolderInUseError, WorkerDiedError
 from hexwrap_server.http.metrics import Metrics
-from hexwrap_server.jobs.engine import ProcessEngine
-from hexwrap_server.jobs.intake import read_and_keep
+from hexwrap_server.input.bodies import Body
+from hexwrap_server.jobs.engine import ProcessEngine, nobody
 from hexwrap_server.jobs.manager import JobManager
-from hexwrap_server.jobs.store import FolderInUseError, Job, Store
-from hexwrap_server.jobs.worker import WorkerDiedError
+from hexwrap_server.jobs.reading import read_request
+from hexwrap_server.jobs.store import Job, Store
 from hexwrap_server.settings import MIB, Settings
 from tests.server.bodies import request, tube
 from tests.server.live import Live, finished, running, until_at
+from tests.server.patience import PATIENCE
 
 Behave = Callable[..., Live]
 
@@ -116,12 +118,10 @@ def test_changed_settings_reuse_the_stages_before(tmp_path: Path) -> None:
 
 
 def test_running_job_is_stopped_and_frees_its_worker(behave: Behave) -> None:
-    client = behave("solve_after", 60)
+    client = behave("solve_after", 3600)
     id = post(client, surface=fresh())
     until_at(client, id)
-    start = time.monotonic()
     assert client.delete(f"/v1/jobs/{id}").status_code == 204
-    assert time.monotonic() - start < 2
     assert client.get(f"/v1/jobs/{id}").json()["status"] == "cancelled"
     assert client.get("/health").json()["running"] == 0
     refused = client.get(f"/v1/jobs/{id}/result")
@@ -131,7 +131,7 @@ def test_running_job_is_stopped_and_frees_its_worker(behave: Behave) -> None:
 
 
 def test_queue_has_positions_and_an_end(behave: Behave) -> None:
-    client = behave("solve_after", 60)
+    client = behave("solve_after", 3600)
     first = post(client, surface=fresh())
     until_at(client, first)
     waiting = [post(client, surface=fresh()) for _ in range(2)]
@@ -156,7 +156,7 @@ def test_cancelling_one_of_two_equal_jobs_leaves_the_other(behave: Behave, tmp_p
 
 
 def test_cancelled_work_can_be_asked_for_again(behave: Behave) -> None:
-    client, surface = behave("solve_after", 60), fresh()
+    client, surface = behave("solve_after", 3600), fresh()
     first = post(client, surface=surface)
     until_at(client, first)
     client.delete(f"/v1/jobs/{first}")
@@ -184,7 +184,7 @@ def test_job_whose_worker_dies_fails_alone(behave: Behave) -> None:
 )
 def test_job_ends_whatever_its_problem_holds(behave: Behave, data: dict[str, Any], told: Any) -> None:
     client = behave("refuse_with", data)
-    job = finished(client, post(client, surface=fresh()), seconds=10)
+    job = finished(client, post(client, surface=fresh()))
     assert job["status"] == "failed"
     if told is None:
         assert job["problem"]["type"] == "/problems/internal"
@@ -197,7 +197,7 @@ def test_job_ends_whatever_its_problem_holds(behave: Behave, data: dict[str, Any
     [({"job_seconds": 0.3}, "time-limit"), ({"job_mib": 20.0}, "memory-limit")],
 )
 def test_job_over_a_limit_fails(tmp_path: Path, settings: dict[str, Any], slug: str) -> None:
-    with running(tmp_path, slow(60), **settings) as client:
+    with running(tmp_path, slow(3600), **settings) as client:
         id = post(client)
         job = finished(client, id)
         assert (job["status"], job["problem"]["type"]) == ("failed", f"/problems/{slug}")
@@ -237,7 +237,8 @@ async def managed(folder: Path) -> AsyncIterator[tuple[JobManager, Still, list[J
         jobs = []
         for around in (8, 9, 10):
             body = json.dumps(request(pattern={"around": around})).encode()
-            jobs.append(manager.submit(read_and_keep(store, body, 10**6, 10**6)))
+            parsed = read_request(nobody, Body(body), Settings(), str(store.surfaces))
+            jobs.append(await manager.submit(parsed))
         while not engine.ends:
             await asyncio.sleep(0)
         yield manager, engine, jobs
@@ -340,9 +341,7 @@ def test_wait_holds_the_answer_and_lets_go(behave: Behave, tmp_path: Path) -> No
     gate = tmp_path / "gate"
     client = behave("solve_held", "surface", str(gate))
     id = post(client, surface=fresh())
-    start = time.monotonic()
     assert client.get(f"/v1/jobs/{id}", params={"wait": 0.3}).json()["status"] in ("queued", "running")
-    assert 0.25 < time.monotonic() - start < 1.2
     refused = client.get(f"/v1/jobs/{id}/result")
     assert (refused.status_code, refused.json()["type"]) == (409, "/problems/not-finished")
     gate.touch()
@@ -378,7 +377,7 @@ def test_jobs_survive_a_restart(tmp_path: Path) -> None:
 
 
 def test_work_that_killed_the_server_thrice_is_given_up(tmp_path: Path) -> None:
-    with running(tmp_path, slow(60)) as client:
+    with running(tmp_path, slow(3600)) as client:
         id, same = post(client), post(client)
         until_at(client, id)
     store = Store(tmp_path)
@@ -403,29 +402,33 @@ def test_one_folder_serves_one_server(tmp_path: Path) -> None:
     Store(tmp_path).close()
 
 
-def test_stop_ends_long_polls_at_once(tmp_path: Path) -> None:
-    answers: list[float] = []
+def test_stop_ends_long_polls_and_streams_at_once(tmp_path: Path) -> None:
+    """Of a job that would take an hour."""
+    answers: list[Any] = []
 
     def poll(base: httpx.URL, id: str) -> None:
-        with httpx.Client(base_url=base, timeout=60, trust_env=False) as other:
-            start = time.monotonic()
-            other.get(f"/v1/jobs/{id}", params={"wait": 50})
-            answers.append(time.monotonic() - start)
+        with (
+            httpx.Client(base_url=base, timeout=PATIENCE, trust_env=False) as other,
+            other.stream("GET", f"/v1/jobs/{id}/events") as events,
+        ):
+            listening.set()
+            answers.append(list(events.iter_lines()))
 
-    with running(tmp_path, slow(60)) as client:
+    with running(tmp_path, slow(3600)) as client:
         id = post(client)
+        listening = threading.Event()
         poller = threading.Thread(target=poll, args=(client.base_url, id))
         poller.start()
-        time.sleep(0.5)
+        assert listening.wait(PATIENCE)
         client.service.manager.close_waits()
-        poller.join(10)
+        poller.join(PATIENCE)
+        assert client.get(f"/v1/jobs/{id}", params={"wait": 50}).json()["status"] != "done"
         client.delete(f"/v1/jobs/{id}")
     assert len(answers) == 1
-    assert answers[0] < 5
 
 
 def test_solve_that_the_server_ends_says_where_the_job_is(tmp_path: Path) -> None:
-    with running(tmp_path, slow(60)) as client, ThreadPoolExecutor(1) as thread:
+    with running(tmp_path, slow(3600)) as client, ThreadPoolExecutor(1) as thread:
         solving = thread.submit(client.post, "/v1/solve", json=request())
         while not client.service.manager.n_running:
             time.sleep(0.02)
@@ -442,7 +445,7 @@ def test_workers_know_for_whom_they_work(tmp_path: Path, capfd: pytest.CaptureFi
     surface = fresh()
     with running(tmp_path, workers=1) as client:
         assert finished(client, post(client, surface=surface))["status"] == "done"
-        deadline = time.monotonic() + 10
+        deadline = time.monotonic() + PATIENCE
         while not list((tmp_path / "stages").glob("*.stage")):  # written when the worker has a pause
             assert time.monotonic() < deadline
             time.sleep(0.02)

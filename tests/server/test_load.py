@@ -9,6 +9,7 @@ from typing import Any
 import httpx
 
 from tests.server.bodies import tube
+from tests.server.patience import PATIENCE
 from tests.server.process import free_port, served
 from tests.server.test_mutations import awake
 
@@ -21,7 +22,7 @@ def test_fifty_clients_at_once(tmp_path: Path) -> None:
         served(tmp_path, port),
         httpx.Client(
             base_url=f"http://127.0.0.1:{port}",
-            timeout=120,
+            timeout=PATIENCE,
             trust_env=False,
             limits=httpx.Limits(max_connections=CLIENTS),
         ) as client,

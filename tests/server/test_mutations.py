@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 from tests.server.bodies import tube
+from tests.server.patience import PATIENCE
 from tests.server.process import free_port, served
 
 Body = dict[str, Any]
@@ -219,7 +220,7 @@ def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[httpx.Client]:
     port = free_port()
     with (
         served(tmp_path_factory.mktemp("data"), port, workers=2, job_seconds=60.0, max_panels=20_000),
-        httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=300, trust_env=False) as client,
+        httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=PATIENCE, trust_env=False) as client,
     ):
         yield client
 

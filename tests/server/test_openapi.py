@@ -23,6 +23,7 @@ from hexwrap_server.http.routes import router
 from hexwrap_server.http.viewer import router as viewer
 from tests.server.bodies import request
 from tests.server.live import Live, running
+from tests.server.patience import PATIENCE
 
 CHECKS = [
     not_a_server_error,
@@ -124,7 +125,7 @@ def attack(client: Live, operation: Any, how: settings) -> None:
     @how
     @given(case=operation.as_strategy())
     def answers(case: Any) -> None:
-        case.call_and_validate(base_url=str(client.base_url), checks=CHECKS, timeout=60)
+        case.call_and_validate(base_url=str(client.base_url), checks=CHECKS, timeout=PATIENCE)
 
     answers()
 

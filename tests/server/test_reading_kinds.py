@@ -152,8 +152,8 @@ def test_off_with_colours_normals_and_a_fourth_coordinate() -> None:
         ("OFF\n4 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2\n3 0 2 3\n", "row of face 0 is '4 0 1 2'"),
         ("OFF\n4 1 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2\n", "row of face 0"),
         ("OFF\n4 1 0\n0 0 0\n1 0\n1 1 0\n0 1 0\n3 0 1 2\n", "row of vertex 1"),
-        ("OFF\n4 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n", "cut short"),
-        ("OFF\n400000000000 2 0\n0 0 0\n", "cut short"),
+        ("OFF\n4 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n", "truncated"),
+        ("OFF\n400000000000 2 0\n0 0 0\n", "truncated"),
         ("OFF\n4\n", "how many"),
         ("OFF BINARY\n\0\0", "binary"),
         ("nOFF\n4\n1 1 1\n", "dimension"),
@@ -268,9 +268,9 @@ def without(text: bytes, word: bytes) -> bytes:
 @pytest.mark.parametrize(
     ("data", "word"),
     [
-        (binary_ply("<")[:-3], "cut short"),
-        (binary_ply(">")[:200], "cut short"),
-        (PLY[:-40], "row of face|cut short"),
+        (binary_ply("<")[:-3], "truncated"),
+        (binary_ply(">")[:200], "truncated"),
+        (PLY[:-40], "row of face|truncated"),
         (without(PLY, b"format ascii 1.0\n"), "text or binary"),
         (without(PLY, b"end_header\n"), "no header"),
         (without(PLY, b"property double z\n"), "x, y and z"),
@@ -279,8 +279,8 @@ def without(text: bytes, word: bytes) -> bytes:
             PLY.replace(b"element face 5", b"element fact 5").replace(b"element face", b"element fact"),
             "faces",
         ),
-        (re.sub(rb"element vertex \d+", b"element vertex 99999999999", PLY), "cut short"),
-        (re.sub(rb"element vertex \d+", b"element vertex 99999999999", binary_ply("<")), "cut short"),
+        (re.sub(rb"element vertex \d+", b"element vertex 99999999999", PLY), "truncated"),
+        (re.sub(rb"element vertex \d+", b"element vertex 99999999999", binary_ply("<")), "truncated"),
         (b"ply\nformat ascii 1.0\nelement vertex x\nend_header\n", "cannot be read"),
     ],
 )
@@ -354,7 +354,7 @@ def test_text_stl_in_other_encodings() -> None:
 @pytest.mark.parametrize(
     ("data", "word"),
     [
-        (binary_stl()[:-10], "cut short"),
+        (binary_stl()[:-10], "truncated"),
         (binary_stl(count=10**9), "announces 1000000000 triangles"),
         (binary_stl(count=0), "announces 0"),
         (binary_stl()[:50], "header"),

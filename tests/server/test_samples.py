@@ -11,10 +11,13 @@ import pytest
 from hexwrap_server import samples
 from hexwrap_server.input.surface_files import read_surface
 from hexwrap_server.samples import make
-from hexwrap_solver.surface import NurbsSurface, surface_from_nurbs
+from hexwrap_solver.surface import NurbsSurface, surface_from_mesh, surface_from_nurbs
 from hexwrap_solver.surface.nurbs import domain, evaluate, evaluate_points
+from hexwrap_solver.surface.types import SentMesh
 
+#: NURBS surfaces, and meshes.
 FIGURES = ["cone", "diagrid", "entrance", "facade", "isometric", "ring", "singular", "tower", "waist"]
+MESHES = ["dome", "openings", "roof"]
 
 
 def surface_of(name: str) -> NurbsSurface:
@@ -39,7 +42,7 @@ def girths(surface: NurbsSurface) -> np.ndarray:
 
 
 def test_the_names() -> None:
-    assert samples.names() == FIGURES
+    assert samples.names() == sorted(FIGURES + MESHES)
     for name in ("", "nothing", "../make", "tower.json"):
         with pytest.raises(KeyError):
             samples.load(name)
@@ -49,7 +52,7 @@ def test_the_names() -> None:
 
 def test_the_script_makes_what_is_bundled(tmp_path: Path) -> None:
     make.make(tmp_path)
-    assert sorted(file.stem for file in tmp_path.glob("*.3dm")) == FIGURES
+    assert sorted(file.stem for file in tmp_path.glob("*.3dm")) == sorted(FIGURES + MESHES)
     for name in FIGURES:
         made = json.loads((tmp_path / f"{name}.json").read_text(encoding="utf-8"))
         kept = samples.load(name)
@@ -65,6 +68,26 @@ def test_the_script_makes_what_is_bundled(tmp_path: Path) -> None:
         ):
             np.testing.assert_allclose(one.pop("point"), other.pop("point"), atol=3e-4)
         assert made == kept
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_the_script_makes_the_meshes_that_are_bundled(tmp_path: Path, name: str) -> None:
+    make.make(tmp_path)
+    made = json.loads((tmp_path / f"{name}.json").read_text(encoding="utf-8"))
+    kept = samples.load(name)
+    np.testing.assert_allclose(made["surface"].pop("vertices"), kept["surface"].pop("vertices"), atol=1.1e-4)
+    assert made == kept
+
+
+@pytest.mark.parametrize(("name", "loops"), [("dome", 1), ("openings", 15), ("roof", 1)])
+def test_the_rhino_file_holds_the_same_mesh(name: str, loops: int) -> None:
+    path = samples.path_3dm(name)
+    read, sent = read_surface(path.read_bytes(), path.name).geometry, samples.load(name)["surface"]
+    assert isinstance(read, SentMesh)
+    np.testing.assert_allclose(read.vertices, sent["vertices"], atol=1e-5)
+    assert read.faces.to_lists() == sent["faces"]
+    surface = surface_from_mesh(read)
+    assert (len(surface.loops), surface.repairs) == (loops, ())
 
 
 @pytest.mark.parametrize("name", FIGURES)

@@ -8,10 +8,11 @@ from typing import Annotated, Any, Literal
 
 import pytest
 
+from hexwrap_server.errors import MOST_LISTED, FormError
 from hexwrap_server.input import faults
 from hexwrap_server.input.form import Body, document, read
 from hexwrap_server.input.schemas import parse_request
-from hexwrap_server.problems import MOST_LISTED, FormError, place_of, problem
+from hexwrap_server.problems import place_of, problem
 from hexwrap_solver.errors import (
     BoundaryError,
     ConvergenceError,

@@ -6,22 +6,22 @@ import asyncio
 import io
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import ezdxf.filemanagement
 import httpx
 import numpy as np
-import orjson
 import pytest
 from ezdxf.entities import LWPolyline
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hexwrap_server.http import routes
-from hexwrap_server.http.service import Service
-from hexwrap_server.input import quick
-from hexwrap_server.settings import Settings
+from hexwrap_server.input import json_text
+from hexwrap_server.jobs import reading
+from hexwrap_server.jobs.engine import nobody
 from tests.server.bodies import request, tube
 from tests.server.live import Live, finished, running
+from tests.server.patience import until
 
 
 @pytest.fixture(scope="module")
@@ -220,14 +220,15 @@ def test_half_characters_are_told(client: Live) -> None:
 
 
 def test_unsolvable_surface_is_a_problem_with_its_faults(client: Live) -> None:
-    open_disk = {"vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "faces": [[0, 1, 2]]}
-    id = client.post("/v1/jobs", json={"surface": open_disk}).json()["id"]
+    corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 1, 1]]
+    fin = {"vertices": corners, "faces": [[0, 1, 2], [0, 1, 3], [0, 1, 4]]}
+    id = client.post("/v1/jobs", json={"surface": fin}).json()["id"]
     job = finished(client, id)
     assert job["status"] == "failed"
     answer = client.get(f"/v1/jobs/{id}/result")
     assert answer.status_code == 422
-    assert answer.json() == job["problem"] == client.post("/v1/solve", json={"surface": open_disk}).json()
-    assert client.post("/v1/surfaces", json=open_disk).json()["type"] == job["problem"]["type"]
+    assert answer.json() == job["problem"] == client.post("/v1/solve", json={"surface": fin}).json()
+    assert client.post("/v1/surfaces", json=fin).json()["type"] == job["problem"]["type"]
 
 
 @pytest.mark.parametrize(
@@ -261,61 +262,55 @@ def test_result_file_is_the_result(client: Live, done: str) -> None:
 @pytest.mark.parametrize(
     ("path", "body"),
     [
+        ("/v1/surfaces", b"{}"),
+        ("/v1/surfaces?name=a.obj", b"v 0 0 0"),
         ("/v1/jobs/{}/lift", b'{"points": [[1, 2, 3]]}'),
-        ("/v1/jobs/{}/flatten", b'{"points": [[1, 2]]}'),
-        ("/v1/jobs", orjson.dumps({"surface": {}} | {f"name {i}": i for i in range(routes.FEW_QUOTES)})),
+        ("/v1/jobs", b"{}"),
+        ("/v1/solve", b"[1e999]"),
+        ("/solve", b"{}"),
     ],
-    ids=("lift", "flatten", "names"),
 )
-def test_what_may_take_long_to_read_is_read_in_a_process(
+def test_no_body_is_read_in_the_server_itself(
     client: Live, done: str, monkeypatch: pytest.MonkeyPatch, path: str, body: bytes
 ) -> None:
     def not_here(*ignored: object) -> None:
         raise AssertionError("it holds the interpreter")
 
-    monkeypatch.setattr(quick, "read", not_here)
+    for name in ("loads", "parse_request", "parse_surface", "sent_file"):
+        monkeypatch.setattr(reading, name, not_here)
+    monkeypatch.setattr(json_text, "orjson", None)
     answer = client.post(path.format(done), content=body)
-    assert (answer.status_code, answer.json()["type"]) == (422, "/problems/invalid-request")
+    assert answer.status_code in (400, 422, 500)
+    assert "AssertionError" not in answer.text
+    assert "AttributeError" not in answer.text
 
 
-@pytest.mark.parametrize(
-    ("path", "body"),
-    [
-        ("/v1/surfaces", b"{}"),
-        ("/v1/surfaces?name=a.obj", b"v 0 0 0"),
-        ("/v1/surfaces/preview?name=a.obj", b"v 0 0 0"),
-        ("/v1/jobs", orjson.dumps({f"name {i}": i for i in range(routes.FEW_QUOTES)})),
-        ("/solve", b"{}"),
-    ],
-)
-def test_what_is_short_does_not_wait_for_what_is_being_read(
-    client: Live, done: str, monkeypatch: pytest.MonkeyPatch, path: str, body: bytes
-) -> None:
-    monkeypatch.setattr(client.service, "_one_reading", asyncio.Semaphore(0))  # somebody reads for ever
-    with pytest.raises(httpx.ReadTimeout):
-        client.post(path, content=body, timeout=0.3)
-    assert client.post(f"/v1/jobs/{done}/lift", json={"points": [[0.1, 0.1]]}).status_code == 200
+def test_small_bodies_do_not_wait_for_large_ones_and_files(client: Live, tmp_path: Path) -> None:
+    """All readers are at something that does not end."""
+    service = client.service
 
+    async def occupy() -> None:
+        for i in range(service.settings.readers):
+            call = service.readers.run(
+                "tests.server.calls:sleep", 3600, str(tmp_path / f"{i}"), report=nobody, seconds=1e6, mib=1e6
+            )
+            tasks.append(asyncio.create_task(call))
 
-def test_errands_run_beside_one_that_reads(tmp_path: Path) -> None:
-    async def story() -> None:
-        service = Service(Settings(data=str(tmp_path)))
-        await service.errands.start()
-        try:
-            mark = tmp_path / "begun"
-            readings = [
-                asyncio.create_task(service.reading("tests.server.calls:sleep", 60, str(mark))) for _ in "ab"
-            ]
-            while not mark.exists():
-                await asyncio.sleep(0.01)
-            assert await service.errand("tests.server.calls:echo", 1) == 1
-            for reading in readings:
-                reading.cancel()
-            await asyncio.gather(*readings, return_exceptions=True)
-        finally:
-            await service.stop()
+    async def free() -> None:
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
 
-    asyncio.run(asyncio.wait_for(story(), 30))
+    tasks: list[asyncio.Task[Any]] = []
+    client.run(occupy())
+    try:
+        until(lambda: len(list(tmp_path.iterdir())) == service.settings.readers, "all readers")
+        assert client.post("/v1/solve", json=request(pattern={"around": 9})).status_code == 200
+        with pytest.raises(httpx.ReadTimeout):
+            client.post("/v1/surfaces", params={"name": "a.obj"}, content=b"v 0 0 0", timeout=0.3)
+    finally:
+        client.run(free())
+    assert client.post("/v1/surfaces", params={"name": "a.obj"}, content=b"v 0 0 0").status_code == 422
 
 
 def test_drawings_are_carried_to_the_surface_and_back(client: Live, done: str) -> None:

@@ -13,6 +13,7 @@ import httpx
 import pytest
 
 from tests.server.bodies import request, tube
+from tests.server.patience import PATIENCE
 from tests.server.process import PROGRAM, children, free_port, is_gone, served
 
 
@@ -31,11 +32,9 @@ def test_signals_end_it_cleanly_while_it_works(tmp_path: Path, number: signal.Si
             time.sleep(0.05)
         ids = [client.post(f"{base}/v1/jobs", json=heavy(i)).json()["id"] for i in range(2)]
         workers = children(process)
-        assert len(workers) == 3  # one for jobs, two for errands
-        start = time.monotonic()
+        assert len(workers) == 2  # one for jobs, one for errands
         process.send_signal(number)
-        assert process.wait(10) == 0
-        assert time.monotonic() - start < 5
+        assert process.wait(PATIENCE) == 0
         assert all(is_gone(worker) for worker in workers)
     log = (tmp_path / "log").read_text()
     assert "Traceback" not in log
@@ -47,13 +46,13 @@ def test_signals_end_it_cleanly_while_it_works(tmp_path: Path, number: signal.Si
 def test_signal_to_the_whole_group_costs_no_job(tmp_path: Path, number: signal.Signals) -> None:
     """As service managers and consoles send it: to the workers as well."""
     port = free_port()
-    with httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=60, trust_env=False) as client:
+    with httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=PATIENCE, trust_env=False) as client:
         with served(tmp_path, port, workers=1, group=True) as process:
             ids = [client.post("/v1/jobs", json=heavy(i)).json()["id"] for i in range(2)]
             while not client.get(f"/v1/jobs/{ids[0]}").json()["stage"]:  # the worker is at it
                 time.sleep(0.02)
             os.killpg(process.pid, number)
-            assert process.wait(10) == 0
+            assert process.wait(PATIENCE) == 0
         with served(tmp_path, port, workers=1):
             for id in ids:
                 assert client.get(f"/v1/jobs/{id}?wait=50").json()["status"] == "done"
@@ -64,7 +63,7 @@ def test_taken_port_is_told_clearly(tmp_path: Path) -> None:
     with served(tmp_path, port, workers=1):
         (tmp_path / "other").mkdir()
         command = [sys.executable, "-c", PROGRAM, str(port), str(tmp_path / "other"), "1"]
-        second = subprocess.run(command, capture_output=True, text=True, timeout=60)
+        second = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
     assert second.returncode != 0
     assert f"Cannot listen on 127.0.0.1:{port}" in second.stderr
 
@@ -84,7 +83,9 @@ def test_what_keeps_it_from_starting_is_told_in_a_sentence(tmp_path: Path) -> No
     paths = os.pathsep.join(os.path.abspath(p or ".") for p in sys.path)
     command = [sys.executable, "-c", BROKEN, str(tmp_path)]
     environment = os.environ | {"PYTHONPATH": paths}
-    told = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60, check=False)
+    told = subprocess.run(
+        command, env=environment, capture_output=True, text=True, timeout=PATIENCE, check=False
+    )
     assert told.returncode == 1
     assert told.stderr.endswith("hexwrap: There is no machine.\n")
     assert "Traceback" not in told.stderr

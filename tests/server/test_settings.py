@@ -1,4 +1,4 @@
-"""Settings are data: flags, environment and README say the same."""
+"""Settings are data: flags, environment and documentation say the same."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from pathlib import Path
 
 import pytest
 
+from hexwrap_server.errors import FolderInUseError
 from hexwrap_server.http.service import open_store
-from hexwrap_server.jobs.store import FolderInUseError
 from hexwrap_server.settings import Settings, add_arguments, flag, readme_table, variable
 
-README = Path(__file__).parents[2] / "README.md"
+PAGE = Path(__file__).parents[2] / "docs" / "service.md"
 
 
 def parsed(*words: str) -> Settings:
@@ -23,8 +23,8 @@ def parsed(*words: str) -> Settings:
     return Settings.from_arguments(parser.parse_args(words))
 
 
-def test_every_setting_is_in_the_readme_as_it_is() -> None:
-    assert readme_table() in README.read_text(encoding="utf-8")
+def test_every_setting_is_in_the_documentation_as_it_is() -> None:
+    assert readme_table() in PAGE.read_text(encoding="utf-8")
 
 
 def test_every_setting_has_a_flag_a_variable_and_help() -> None:

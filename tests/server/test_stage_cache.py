@@ -13,14 +13,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from hexwrap_server.jobs import codec, later
+from hexwrap_server.errors import CodecError, StorageError
+from hexwrap_server.jobs import codec
 from hexwrap_server.jobs.cache import SHARES, CachingRunner, StageCache, size_of
-from hexwrap_server.jobs.codec import CodecError, decode, digest, encode
-from hexwrap_server.jobs.disk import StorageError, prune, write_whole
+from hexwrap_server.jobs.codec import decode, digest, encode
+from hexwrap_server.jobs.disk import prune, write_whole
 from hexwrap_solver.arrays import Ragged
 from hexwrap_solver.conformal.types import BoundaryCondition, Deck
 from hexwrap_solver.pattern.types import PatternSettings
@@ -34,10 +35,12 @@ values = st.recursive(
 
 
 @given(values)
+@settings(deadline=None)
 def test_values_come_out_as_they_went_in(value: Any) -> None:
     assert decode(encode(value)) == value
 
 
+@settings(deadline=None)
 @given(arrays.arrays(st.sampled_from([np.float64, np.int64, np.bool_, np.complex128]), arrays.array_shapes()))
 def test_arrays_come_out_as_they_went_in(array: np.ndarray[Any, Any]) -> None:
     back = decode(encode(array))
@@ -96,7 +99,7 @@ def runner(folder: Path | None, memory: int = 10**8) -> CachingRunner:
     return CachingRunner(StageCache(folder, memory), lambda stage, fraction, what: None)
 
 
-def stages(run: CachingRunner, settings: tuple[int, int]) -> int:
+def stages(run: CachingRunner, asked: tuple[int, int]) -> int:
     """Two stages; how many were computed."""
     computed = []
 
@@ -104,9 +107,8 @@ def stages(run: CachingRunner, settings: tuple[int, int]) -> int:
         computed.append(name)
         return np.ones(100)
 
-    run("map", settings[0], lambda progress: compute("map"))
-    run("pattern", settings[1], lambda progress: compute("pattern"))
-    later.catch_up()
+    run("map", asked[0], lambda progress: compute("map"))
+    run("pattern", asked[1], lambda progress: compute("pattern"))
     return len(computed)
 
 
@@ -118,18 +120,9 @@ def test_stage_is_known_by_its_settings_and_all_before(tmp_path: Path) -> None:
     assert stages(runner(None), (1, 1)) == 2
 
 
-def test_costly_stages_are_written_at_once(tmp_path: Path) -> None:
-    cache = StageCache(tmp_path, 0)
-    cache.put("cheap", 1, seconds=0.01)
-    cache.put("costly", 2, seconds=60)
-    assert [path.name for path in tmp_path.iterdir()] == ["costly.stage"]
-    later.catch_up()
-    assert (cache.get("cheap"), cache.get("costly")) == ((1, "disk"), (2, "disk"))
-
-
 def test_full_disk_costs_no_stage(tmp_path: Path) -> None:
     cache = StageCache(tmp_path / "missing", 1000)
-    cache.put("a", 1, seconds=60)
+    cache.put("a", 1)
     assert cache.get("a") == (1, "memory")
 
 
@@ -170,7 +163,7 @@ def test_memory_counts_what_was_derived_from_a_stage() -> None:
     assert cache.get("surface") is not None
     assert surface.tree is not None
     assert size_of(surface) > 2 * plain
-    later.catch_up()
+    cache.weigh()
     assert cache.get("surface") is None
 
 

@@ -11,23 +11,10 @@ from contextlib import contextmanager
 
 import pytest
 
-from hexwrap_server.jobs.pipes import write_frame
+from tests.server.patience import PATIENCE
 
 #: Libraries of single file formats and pictures.
 FORMATS = {"matplotlib", "ezdxf"}
-
-
-#: The life of a scribe whose loading takes a minute.
-SLOW_SCRIBE = """
-import sys, time
-class Slow:
-    def find_spec(self, name, path=None, target=None):
-        if name == "hexwrap_server.jobs.scribe":
-            time.sleep(60)
-sys.meta_path.insert(0, Slow())
-from hexwrap_server.jobs.scribe_main import main
-main()
-"""
 
 
 def environment() -> dict[str, str]:
@@ -50,9 +37,8 @@ def child(program: str) -> Iterator[subprocess.Popen[bytes]]:
     [
         ("http.app", FORMATS),
         ("jobs.work", FORMATS | {"fastapi"}),
-        ("jobs.scribe", FORMATS | {"fastapi", "pydantic"}),
-        ("jobs.worker", FORMATS | {"scipy"}),  # these two listen before they load anything large
-        ("jobs.scribe_main", FORMATS | {"scipy"}),
+        ("jobs.reading", FORMATS | {"fastapi"}),
+        ("jobs.worker", FORMATS | {"scipy"}),  # it listens before it loads anything large
     ],
 )
 def test_what_is_not_loaded_at_the_start(module: str, not_loaded: set[str]) -> None:
@@ -69,24 +55,13 @@ def test_what_is_not_loaded_at_the_start(module: str, not_loaded: set[str]) -> N
     assert not loaded & not_loaded
 
 
-def test_a_scribe_leaves_with_its_worker_while_it_loads() -> None:
-    with child(SLOW_SCRIBE) as process:
+def test_worker_that_cannot_be_spoken_to_leaves() -> None:
+    """A word is announced that is larger than any memory."""
+    with child("from hexwrap_server.jobs.worker import main; main()") as process:
         assert process.stdin is not None
-        process.stdin.close()
-        assert process.wait(timeout=30) == 0
-
-
-@pytest.mark.parametrize("name", ["scribe_main", "worker"])
-def test_who_cannot_be_spoken_to_leaves(name: str) -> None:
-    """Three words are announced, and one of them is larger than any memory."""
-    with child(f"from hexwrap_server.jobs.{name} import main; main()") as process:
-        assert process.stdin is not None
-        if name == "worker":
-            process.stdin.write((2**62).to_bytes(8, "little"))
-            process.stdin.flush()
-        else:
-            write_frame(process.stdin, ("part", "map", 2**62))
-        assert process.wait(timeout=30) == 0
+        process.stdin.write((2**62).to_bytes(8, "little"))
+        process.stdin.flush()
+        assert process.wait(timeout=PATIENCE) == 0
 
 
 def test_standard_input_is_left_to_nobody() -> None:
@@ -96,5 +71,5 @@ def test_standard_input_is_left_to_nobody() -> None:
         "outlet.write(os.read(0, 9) + b', ' + inlet.read()); outlet.flush()"
     )
     with child(program) as process:
-        said, _ = process.communicate(b"hear me", timeout=30)
+        said, _ = process.communicate(b"hear me", timeout=PATIENCE)
     assert said == b", hear me"

@@ -11,9 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hexwrap_server.errors import FormError
 from hexwrap_server.input.requests import Outcome, Wanted
 from hexwrap_server.jobs.store import Job, Store, Work
-from hexwrap_server.problems import FormError, problem
+from hexwrap_server.problems import problem
 from hexwrap_solver.errors import RequestError
 from tests.server.bodies import tube
 from tests.server.live import Live, running
@@ -100,7 +101,7 @@ def test_files_with_too_many_vertices_are_refused(client: Live, path: str) -> No
 
 def test_old_and_superfluous_results_are_forgotten(tmp_path: Path) -> None:
     store = Store(tmp_path)
-    outcome = Outcome(b"r" * 1000, b"s" * 1000, {}, 2000, {}, {})
+    outcome = Outcome(b"r" * 1000, b"s" * 1000, 2000, {}, {})
     for i in range(4):
         identity = f"{i}" * 64
         store.keep_surface("a" * 64, b"surface")

@@ -95,10 +95,11 @@ def test_settings_beside_an_id_replace_those_sent_with_the_surface(live: Live) -
 
 def test_a_preview_shows_a_file_as_it_stands_even_one_that_would_be_refused(live: Live) -> None:
     mesh = tube(6, 5)
-    del mesh["faces"][8]
+    a, b, _ = mesh["faces"][8]
+    mesh["faces"].append([a, b, 0])  # the third face at an edge
     text = "".join(f"v {x} {y} {z}\n" for x, y, z in mesh["vertices"])
     text += "".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in mesh["faces"])
-    files = {"file": ("hole.obj", text)}
+    files = {"file": ("fin.obj", text)}
     assert live.post("/v1/surfaces", files=files).status_code == 422
     shown = live.post("/v1/surfaces/preview", files=files).json()
     assert shown["vertices"] == mesh["vertices"]

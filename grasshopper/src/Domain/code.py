@@ -27,6 +27,8 @@ def domain(token, url):
     """Work of the background thread."""
     result = finished(url, token, ["mesh", "map", "pattern"])
     mesh, unrolled, pattern = result["mesh"], result["map"], result["pattern"]
+    if unrolled["kind"] == "net":
+        return net(mesh, unrolled, pattern)
     deck = Deck(unrolled["deck"])
     uv = [complex(x, y) for x, y in unrolled["uv"]]
     sheets = directed_edges(mesh["faces"], unrolled["sheet"])
@@ -39,6 +41,49 @@ def domain(token, url):
         "angles": angles,
         "pattern": flat_pattern(pattern, deck) if pattern else None,
         "summary": summary(unrolled),
+    }
+
+
+def net(mesh, unrolled, pattern):
+    """The same of a domain that is no cylinder or cone: triangles in the plane, glued across the cut."""
+    sides = {}
+    for corners, places in zip(mesh["faces"], unrolled["corners"]):
+        for k in range(3):
+            sides[corners[k - 1], corners[k]] = complex(*places[k - 1]), complex(*places[k])
+    size = max(abs(end) for side in sides.values() for end in side) or 1.0
+    banks = []
+    for edge, (start, end) in sorted(sides.items()):
+        beyond = sides.get(edge[::-1])
+        if beyond and abs(beyond[0] - end) + abs(beyond[1] - start) > 1e-6 * size:
+            banks.append(flat_curve([start, end]))
+    boundary = []
+    for loop in mesh["loops"]:
+        pieces = []
+        for k in range(len(loop)):
+            start, end = sides[loop[k], loop[(k + 1) % len(loop)]]
+            if not pieces or abs(pieces[-1][-1] - start) > 1e-6 * size:
+                pieces.append([start])
+            pieces[-1].append(end)
+        boundary.extend(flat_curve(piece) for piece in pieces)
+    points, degrees = [], []
+    for loop, row in zip(mesh["loops"], unrolled["boundary_angles"]):
+        for k, angle in enumerate(row):
+            if abs(angle - math.pi) > STRAIGHT:
+                start = sides[loop[k], loop[(k + 1) % len(loop)]][0]
+                points.append(point([start.real, start.imag]))
+                degrees.append(math.degrees(angle))
+    branches = {}
+    if pattern:
+        for ring, cell in zip(pattern["ring"], pattern["corners"]):
+            branches.setdefault(ring, []).append(closed_polyline(cell))
+    text = "net with %d loops and %d singularities" % (len(mesh["loops"]), len(unrolled["cones"]))
+    return {
+        "boundary": boundary,
+        "cut": banks,
+        "corners": points,
+        "angles": degrees,
+        "pattern": tree_of(branches) if pattern else None,
+        "summary": text,
     }
 
 

@@ -16,8 +16,9 @@ import httpx
 from rich.console import Console
 
 from hexwrap_server import samples
-from hexwrap_server.cli.local import UsageError, sample_body
+from hexwrap_server.cli.local import sample_body
 from hexwrap_server.cli.summary import print_summary
+from hexwrap_server.errors import UsageError
 from hexwrap_server.output.writers import WRITERS
 
 #: Seconds: for one answer, for a server to start, to stop before it is killed, between two looks at a job.
@@ -126,7 +127,7 @@ def stop_server(process: subprocess.Popen[bytes]) -> None:
 
 
 def who_answers(port: int) -> str:
-    """``hexwrap``, ``other`` or ``nobody``."""
+    """``hexwrap``, ``other`` or ``nobody``: who answers."""
     with _client(port) as client:
         try:
             health = client.get("/health", timeout=3.0).json()

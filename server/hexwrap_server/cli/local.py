@@ -9,6 +9,7 @@ from typing import Any
 
 from hexwrap_server import samples
 from hexwrap_server.cli.options import asked_body
+from hexwrap_server.errors import UsageError
 from hexwrap_server.input.json_text import loads
 from hexwrap_server.input.readers.text import as_utf8
 from hexwrap_server.input.requests import SentSurface, Wanted
@@ -20,13 +21,9 @@ from hexwrap_server.jobs.worker import Report
 from hexwrap_solver.pipeline import Solution
 from hexwrap_solver.surface.types import SurfaceSettings
 
-#: Nobody but the user waits here, so only what no memory would hold is refused.
+#: Only the user waits here, so only what exceeds any memory is refused.
 MAX_VERTICES, MAX_PANELS = 20_000_000, 5_000_000
 SAMPLE = "sample:"
-
-
-class UsageError(Exception):
-    """What was typed makes no sense; the sentence says why."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +51,7 @@ def read_body(given: str) -> tuple[dict[str, Any], bytes | None]:
         return {"name": path.stem[:200]}, data
     body = loads(as_utf8(data))
     if not isinstance(body, dict):
-        raise UsageError(f"{given} holds no JSON object; a request or a surface is one.")
+        raise UsageError(f"{given} does not hold a JSON object: a request or a surface.")
     body = body if "surface" in body else {"surface": body}
     return {"name": path.stem[:200], **body}, None
 
@@ -62,7 +59,7 @@ def read_body(given: str) -> tuple[dict[str, Any], bytes | None]:
 def sample_body(name: str) -> dict[str, Any]:
     """The request of a bundled sample. Raises UsageError."""
     if name not in samples.names():
-        raise UsageError(f"there is no sample '{name}'; there are {', '.join(samples.names())}.")
+        raise UsageError(f"unknown sample '{name}'; choose one of {', '.join(samples.names())}.")
     return samples.load(name)
 
 
@@ -77,7 +74,7 @@ def task(given: str, arguments: argparse.Namespace) -> Task:
         settings = request.wanted.surface or SurfaceSettings()
         sent = sent_surface(data, Path(given).name, settings, MAX_VERTICES).sent
     if not isinstance(sent, SentSurface):
-        raise UsageError(f"{given} names a surface that only a server knows; give the surface itself.")
+        raise UsageError(f"{given} holds a surface id, which needs a server; give the surface itself.")
     return Task(request.name, sent, request.wanted)
 
 

@@ -21,9 +21,10 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from hexwrap_server import __version__, samples
 from hexwrap_server.cli.demo import ALL, DemoError, run_demo
 from hexwrap_server.cli.inspect import print_content
-from hexwrap_server.cli.local import Task, UsageError, only_map, solve_here, task
+from hexwrap_server.cli.local import Task, only_map, solve_here, task
 from hexwrap_server.cli.options import add_request_options, as_options, is_option_at_fault
 from hexwrap_server.cli.summary import print_summary
+from hexwrap_server.errors import FormError, StartError, UsageError
 from hexwrap_server.input import form
 from hexwrap_server.input.curves import READERS, read_drawing, write_curves
 from hexwrap_server.input.curves import WRITERS as CURVE_WRITERS
@@ -31,9 +32,9 @@ from hexwrap_server.input.finished_map import map_in_result
 from hexwrap_server.jobs.lift_curves import flatten_curves, lift_curves
 from hexwrap_server.jobs.worker import Report
 from hexwrap_server.output import wire
+from hexwrap_server.output.meta import GROUPS
 from hexwrap_server.output.text import length
 from hexwrap_server.output.writers import WRITERS, Meta, check_wanted, write
-from hexwrap_server.problems import FormError
 from hexwrap_server.settings import Settings, add_arguments
 from hexwrap_solver.errors import HexwrapError
 from hexwrap_solver.pipeline import Solution
@@ -42,7 +43,8 @@ from hexwrap_solver.surface.types import SurfaceSettings
 #: What an ending stands for where the name of the file says no more.
 ENDINGS = {
     ".obj": "panels.obj", ".3dm": "panels.3dm", ".dxf": "panels.dxf", ".csv": "panels.csv",
-    ".svg": "domain.svg", ".png": "panels.png", ".json": "result.json", ".npz": "result.npz",
+    ".ifc": "panels.ifc", ".glb": "panels.glb", ".svg": "domain.svg",
+    ".png": "panels.png", ".json": "result.json", ".npz": "result.npz",
 }  # fmt: skip
 #: Settings of a surface that choose among what a file holds.
 INSPECTED = ("object", "layer", "unit")
@@ -107,6 +109,13 @@ def make_parser() -> argparse.ArgumentParser:
     solve.add_argument(
         "--sheet", type=float, nargs=2, metavar=("WIDTH", "HEIGHT"), help="size of the sheets of flat.dxf"
     )
+    solve.add_argument(
+        "--group", choices=GROUPS, default="size",
+        help="what shares a sheet of flat.dxf: all sizes, a ring, or a side of the building (zone)",
+    )  # fmt: skip
+    solve.add_argument(
+        "--storey", type=float, metavar="HEIGHT", help="height of the storeys of panels.ifc (default: none)"
+    )
     solve.add_argument("-q", "--quiet", action="store_true", help="print nothing but errors")
     add_request_options(solve)
     solve.set_defaults(command=_solve)
@@ -155,12 +164,11 @@ def make_parser() -> argparse.ArgumentParser:
 
 
 def _kinds() -> list[str]:
-    return [*ENDINGS, "flat.dxf", "domain.dxf"]
+    return [*ENDINGS, "flat.dxf", "domain.dxf", "cutting-list.csv"]
 
 
 def _serve(asked: argparse.Namespace) -> int:
-    from hexwrap_server.http.app import PortTakenError, serve  # the web framework takes a second to import
-    from hexwrap_server.jobs.store import DamagedError, FolderInUseError
+    from hexwrap_server.http.app import serve  # the web framework takes a second to import
 
     try:
         settings = Settings.from_arguments(asked)
@@ -168,7 +176,7 @@ def _serve(asked: argparse.Namespace) -> int:
         raise UsageError(str(error)) from None
     try:
         serve(settings)
-    except (PortTakenError, FolderInUseError, DamagedError, OSError) as error:
+    except (StartError, OSError) as error:
         return _refuse(1, str(error))
     return 0
 
@@ -180,13 +188,21 @@ def _solve(asked: argparse.Namespace) -> int:
         raise UsageError(
             f"--sheet {asked.sheet[0]:g} {asked.sheet[1]:g}: both sides must be finite and greater than 0."
         )
+    if asked.storey is not None and not 0 < asked.storey < inf:
+        raise UsageError(f"--storey {asked.storey:g}: must be finite and greater than 0.")
     todo = task(asked.input, asked)
     for kind in kinds.values():
         check_wanted(kind, todo.wanted)
     solution, timings = solve_with_progress(todo, asked.quiet)
-    meta = Meta(todo.name or "hexwrap", timings, tuple(asked.sheet) if asked.sheet else None)
+    meta = Meta(
+        todo.name or "hexwrap",
+        timings,
+        tuple(asked.sheet) if asked.sheet else None,
+        group=asked.group,
+        storey=asked.storey,
+    )
     console = Console(quiet=asked.quiet, soft_wrap=True)
-    parts = ("mesh", "map", "pattern", "panels", "sizes", "quality", "timings")
+    parts = ("unit", "mesh", "map", "pattern", "panels", "sizes", "quality", "timings")
     print_summary(console, meta.name, {name: wire.part(solution, name, timings) for name in parts})
     for out, kind in kinds.items():
         save(out, write(kind, solution, meta))
@@ -214,7 +230,7 @@ def _lift(asked: argparse.Namespace) -> int:
         raise UsageError(f"--step {asked.step:g}: must be greater than 0.")
     _check_folders([asked.output])
     if not Path(asked.points).is_file():
-        raise UsageError(f"{asked.points}: there is no such file.")
+        raise UsageError(f"{asked.points}: no such file.")
     drawing = read_drawing(Path(asked.points))
     cmap = map_in_result(Path(asked.input))
     if cmap is None:
@@ -222,8 +238,9 @@ def _lift(asked: argparse.Namespace) -> int:
     carry = flatten_curves if asked.flatten else lift_curves
     carried = carry(cmap, drawing.curves, asked.step)
     if not carried.curves:
-        return _refuse(1, "no point of the drawing lies in the domain; see domain.dxf for where that is.")
-    save(asked.output, write_curves(ending, carried.curves))
+        return _refuse(1, "no point of the drawing lies in the domain, which domain.dxf shows.")
+    unit = None if asked.flatten else cmap.surface.unit
+    save(asked.output, write_curves(ending, carried.curves, unit))
     console = Console(quiet=asked.quiet, soft_wrap=True, highlight=False)
     for note in drawing.notes():
         console.print(note)
@@ -283,7 +300,7 @@ def _check_folders(outputs: Sequence[str]) -> None:
     """Before the work, not after it."""
     for out in outputs:
         if not Path(out).resolve().parent.is_dir():
-            raise UsageError(f"-o {out}: there is no folder {Path(out).resolve().parent}.")
+            raise UsageError(f"-o {out}: the folder {Path(out).resolve().parent} does not exist.")
         if Path(out).is_dir():
             raise UsageError(f"-o {out}: this is a folder; name a file.")
 

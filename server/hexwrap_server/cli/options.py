@@ -7,22 +7,23 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from hexwrap_server.errors import FormError
 from hexwrap_server.input.faults import Path, pointer
 from hexwrap_server.input.form import Body, Leaf, is_nullable, leaves
-from hexwrap_server.problems import FormError
 
 #: Flags that are neither the setting's name nor, for the first setting of a section, the section's.
 FLAGS: dict[Path, str] = {
     ("boundary", "angles"): "--angle",
+    ("boundary", "loops"): "--loop",
     ("pattern", "boundary"): "--cells",
     ("panels", "weights", "planarity"): "--weight-planarity",
     ("panels", "weights", "angle"): "--weight-angle",
     ("panels", "weights", "edge"): "--weight-edge",
     ("panels", "weights", "surface"): "--weight-surface",
+    ("surface", "features", "angle"): "--fold",
 }
 #: Settings of which a request gives one.
 SIZES: tuple[Path, Path] = (("pattern", "around"), ("pattern", "edge_length"))
-PLACES = "PLACE is an index of the sent mesh or X,Y,Z (any number of times)"
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,7 @@ class Option:
         """What it does, with its default."""
         text, default = self.leaf.setting.help, self.leaf.default
         if self.leaf.is_list:
-            return f"{text}; {PLACES}"
+            return f"{text}; PLACE is the number of a {self.leaf.entry[0]} or X,Y,Z (any number of times)"
         if self.is_first:
             text += "; 'none' leaves it out"
         if default is None or default is False or default == "":
@@ -86,7 +87,7 @@ def add_request_options(parser: argparse.ArgumentParser) -> None:
         common: dict[str, Any] = {"dest": option.name, "default": argparse.SUPPRESS, "help": option.help}
         if option.leaf.is_list:
             group.add_argument(
-                option.flag, action="append", metavar=f"PLACE={option.leaf.entry.upper()}", **common
+                option.flag, action="append", metavar=f"PLACE={option.leaf.entry[1].upper()}", **common
             )
         elif option.leaf.default is False:
             group.add_argument(option.flag, action="store_true", **common)
@@ -185,19 +186,21 @@ def _value(text: str) -> object:
 
 
 def _entry(option: Option, text: str) -> dict[str, object]:
-    """An entry of a list: a place, and the number that is wanted there."""
+    """An entry of a list: a place, and what is wanted there."""
+    name, wanted = option.leaf.entry
+    what = wanted.upper()
     place, sign, number = text.rpartition("=")
     parts = place.split(",")
     if not sign or len(parts) not in (1, 3):
-        word = option.leaf.entry.upper()
-        example = f"VERTEX={word} or X,Y,Z={word}, such as {option.flag} 12=2.0944"
-        raise FormError.at(pointer(option.path), f"{option.flag} {text}: give {example}")
-    where = {"vertex": _value(place)} if len(parts) == 1 else {"point": [_value(part) for part in parts]}
-    return {**where, option.leaf.entry: _value(number)}
+        raise FormError.at(
+            pointer(option.path), f"{option.flag} {text}: give {name.upper()}={what} or X,Y,Z={what}"
+        )
+    where = {name: _value(place)} if len(parts) == 1 else {"point": [_value(part) for part in parts]}
+    return {**where, wanted: _value(number)}
 
 
 def _put(body: dict[str, Any], path: Path, value: object) -> None:
-    """Set a field, without changing the sections of the body that was given; what is no section stays, to be
+    """Set a field without changing the sections of the given body; a section of the wrong type stays, to be
     refused."""
     for step in path[:-1]:
         section = body.get(step)

@@ -28,6 +28,7 @@ def print_summary(console: Console, name: str, result: dict[str, Any]) -> None:
     table.add_column(style="dim", no_wrap=True)
     table.add_column()
     for heading, rows in (
+        ("model", [("in", result["unit"])] if result.get("unit") else []),
         ("domain", _domain(result["map"])),
         ("pattern", _pattern(result["pattern"])),
         ("panels", _panels(result)),

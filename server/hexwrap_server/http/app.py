@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import logging
 import signal
 import socket
@@ -20,30 +21,25 @@ from starlette.routing import BaseRoute, Match, Mount
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from hexwrap_server import __version__
+from hexwrap_server.errors import HttpError, PortTakenError, StorageError
 from hexwrap_server.http.answers import problem_response
 from hexwrap_server.http.compressed import Compressed
 from hexwrap_server.http.docs import add_docs
 from hexwrap_server.http.head import Head
 from hexwrap_server.http.hops.routes import hops_router
 from hexwrap_server.http.observe import METHODS, Observer
-from hexwrap_server.http.routes import JobFailedError, router
+from hexwrap_server.http.routes import router
 from hexwrap_server.http.security import Doorkeeper
 from hexwrap_server.http.service import Service
 from hexwrap_server.http.viewer import add_viewer
-from hexwrap_server.jobs import garbage
 from hexwrap_server.jobs.engine import Engine
 from hexwrap_server.logs import set_up_logging
-from hexwrap_server.problems import HttpError
 from hexwrap_server.settings import Settings
 from hexwrap_solver.errors import HexwrapError
 
 #: Seconds that open connections get when the server stops.
 GRACE = 2
 log = logging.getLogger("hexwrap.server")
-
-
-class PortTakenError(Exception):
-    """Somebody else listens there."""
 
 
 def create_app(settings: Settings | None = None, engine: Engine | None = None) -> FastAPI:
@@ -83,6 +79,7 @@ def create_app(settings: Settings | None = None, engine: Engine | None = None) -
     add_viewer(app)
     add_docs(app)
     app.add_exception_handler(HexwrapError, _on_error)
+    app.add_exception_handler(OSError, _on_os_error)
     app.add_exception_handler(HTTPException, _on_http_exception)
     app.add_exception_handler(RequestValidationError, _on_parameters)
     app.add_middleware(Compressed)
@@ -111,7 +108,7 @@ def serve(settings: Settings) -> None:
             timeout_graceful_shutdown=GRACE,
             h11_max_incomplete_event_size=64 * 1024,
         )
-        garbage.look_no_more()
+        gc.freeze()  # half a million objects of modules need not be searched for garbage
         _run(_Server(config, app.state.service), app, listener)
     except KeyboardInterrupt:
         return
@@ -152,7 +149,7 @@ class _Server(uvicorn.Server):
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         super().handle_exit(sig, frame)
-        self._service.manager.close_waits()
+        self._service.begin_to_stop()
 
 
 def open_listener(settings: Settings) -> socket.socket:
@@ -178,7 +175,13 @@ def open_listener(settings: Settings) -> socket.socket:
 
 async def _on_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, HexwrapError)
-    return problem_response(error.document if isinstance(error, JobFailedError) else error)
+    return problem_response(error)
+
+
+async def _on_os_error(request: Request, error: Exception) -> Response:
+    """Such as too many open files."""
+    log.error("a file cannot be used", exc_info=error)
+    return problem_response(StorageError.of(error))
 
 
 async def _on_http_exception(request: Request, error: Exception) -> Response:
@@ -186,7 +189,7 @@ async def _on_http_exception(request: Request, error: Exception) -> Response:
     title, detail = {
         404: (
             "No such address",
-            f"There is nothing at {request.url.path[:200]}; the routes are listed at /docs.",
+            f"Nothing is at {request.url.path[:200]}; the routes are listed at /docs.",
         ),
         405: ("Method not allowed", f"{request.method} is not possible at {request.url.path[:200]}."),
     }.get(error.status_code, (str(error.detail), str(error.detail)))
@@ -206,7 +209,7 @@ def _allowed(request: Request) -> list[str]:
 
 def _takes(route: BaseRoute, asked: Scope) -> bool:
     if isinstance(route, Mount) and asked["method"] != "GET":
-        return False  # a folder of files matches whatever the method
+        return False  # a folder of files matches any method
     return route.matches(asked)[0] is Match.FULL
 
 

@@ -9,8 +9,12 @@ from isal import isal_zlib
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from hexwrap_server.http.answers import GZIP_LEVEL, GZIP_WINDOW, WORTH_PACKING, takes_gzip
-
+#: Smaller answers are not worth packing.
+WORTH_PACKING = 1024
+#: Higher ones take longer and hardly make numbers smaller.
+GZIP_LEVEL = 1
+#: zlib's way to say: a gzip header, and the largest window.
+GZIP_WINDOW = 31
 #: A packed stream of events would hold back each of them until there are many.
 NEVER_PACKED = "text/event-stream"
 #: Longer pieces are packed in a thread.
@@ -84,3 +88,24 @@ def _can_be_packed(start: Message) -> bool:
     headers = Headers(raw=start.get("headers", []))
     is_stream = headers.get("content-type", "").startswith(NEVER_PACKED)
     return start["status"] != 206 and "content-encoding" not in headers and not is_stream
+
+
+def takes_gzip(headers: Headers) -> bool:
+    """Whether Accept-Encoding gives gzip a quality above 0; gzip by name goes before ``*``."""
+    qualities: dict[str, float] = {}
+    for entry in ",".join(headers.getlist("accept-encoding")).split(","):
+        name, *parameters = (word.strip().lower() for word in entry.split(";"))
+        qualities[name] = _quality(parameters)
+    return qualities.get("gzip", qualities.get("*", 0.0)) > 0
+
+
+def _quality(parameters: list[str]) -> float:
+    """1 where there is none; what is not a number counts as 0."""
+    for parameter in parameters:
+        name, _, value = parameter.partition("=")
+        if name.strip() == "q":
+            try:
+                return float(value)
+            except ValueError:
+                return 0.0
+    return 1.0

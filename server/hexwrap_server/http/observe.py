@@ -9,12 +9,12 @@ from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from hexwrap_server import __version__
+from hexwrap_server.errors import InternalError
 from hexwrap_server.http import head
 from hexwrap_server.http.answers import problem_response
 from hexwrap_server.http.metrics import Metrics
-from hexwrap_server.jobs.worker import InternalError
 
-#: Methods that are told apart; a client may make up others without end, and each would be counted for ever.
+#: Methods that are counted separately; a client may invent others, and each would be counted for ever.
 METHODS = frozenset({"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"})
 FAULT = "The server could not answer because of a fault in hexwrap, not in the request; please report it."
 log = logging.getLogger("hexwrap.http")

@@ -90,8 +90,9 @@ _QUALITY = _all(
     distinct_panels=_COUNT,
     notes=listed(_TEXT),
 )
-#: Whatever ``?include=`` picks of it, and without that all of it.
+#: The parts that ``?include=`` picks, by default all.
 RESULT = record(
+    unit=nullable({"enum": ["m", "cm", "mm", "ft", "in"]}),
     mesh=_MESH,
     map=_MAP,
     pattern=nullable(_PATTERN),

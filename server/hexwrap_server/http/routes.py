@@ -4,33 +4,25 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator
-from typing import Annotated, Any
+from typing import Annotated, Literal
 
 from fastapi import APIRouter, Path, Query, Request
+from isal import igzip
 from starlette.responses import Response, StreamingResponse
 
+from hexwrap_server.errors import GoneError, HttpError, JobFailedError, not_found
 from hexwrap_server.http import head, openapi
-from hexwrap_server.http.answers import (
-    JSON,
-    json_response,
-    packed_response,
-    problem_response,
-    takes_gzip,
-)
-from hexwrap_server.http.bodies import plain_body, read_body, sent_body
+from hexwrap_server.http.answers import JSON, json_response, problem_response
+from hexwrap_server.http.bodies import sent_body
+from hexwrap_server.http.compressed import takes_gzip
 from hexwrap_server.http.metrics import MEDIA_TYPE as METRICS_TYPE
 from hexwrap_server.http.service import Service
 from hexwrap_server.input.requests import Intake, ParsedRequest
-from hexwrap_server.jobs.intake import keep, read_and_keep
-from hexwrap_server.jobs.manager import JobManager, unpacked
-from hexwrap_server.jobs.parts import PARTS, names
+from hexwrap_server.jobs.manager import JobManager
 from hexwrap_server.jobs.store import Job
-from hexwrap_server.problems import HttpError, dumped, not_found
-from hexwrap_server.settings import MIB
+from hexwrap_server.output.wire import CORNERS, PARTS
+from hexwrap_server.problems import dumped
 
-#: Bodies of up to so many bytes and quotation marks are read in a thread, others in a process: reading holds
-#: the interpreter, and a name that is out of place takes as long as many numbers.
-SMALL_BODY, FEW_QUOTES = 4_000_000, 50_000
 #: Longest time that ``?wait=`` holds an answer.
 MAX_WAIT = 60.0
 #: Seconds between two signs of life on an event stream.
@@ -41,6 +33,9 @@ FILES = {
     "panels.3dm": "model/vnd.3dm",
     "panels.dxf": "image/vnd.dxf",
     "panels.csv": "text/csv; charset=utf-8",
+    "panels.ifc": "application/x-step",
+    "panels.glb": "model/gltf-binary",
+    "cutting-list.csv": "text/csv; charset=utf-8",
     "flat.dxf": "image/vnd.dxf",
     "domain.svg": "image/svg+xml",
     "domain.dxf": "image/vnd.dxf",
@@ -89,15 +84,20 @@ async def metrics(request: Request) -> Response:
 async def post_job(request: Request) -> Response:
     """Have a surface panelized."""
     manager = manager_of(request)
-    job = manager.submit(await _read(request))
+    job = await manager.submit(await _read(request))
     return json_response(manager.document(job), 202, {"Location": f"/v1/jobs/{job.id}"})
 
 
 @router.get("/v1/jobs", openapi_extra=openapi.JOBS)
-async def list_jobs(request: Request, limit: Annotated[int, Query(ge=1, le=1000)] = 100) -> Response:
-    """Jobs, newest first."""
-    manager = manager_of(request)
-    return json_response({"jobs": [manager.document(job) for job in manager.latest(limit)]})
+async def list_jobs(
+    request: Request,
+    limit: Annotated[int, Query(ge=1, le=1000)] = 100,
+    before: Annotated[str | None, Query(max_length=64, description="only jobs older than this one")] = None,
+) -> Response:
+    """Jobs, newest first; ``next`` is where the list goes on."""
+    jobs = await manager_of(request).latest(limit, before)
+    more = f"/v1/jobs?limit={limit}&before={jobs[-1]['id']}" if len(jobs) == limit else None
+    return await asyncio.to_thread(json_response, {"jobs": jobs, "next": more})
 
 
 @router.get("/v1/jobs/{id}", openapi_extra=openapi.JOB)
@@ -141,9 +141,17 @@ async def solve(
     request: Request, include: Annotated[str | None, Query(description=", ".join(PARTS))] = None
 ) -> Response:
     """The Result itself, when it is there."""
-    manager = manager_of(request)
     parts = _parts(include)
-    job = manager.submit(await _read(request))
+    parsed = await _read(request)
+    try:
+        return await _solved(request, parsed, parts)
+    except GoneError:  # the result was kept, and found damaged: then it is computed anew
+        return await _solved(request, parsed, parts)
+
+
+async def _solved(request: Request, parsed: ParsedRequest, parts: list[str] | None) -> Response:
+    manager = manager_of(request)
+    job = await manager.submit(parsed)
     job = await manager.wait(job.id, None)
     if not job.is_over:
         raise HttpError(
@@ -163,24 +171,16 @@ async def post_surface(
 ) -> Response:
     """Send a surface once, as JSON or as a file."""
     service = service_of(request)
-    settings, caching = service.settings, service.manager.caching
     kind = request.headers.get("content-type", "")
-    body = await read_body(request, settings.max_body_mib)
-    if name is not None or kind.lower().startswith("multipart/"):
-        arguments: tuple[Any, ...] = (
-            body,
-            kind,
-            name or "",
-            settings.max_vertices,
-            int(settings.max_body_mib * MIB),
-            caching,
-        )
-        intake: Intake = await service.reading("hexwrap_server.input.uploads:read_upload", *arguments)
-    else:
-        intake = await service.reading(
-            "hexwrap_server.jobs.work:read_surface", body, settings.max_vertices, caching
-        )
-    await asyncio.to_thread(service.store.keep_surface, intake.id, intake.surface)
+    keep = str(service.store.surfaces), service.manager.caching
+    reader = "hexwrap_server.jobs.reading:read_"
+    async with sent_body(request) as body:
+        if name is not None or kind.lower().startswith("multipart/"):
+            intake: Intake = await service.read(
+                f"{reader}upload", body, *keep, kind, name or "", is_file=True
+            )
+        else:
+            intake = await service.read(f"{reader}surface", body, *keep)
     return json_response({"id": intake.id} | intake.answer, 201)
 
 
@@ -209,69 +209,71 @@ async def get_file(
             description="flat.dxf: width and height of its sheets in model units, such as 2500x1250",
         ),
     ] = None,
+    group: Annotated[
+        Literal["size", "ring", "zone"],
+        Query(description="flat.dxf: what shares a sheet: all sizes, a ring, or a side of the building"),
+    ] = "size",
+    storey: Annotated[
+        float | None,
+        Query(gt=0, allow_inf_nan=False, description="panels.ifc: height of the storeys in model units"),
+    ] = None,
 ) -> Response:
     """The finished work as a file."""
     if name not in FILES:
-        raise not_found("file", f"There is no file '{name[:64]}'; there are {', '.join(FILES)}.")
+        raise not_found("file", f"Unknown file '{name[:64]}'; choose one of {', '.join(FILES)}.")
     service = service_of(request)
     size = None if sheet is None else _sheet(sheet)
     job = service.manager.get(id)
     _finished(job)
     if name == "result.json":
-        packed, work = await service.manager.result(job)
-        data = await asyncio.to_thread(unpacked, packed, work, None)
+        data = await asyncio.to_thread(igzip.decompress, await service.manager.result(job))
     else:
         path = str(service.store.solution_path(job.identity))
+        options = {"sheet": size, "group": group, "storey": storey}
         data = await service.errand(
-            "hexwrap_server.jobs.work:write_file", path, name, job.name, job.timings, size
+            "hexwrap_server.jobs.work:write_file", path, name, job.name, job.timings, options
         )
     headers = {"Content-Disposition": f'attachment; filename="{name}"'}
-    return await packed_response(request, data, FILES[name], headers)
+    return Response(data, 200, headers, FILES[name])
 
 
 async def _read(request: Request) -> ParsedRequest:
     """The request of a body; the same bytes again are not read again."""
     service = service_of(request)
-    settings = service.settings
-    sent = await sent_body(request, settings.max_body_mib)
-    known = service.known_body(sent.mark)
-    if known is not None:
-        return known
-    text = await plain_body(sent, settings.max_body_mib)
-    limits = (settings.max_vertices, settings.max_panels)
-    if len(text) <= SMALL_BODY and text.count(b'"') <= FEW_QUOTES:
-        parsed = await service.read(read_and_keep, service.store, text, *limits)
-    else:
-        parsed = await service.reading("hexwrap_server.input.json_text:read_request", text, *limits)
-        await asyncio.to_thread(keep, service.store, parsed)
-    return service.remember_body(sent.mark, parsed)
+    async with sent_body(request) as body:
+        known = service.known_body(body.mark)
+        if known is not None:
+            return known
+        parsed = await service.read(
+            "hexwrap_server.jobs.reading:read_request", body, str(service.store.surfaces)
+        )
+        return service.remember_body(body.mark, parsed)
 
 
 async def _carry(request: Request, id: str, what: str) -> Response:
     service = service_of(request)
-    settings = service.settings
     job = service.manager.get(id)
-    body = await read_body(request, settings.max_body_mib)
-    _finished(job)
-    path = str(service.store.solution_path(job.identity))
-    data = await service.errand(f"hexwrap_server.jobs.lift_points:{what}", path, body, settings.max_points)
-    return await packed_response(request, data)
+    async with sent_body(request) as body:
+        _finished(job)
+        path = str(service.store.solution_path(job.identity))
+        data = await service.read(f"hexwrap_server.jobs.lift_points:{what}", body, path)
+    return Response(data, media_type=JSON)
 
 
 async def _result(request: Request, job: Job, include: list[str] | None) -> Response:
     if job.status == "failed" and job.problem:
         return problem_response(job.problem)
     _finished(job)
-    packed, work = await manager_of(request).result(job)
     picked = "" if include is None else f"?include={','.join(include)}"
-    location = f"/v1/jobs/{job.id}/result{picked}"
-    headers = {"Content-Location": location, "Vary": "Accept-Encoding"} | _timing(job)
-    if include is None and takes_gzip(request.headers):
-        return Response(packed, headers=headers | {"Content-Encoding": "gzip"}, media_type=JSON)
-    text = await asyncio.to_thread(unpacked, packed, work, include)
-    if include is None:
-        return Response(text, headers=headers, media_type=JSON)
-    return await packed_response(request, text, headers=headers)
+    headers = {"Content-Location": f"/v1/jobs/{job.id}/result{picked}", "Vary": "Accept-Encoding"}
+    headers |= _timing(job)
+    service = service_of(request)
+    if include is not None:
+        return Response(await service.manager.parts(job, include, service.errand), 200, headers, JSON)
+    packed = await service.manager.result(job)
+    if takes_gzip(request.headers):
+        return Response(packed, 200, headers | {"Content-Encoding": "gzip"}, JSON)
+    return Response(await asyncio.to_thread(igzip.decompress, packed), 200, headers, JSON)
 
 
 def _finished(job: Job) -> None:
@@ -292,19 +294,12 @@ def _finished(job: Job) -> None:
         )
 
 
-class JobFailedError(HttpError):
-    """Carries a failed job's own problem."""
-
-    def __init__(self, document: dict[str, Any]) -> None:
-        super().__init__(document["status"], "", document["title"], document["detail"])
-        self.document = document
-
-
 def _parts(include: str | None) -> list[str] | None:
     if include is None:
         return None
-    known, unknown = names(include)
-    if unknown or not known:
+    wanted = [name.strip() for name in include.split(",") if name.strip()]
+    known = [name for name in (*PARTS, CORNERS) if name in wanted]
+    if not known or len(known) < len(set(wanted)):
         raise _bad_parameter("include", f"'include' names parts of the Result: {', '.join(PARTS)}.")
     return known
 

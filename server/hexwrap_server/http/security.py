@@ -13,8 +13,8 @@ from urllib.parse import urlsplit
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Receive, Scope, Send
 
+from hexwrap_server.errors import HttpError
 from hexwrap_server.http.answers import problem_response
-from hexwrap_server.problems import HttpError
 from hexwrap_server.settings import Settings
 
 LOOPBACK_NAMES = frozenset({"127.0.0.1", "localhost", "[::1]"})

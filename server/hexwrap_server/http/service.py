@@ -5,27 +5,29 @@ from __future__ import annotations
 import asyncio
 import time
 from collections import OrderedDict
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import platformdirs
 
 from hexwrap_server import __version__
+from hexwrap_server.errors import HttpError, MemoryLimitError, TimeLimitError
 from hexwrap_server.http.metrics import Metrics
+from hexwrap_server.input.bodies import Body
 from hexwrap_server.input.requests import ParsedRequest
 from hexwrap_server.jobs.disk import make_private
 from hexwrap_server.jobs.engine import Engine, ProcessEngine, nobody
 from hexwrap_server.jobs.manager import JobManager
 from hexwrap_server.jobs.store import Store
-from hexwrap_server.settings import Settings
+from hexwrap_server.settings import MIB, Settings
 
-T = TypeVar("T")
-
+#: What processes for reading and errands load at their start.
+ERRANDS_PRELOAD = "hexwrap_server.jobs.reading"
 #: Longest errand (reading a body, writing a file), seconds.
 ERRAND_SECONDS = 120.0
+#: Bodies of up to so many MiB, unpacked, do not wait for larger ones and for files.
+SMALL_BODY = 4.0
 #: Bodies whose contents are remembered by their hash.
 KNOWN_BODIES = 256
 
@@ -39,21 +41,29 @@ class Service:
         self.store = open_store(settings)
         self.metrics = Metrics()
         self.engine = engine or make_engine(settings)
-        self.errands = ProcessEngine(2)
-        self._one_reading = asyncio.Semaphore(1)
+        self.errands = ProcessEngine(2, ERRANDS_PRELOAD, warm=1)
+        self.readers = ProcessEngine(settings.readers, ERRANDS_PRELOAD, warm=0)
+        #: Bytes of request bodies in memory.
+        self.body_bytes = 0
         self.manager = JobManager(self.store, self.engine, settings, self.metrics)
-        self._reader = ThreadPoolExecutor(1, thread_name_prefix="hexwrap-reader")
         self._known_bodies: OrderedDict[str, ParsedRequest] = OrderedDict()
         self._since = time.time()
 
     async def start(self) -> None:
+        self.loop = asyncio.get_running_loop()
         await self.engine.start()
         await self.errands.start()
+        await self.readers.start()
         await self.manager.start()
 
+    def begin_to_stop(self) -> None:
+        """Answer whoever waits; nothing new is begun."""
+        self.manager.close_waits()
+        self.errands.give_up()
+        self.readers.give_up()
+
     async def stop(self) -> None:
-        await asyncio.gather(self.manager.stop(), self.errands.stop())
-        self._reader.shutdown()
+        await asyncio.gather(self.manager.stop(), self.errands.stop(), self.readers.stop())
         self.store.close()
 
     @property
@@ -76,14 +86,35 @@ class Service:
             function, *arguments, report=nobody, seconds=ERRAND_SECONDS, mib=self.settings.job_mib
         )
 
-    async def reading(self, function: str, *arguments: Any) -> Any:
-        """An errand that reads what may be large: one at a time, so that the short ones need not wait."""
-        async with self._one_reading:
-            return await self.errand(function, *arguments)
+    async def read(self, function: str, body: Body, *arguments: Any, is_file: bool = False) -> Any:
+        """Have a body read in a process, as ``function(report, body, settings, *arguments)``.
 
-    async def read(self, function: Callable[..., T], *arguments: Any) -> T:
-        """Read a body in the one thread for it: several would keep the event loop from its turn."""
-        return await asyncio.get_running_loop().run_in_executor(self._reader, function, *arguments)
+        Raises what the function raises, TimeLimitError and MemoryLimitError.
+        """
+        settings = self.settings
+        if not is_file and len(body.data) <= SMALL_BODY * MIB:
+            small = replace(settings, max_body_mib=min(SMALL_BODY, settings.max_body_mib))
+            try:
+                return await self._read(self.errands, function, body, small, *arguments)
+            except HttpError as error:
+                if error.status != 413 or small == settings:
+                    raise
+        return await self._read(self.readers, function, body, settings, *arguments)
+
+    async def _read(self, engine: ProcessEngine, function: str, *arguments: Any) -> Any:
+        seconds, mib = self.settings.read_seconds, self.settings.read_mib
+        try:
+            return await engine.run(function, *arguments, report=nobody, seconds=seconds, mib=mib)
+        except TimeLimitError:
+            raise TimeLimitError(
+                f"Reading was stopped after {seconds:g} s, the limit of this server; send a smaller or "
+                "simpler body, or start the server with a larger --read-seconds."
+            ) from None
+        except MemoryLimitError:
+            raise MemoryLimitError(
+                f"Reading was stopped at {mib:g} MiB of memory, the limit of this server; send a smaller or "
+                "simpler body, or start the server with a larger --read-mib."
+            ) from None
 
     def known_body(self, mark: str) -> ParsedRequest | None:
         """What was read from the same bytes before, if its surface is still kept."""
@@ -94,12 +125,11 @@ class Service:
         return known
 
     def remember_body(self, mark: str, parsed: ParsedRequest) -> ParsedRequest:
-        """The surface itself is on disk; only what points to it is remembered."""
-        light = replace(parsed, surface=None)
-        self._known_bodies[mark] = light
+        """The surface itself is on disk."""
+        self._known_bodies[mark] = parsed
         while len(self._known_bodies) > KNOWN_BODIES:
             self._known_bodies.popitem(last=False)
-        return light
+        return parsed
 
 
 def make_engine(settings: Settings) -> Engine:

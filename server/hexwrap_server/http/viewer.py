@@ -14,16 +14,12 @@ from starlette.responses import FileResponse, Response
 from starlette.staticfiles import StaticFiles
 
 from hexwrap_server import samples
+from hexwrap_server.errors import not_found
 from hexwrap_server.http import openapi
-from hexwrap_server.http.answers import json_response, packed_response
-from hexwrap_server.http.bodies import read_body
+from hexwrap_server.http.answers import JSON, json_response
+from hexwrap_server.http.bodies import sent_body
 from hexwrap_server.http.routes import JobId, service_of
 from hexwrap_server.input.form import Body, document, schema
-from hexwrap_server.input.uploads import sent_file
-from hexwrap_server.jobs.work import take_in
-from hexwrap_server.jobs.worker import Report
-from hexwrap_server.problems import body_is_the_surface, not_found
-from hexwrap_server.settings import MIB
 
 STATIC = Path(__file__).parents[1] / "static"
 #: The page loads nothing from elsewhere, and says so to the browser.
@@ -61,13 +57,13 @@ async def list_samples() -> Response:
 
 
 @router.get("/v1/samples/{name}", openapi_extra=openapi.SAMPLE)
-async def sample(request: Request, name: str) -> Response:
+async def sample(name: str) -> Response:
     """A bundled surface as a complete request body."""
     if name not in samples.names():
         raise not_found(
-            "sample", f"There is no sample '{name[:64]}'; there are {', '.join(samples.names())}."
+            "sample", f"Unknown sample '{name[:64]}'; choose one of {', '.join(samples.names())}."
         )
-    return await packed_response(request, orjson.dumps(samples.load(name)))
+    return Response(orjson.dumps(samples.load(name)), media_type=JSON)
 
 
 @router.get("/v1/jobs/{id}/request", openapi_extra=openapi.REQUEST)
@@ -89,23 +85,9 @@ async def preview(
     name: Annotated[str | None, Query(max_length=200, description="name of a raw file")] = None,
 ) -> Response:
     """A file's mesh as it stands, unchecked: to have something to point at when it is refused."""
-    service = service_of(request)
-    body = await read_body(request, service.settings.max_body_mib)
     kind = request.headers.get("content-type", "")
-    limits = (service.settings.max_vertices, int(service.settings.max_body_mib * MIB))
-    data = await service.reading("hexwrap_server.http.viewer:read_preview", body, kind, name or "", *limits)
-    return await packed_response(request, data)
-
-
-@body_is_the_surface(is_file=True)
-def read_preview(
-    report: Report, body: bytes, content_type: str, name: str, max_vertices: int, max_bytes: int
-) -> bytes:
-    """Vertices and faces of a file as JSON; runs in a worker. Raises UploadError, SurfaceError."""
-    read = sent_file(body, content_type, name, max_vertices, max_bytes).sent
-    if read.mesh is None:
-        meshed = take_in(read)
-        vertices, faces = meshed.vertices, meshed.faces.tolist()
-    else:
-        vertices, faces = read.mesh.vertices, read.mesh.faces.to_lists()
-    return orjson.dumps({"vertices": vertices, "faces": faces}, option=orjson.OPT_SERIALIZE_NUMPY)
+    async with sent_body(request) as body:
+        data = await service_of(request).read(
+            "hexwrap_server.jobs.reading:preview", body, kind, name or "", is_file=True
+        )
+    return Response(data, media_type=JSON)

@@ -23,11 +23,7 @@ class Fault(ValueError):
 
 
 def table(rows: object, pointer: str, width: int, most: int) -> Floats:
-    """(n, width) finite numbers, from lists or from an array that was read as one. Raises Fault."""
-    if isinstance(rows, np.ndarray):
-        if rows.shape[1] == width and len(rows) <= most:
-            return rows
-        rows = rows.tolist()
+    """(n, width) finite numbers. Raises Fault."""
     listed = _rows(rows, pointer, (width,), most)
     return _finite(listed, pointer, width).reshape(-1, width)
 
@@ -51,10 +47,8 @@ def numbers(row: object, pointer: str, most: int) -> Floats:
 
 
 def faces(rows: object, pointer: str, n_vertices: int, most: int) -> Ragged:
-    """Rows of three or four indices in 0 … n_vertices − 1, from lists or read as one. Raises Fault."""
-    read = rows if isinstance(rows, Ragged) else _corners(rows, pointer, n_vertices, most)
-    if read.n_rows > most:
-        raise _too_many(read.n_rows, pointer, most)
+    """Rows of three or four indices in 0 … n_vertices − 1. Raises Fault."""
+    read = _corners(rows, pointer, n_vertices, most)
     wrong = np.flatnonzero((read.values < 0) | (read.values >= n_vertices))
     if len(wrong):
         raise _no_vertex(read.offsets, int(wrong[0]), int(read.values[wrong[0]]), pointer, n_vertices)

@@ -20,11 +20,11 @@ from hexwrap_server.input.readers.errors import NoObjectError, SeveralObjectsErr
 from hexwrap_server.input.readers.found import FileContent, Found, Geometry
 from hexwrap_solver.surface import SentMesh
 
-#: Of several parts that could be meant, one whose area is so many times that of the next is meant.
+#: Of several parts that could be meant, one whose area is this many times that of the next is meant.
 DOMINANT = 10.0
-#: Edges that nearly meet are told up to so many times the tolerance.
+#: Edges that nearly meet are reported up to this many times the tolerance.
 NEARLY = 100.0
-#: At most so many such places are told.
+#: At most this many such places are reported.
 SHOWN = 5
 #: Of more objects than these, only the largest are looked at.
 MOST = 300
@@ -131,7 +131,7 @@ def _nearly(part: Part, others: Sequence[Part], meant: Sequence[Found], toleranc
     for other in others:
         if not len(other.rim):
             continue
-        distance, _ = tree.query(other.rim)
+        distance = np.asarray(tree.query(other.rim)[0])
         k = int(np.argmin(distance))
         if tolerance < distance[k] < NEARLY * tolerance:
             told.append(

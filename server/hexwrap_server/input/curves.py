@@ -15,12 +15,14 @@ from pathlib import Path
 import numpy as np
 import rhino3dm
 
-from hexwrap_server.input.readers.drawing import Curve, Drawing, DrawingError
+from hexwrap_server.errors import DrawingError
+from hexwrap_server.input.readers.drawing import Curve, Drawing
 from hexwrap_server.input.readers.drawing_3dm import read_3dm_drawing
 from hexwrap_server.input.readers.drawing_csv import read_csv
 from hexwrap_server.input.readers.drawing_dxf import read_dxf
 from hexwrap_server.input.readers.drawing_json import read_json
 from hexwrap_server.output.drawing import encode
+from hexwrap_server.output.units import unit_of
 from hexwrap_solver.arrays import Floats
 
 
@@ -46,9 +48,9 @@ def read_drawing(path: Path) -> Drawing:
     return drawing
 
 
-def write_curves(kind: str, curves: list[Curve]) -> bytes:
-    """kind: the ending of the file. Raises KeyError for an ending that is not in WRITERS."""
-    return WRITERS[kind](curves)
+def write_curves(kind: str, curves: list[Curve], unit: str | None = None) -> bytes:
+    """kind: the ending of the file; unit: of the lengths. Raises KeyError for an ending not in WRITERS."""
+    return WRITERS[kind](curves, unit)
 
 
 def refined(curve: Curve, step: float) -> Curve:
@@ -64,11 +66,12 @@ def refined(curve: Curve, step: float) -> Curve:
     return Curve(fine if curve.closed else np.vstack([fine, points[-1:]]), curve.closed)
 
 
-def _write_csv(curves: list[Curve]) -> bytes:
+def _write_csv(curves: list[Curve], unit: str | None) -> bytes:
     """A heading, rows of numbers, an empty row between curves; closed ones return to their first point."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\r\n")
-    writer.writerow("xyz"[: curves[0].points.shape[1]])
+    behind = f" [{unit}]" if unit else ""
+    writer.writerow([f"{letter}{behind}" for letter in "xyz"[: curves[0].points.shape[1]]])
     for number, curve in enumerate(curves):
         if number:
             text.write("\r\n")
@@ -76,16 +79,16 @@ def _write_csv(curves: list[Curve]) -> bytes:
     return text.getvalue().encode()
 
 
-def _write_json(curves: list[Curve]) -> bytes:
+def _write_json(curves: list[Curve], unit: str | None) -> bytes:
     listed = [{"points": curve.points.tolist(), "closed": curve.closed} for curve in curves]
-    return json.dumps({"curves": listed}).encode()
+    return json.dumps({"curves": listed} | ({"unit": unit} if unit else {})).encode()
 
 
-def _write_dxf(curves: list[Curve]) -> bytes:
+def _write_dxf(curves: list[Curve], unit: str | None) -> bytes:
     from ezdxf.filemanagement import new
 
     document = new("R2010")
-    document.header["$INSUNITS"] = 0
+    document.header["$INSUNITS"] = unit_of(unit).dxf
     space = document.modelspace()
     for curve in curves:
         if len(curve.points) == 1:
@@ -95,9 +98,9 @@ def _write_dxf(curves: list[Curve]) -> bytes:
     return encode(document)
 
 
-def _write_3dm(curves: list[Curve]) -> bytes:
+def _write_3dm(curves: list[Curve], unit: str | None) -> bytes:
     model = rhino3dm.File3dm()
-    model.Settings.ModelUnitSystem = getattr(rhino3dm.UnitSystem, "None")
+    model.Settings.ModelUnitSystem = getattr(rhino3dm.UnitSystem, unit_of(unit).rhino)
     for curve in curves:
         points = [rhino3dm.Point3d(*p, *[0.0] * (3 - len(p))) for p in _drawn(curve).tolist()]
         if len(points) == 1:
@@ -114,6 +117,6 @@ def _drawn(curve: Curve) -> Floats:
 READERS: dict[str, Callable[[bytes], Drawing]] = {
     ".csv": read_csv, ".txt": read_csv, ".json": read_json, ".dxf": read_dxf, ".3dm": read_3dm_drawing,
 }  # fmt: skip
-WRITERS: dict[str, Callable[[list[Curve]], bytes]] = {
+WRITERS: dict[str, Callable[[list[Curve], str | None], bytes]] = {
     ".csv": _write_csv, ".txt": _write_csv, ".json": _write_json, ".dxf": _write_dxf, ".3dm": _write_3dm,
 }  # fmt: skip

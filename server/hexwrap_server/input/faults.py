@@ -11,7 +11,7 @@ from typing import Any, get_args
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from hexwrap_server.problems import MOST_LISTED
+from hexwrap_server.errors import MOST_LISTED
 
 #: Steps from the body to a field of it.
 Path = tuple[str, ...]

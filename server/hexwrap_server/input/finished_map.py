@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from hexwrap_server.cli.local import UsageError
+from hexwrap_server.errors import UsageError
 from hexwrap_solver.arrays import Floats, Ints
 from hexwrap_solver.conformal.net import Net
 from hexwrap_solver.conformal.types import ConformalMap, Deck, Unrolled
@@ -22,7 +22,7 @@ Getter = Callable[[str], Any]
 
 
 def map_in_result(path: Path) -> ConformalMap | None:
-    """The map, or None where the file is no result. Raises UsageError for a result that is broken."""
+    """The map, or None where the file is not a result. Raises UsageError for a result that is broken."""
     get = _getter(path)
     if get is None:
         return None
@@ -58,16 +58,8 @@ def _in_dictionary(result: dict[str, Any]) -> Getter:
     return get
 
 
-def with_corners(mesh: dict[str, Any], found: dict[str, Any]) -> dict[str, Any]:
-    """The ``map`` of a Result with ``corners``: (m, 3, 2) where the corners of each face stand."""
-    if found.get("corners") is None:
-        corners = _map(_in_dictionary({"mesh": mesh, "map": found})).corners()
-        found = found | {"corners": np.stack([corners.real, corners.imag], axis=-1)}
-    return found
-
-
 def _known(get: Getter, name: str) -> Any:
-    """None where there is no such value."""
+    """None where the value is missing."""
     try:
         return get(name)
     except (KeyError, IndexError):

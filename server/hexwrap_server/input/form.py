@@ -17,11 +17,12 @@ from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 import pydantic
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, FiniteFloat, ValidationError
 
+from hexwrap_server.errors import FormError
 from hexwrap_server.input.faults import Path, faults, pointer
 from hexwrap_server.input.requests import Wanted
-from hexwrap_server.problems import FormError
 from hexwrap_solver.conformal.types import ANGLE_UNITS
 from hexwrap_solver.setting import Setting
+from hexwrap_solver.surface.checks import LARGEST, SMALLEST
 
 T = TypeVar("T")
 
@@ -60,10 +61,12 @@ class Leaf:
         return any(get_args(part)[-1:] == (...,) for part in _parts(self.annotation))
 
     @property
-    def entry(self) -> str:
-        """The field that the entries of such a list are about: the one without a default."""
+    def entry(self) -> tuple[str, str]:
+        """Of the entries of such a list: the field that numbers their place, and the one that says what is
+        wanted there, which has no default."""
         (section,) = (get_args(part)[0] for part in _parts(self.annotation))
-        return next(f.name for f in fields(section) if f.default is MISSING)
+        place = next(leaf.path[0] for leaf in leaves(section) if int in _parts(leaf.annotation))
+        return place, next(f.name for f in fields(section) if f.default is MISSING)
 
     @property
     def numbers(self) -> int:
@@ -199,10 +202,17 @@ def _accepted(annotation: Any, setting: Setting) -> Any:
     if part is int:
         return Annotated[int, bounds, BeforeValidator(_whole_number)]
     if part is float:
-        return Annotated[FiniteFloat, bounds]
+        return Annotated[FiniteFloat, bounds, AfterValidator(_moderate)]
     if part is str:
         return Annotated[str, pydantic.Field(max_length=setting.most)]
     return part
+
+
+def _moderate(value: float) -> float:
+    """Neither so large nor so small that its square or its inverse is no number."""
+    if value and not SMALLEST <= abs(value) <= LARGEST:
+        raise ValueError(f"must be 0, or between {SMALLEST:g} and {LARGEST:g} in size")
+    return value
 
 
 def _whole_number(value: object) -> object:

@@ -1,4 +1,4 @@
-"""JSON text → request, in a thread for small bodies and in a worker process for large ones."""
+"""JSON text → document, with the place of a number that JSON cannot hold."""
 
 from __future__ import annotations
 
@@ -6,45 +6,22 @@ import codecs
 import gc
 import json
 import sys
+from typing import Any
 
 import orjson
 
-from hexwrap_server.input import quick
+from hexwrap_server.errors import FormError, NotJsonError
 from hexwrap_server.input.faults import escaped
-from hexwrap_server.input.requests import ParsedRequest
-from hexwrap_server.input.schemas import Request, parse_request
-from hexwrap_server.jobs import codec
-from hexwrap_server.jobs.worker import Report
-from hexwrap_server.problems import FormError
 from hexwrap_solver.surface.errors import NonFiniteError
 
 
-def read_request(report: Report, text: bytes, max_vertices: int, max_panels: int) -> ParsedRequest:
-    """JSON → request. Raises FormError."""
-    return packed(parse_request(loads(text), max_vertices, max_panels))
-
-
-def packed(request: Request) -> ParsedRequest:
-    """The surface by its content."""
-    if isinstance(request.surface, str):
-        return ParsedRequest(request.name, request.surface, None, request.wanted)
-    return ParsedRequest(
-        request.name, codec.digest(request.surface), codec.encode(request.surface), request.wanted
-    )
-
-
 def loads(text: bytes) -> object:
-    """The document; large tables in it may be arrays already (``quick``).
+    """The document.
 
-    A byte order mark, which some editors put first, is passed over. Raises FormError where the text is no
+    A byte order mark, which some editors put first, is passed over. Raises FormError where the text is not
     JSON, or holds a number that no float is.
     """
     text = text.removeprefix(codecs.BOM_UTF8)
-    document = quick.read(text)
-    return _listed(text) if document is None else document
-
-
-def _listed(text: bytes) -> object:
     gc.disable()  # a body of a million numbers holds no cycles, but sets off many searches for them
     try:
         return orjson.loads(text)
@@ -68,21 +45,18 @@ def _not_finite(text: bytes) -> str | None:
         document = json.loads(text)
     except (ValueError, RecursionError):
         return None
-    todo: list[tuple[str, object]] = [("", document)]
+    at: list[object] = []  # the steps to the list or object that is looked at
+    todo: list[tuple[int, object, Any]] = [(0, None, document)]
     while todo:
-        place, value = todo.pop()
+        depth, step, value = todo.pop()
+        at[depth:] = [step]
         if isinstance(value, dict):
-            todo += [(f"{place}/{escaped(name)}", inner) for name, inner in value.items()][::-1]
+            todo += [(depth + 1, name, inner) for name, inner in value.items()][::-1]
         elif isinstance(value, list):
             for i, entry in enumerate(value):
                 if isinstance(entry, (int, float)) and not abs(entry) <= sys.float_info.max:
-                    return f"{place}/{i}"
-            todo += [(f"{place}/{i}", row) for i, row in enumerate(value) if isinstance(row, (list, dict))][
+                    return "".join(f"/{escaped(str(step))}" for step in [*at[1:], i])
+            todo += [(depth + 1, i, row) for i, row in enumerate(value) if isinstance(row, (list, dict))][
                 ::-1
             ]
     return None
-
-
-class NotJsonError(FormError):
-    slug = "not-json"
-    title = "The body is not JSON"

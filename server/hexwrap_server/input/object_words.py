@@ -8,7 +8,7 @@ from typing import Any
 from hexwrap_server.input.readers.found import FileContent, Found
 from hexwrap_solver.surface.pieces import Joint, Piece
 
-#: Sentences name at most so many objects, problems list at most so many.
+#: Sentences name at most this many objects, problems list at most this many.
 SHOWN, LISTED = 5, 200
 #: A gap below this part of the tolerance is rounding.
 NONE = 1e-6

@@ -144,7 +144,7 @@ def _allowed(tolerance: float | None, size: float) -> float:
 
 def brep_where_needed(geometry: Geometry, tolerance: float | None) -> tuple[Geometry, list[str]]:
     """The NURBS surface itself where it is closed in one direction and has no pole, else a Brep of one face
-    whose ends are one seam where they meet within the file's tolerance; and what is to be told."""
+    whose ends are one seam where they meet within the file's tolerance; and notes for the user."""
     if not isinstance(geometry, NurbsSurface):
         return geometry, []
     size = _size(geometry.control_points[..., :3])

@@ -40,11 +40,10 @@ class Wanted(SolveSettings):
 
 @dataclass(frozen=True)
 class ParsedRequest:
-    """A request that was read from JSON. surface: encoded, None where an id was given."""
+    """A request that was read; its surface is kept under that id."""
 
     name: str
     surface_id: str
-    surface: bytes | None
     wanted: Wanted
 
 
@@ -75,13 +74,11 @@ class Order:
 class Outcome:
     """A finished job. result: the Result, gzip; solution: for lift, flatten and files; None: put into files.
 
-    parts: where each part of the Result stands in the unpacked text. size: bytes of both.
-    found: per stage ``memory``, ``disk`` or ``computed``.
+    size: bytes of both. found: per stage ``memory``, ``disk`` or ``computed``.
     """
 
     result: bytes | None
     solution: bytes | None
-    parts: dict[str, tuple[int, int]]
     size: int
     timings: dict[str, float]
     found: dict[str, str]
@@ -89,8 +86,7 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Intake:
-    """A surface that was checked: what POST /v1/surfaces answers, and what is kept."""
+    """A surface that was checked and kept, and what POST /v1/surfaces answers besides its id."""
 
     id: str
-    surface: bytes
     answer: dict[str, Any] = field(default_factory=dict)

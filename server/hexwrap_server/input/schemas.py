@@ -11,21 +11,22 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from hexwrap_server.errors import FormError
 from hexwrap_server.input.arrays import Fault, faces, numbers, table
 from hexwrap_server.input.faults import escaped
 from hexwrap_server.input.form import Body, read, values
 from hexwrap_server.input.requests import SentSurface, Wanted
-from hexwrap_server.problems import FormError
 from hexwrap_solver.conformal.types import BoundaryCondition
 from hexwrap_solver.setting import Setting
+from hexwrap_solver.surface.nurbs_checks import HIGHEST_DEGREE
 from hexwrap_solver.surface.types import MeshSettings, NurbsSurface, SentMesh, SurfaceSettings
 
 
 @dataclass(frozen=True)
 class NurbsForm:
-    """The part of a NURBS surface that is no large array."""
+    """The part of a NURBS surface besides its large arrays."""
 
-    degree: Annotated[tuple[int, int], Setting("degrees in u and v", ge=1, le=25)]
+    degree: Annotated[tuple[int, int], Setting("degrees in u and v", ge=1, le=HIGHEST_DEGREE)]
     closed: Annotated[tuple[bool, bool], Setting("whether it closes up in u and in v")] = (False, False)
 
 

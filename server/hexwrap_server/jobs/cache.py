@@ -17,9 +17,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from hexwrap_server.jobs import later
-from hexwrap_server.jobs.codec import CodecError, decode, digest, pieces
-from hexwrap_server.jobs.disk import StorageError, write_whole
+from hexwrap_server.errors import CodecError, StorageError
+from hexwrap_server.jobs.codec import decode, digest, pieces
+from hexwrap_server.jobs.disk import write_whole
 from hexwrap_server.version import solver_version
 from hexwrap_solver.arrays import Progress
 
@@ -39,9 +39,6 @@ SHARES = {
     "support": 0.03,
 }
 
-#: Stages that took this many seconds are written at once, others when the answer is sent.
-PRECIOUS = 1.0
-
 
 class StageCache:
     """Finished stages by key: the recently used ones in memory, more of them in a folder."""
@@ -50,7 +47,6 @@ class StageCache:
         self.folder = folder
         self.memory_bytes = memory_bytes
         self._kept: OrderedDict[str, tuple[Any, int]] = OrderedDict()
-        self._used = 0
 
     def get(self, key: str) -> tuple[Any, str] | None:
         """The stage and where it was found (``memory`` or ``disk``), or None."""
@@ -63,36 +59,29 @@ class StageCache:
         self._keep(key, value)
         return value, "disk"
 
-    def put(self, key: str, value: Any, seconds: float = 0.0) -> None:
-        """seconds: what it cost."""
+    def put(self, key: str, value: Any) -> None:
         self._keep(key, value)
         if self.folder is None:
             return
-        if seconds >= PRECIOUS:
-            self._write(key, value)
-        else:
-            later.put_off(lambda: self._write(key, value))
-
-    def _write(self, key: str, value: Any) -> None:
         try:
             write_whole(self._path(key), pieces(value))
         except StorageError as error:  # a full disk costs speed, not the job
             log.warning("a stage could not be written to the cache: %s", error)
 
+    def weigh(self) -> None:
+        """Count what is kept anew: stages keep what later ones derived from them."""
+        for key, (value, _) in self._kept.items():
+            self._kept[key] = (value, size_of(value))
+        self._make_room()
+
     def _keep(self, key: str, value: Any) -> None:
-        self._weigh(key, value)
-        later.put_off(lambda: self._weigh_again(key))  # with what later stages will have derived from it
+        self._kept.pop(key, None)
+        self._kept[key] = (value, size_of(value))
+        self._make_room()
 
-    def _weigh_again(self, key: str) -> None:
-        if key in self._kept:
-            self._weigh(key, self._kept[key][0])
-
-    def _weigh(self, key: str, value: Any) -> None:
-        size = size_of(value)
-        self._used += size - self._kept.get(key, (None, 0))[1]
-        self._kept[key] = (value, size)
-        while self._used > self.memory_bytes and self._kept:
-            self._used -= self._kept.popitem(last=False)[1][1]
+    def _make_room(self) -> None:
+        while self._kept and sum(size for _, size in self._kept.values()) > self.memory_bytes:
+            self._kept.popitem(last=False)
 
     def _read(self, key: str) -> Any:
         if self.folder is None:
@@ -113,28 +102,17 @@ class StageCache:
         return self.folder / f"{key}.stage"
 
 
-def nothing(stage: str, value: Any) -> None:
-    """A listener that does not care."""
-
-
 class CachingRunner:
     """A StageRunner that looks every stage up first.
 
     timings: seconds per stage, hits included. found: per stage ``memory``, ``disk`` or ``computed``.
-    made: told of each stage that is done, and of what it made.
     """
 
-    def __init__(
-        self,
-        cache: StageCache,
-        report: Callable[[str, float, str], None],
-        made: Callable[[str, Any], None] = nothing,
-    ) -> None:
+    def __init__(self, cache: StageCache, report: Callable[[str, float, str], None]) -> None:
         self.timings: dict[str, float] = {}
         self.found: dict[str, str] = {}
         self.cache = cache
         self._report = report
-        self._made = made
         self._key = solver_version()
         self._done = 0.0
 
@@ -151,13 +129,12 @@ class CachingRunner:
         hit = self.cache.get(self._key)
         if hit is None:
             result = compute(progress)
-            self.cache.put(self._key, result, time.perf_counter() - start)
+            self.cache.put(self._key, result)
             self.found[stage] = "computed"
         else:
             result, self.found[stage] = hit
         self._done = done + share
         self.timings[stage] = time.perf_counter() - start
-        self._made(stage, result)
         return result
 
 

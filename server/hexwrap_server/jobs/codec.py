@@ -18,15 +18,13 @@ from typing import Any
 import numpy as np
 from isal import isal_zlib
 
+from hexwrap_server.errors import CodecError
+
 _MAGIC = b"HXWRAP01"
 _HEAD = struct.Struct("<8sQI")
 _ALIGNMENT = 16
 #: Where the dataclasses that may be stored are defined.
 _PACKAGES = ("hexwrap_solver.", "hexwrap_server.input.requests")
-
-
-class CodecError(ValueError):
-    """Bytes that were not written by ``encode``, or were damaged since."""
 
 
 def encode(value: Any) -> bytes:
@@ -171,5 +169,5 @@ def _class(place: str) -> Any:
     module, _, name = place.partition(":")
     kind = getattr(import_module(module), name) if module.startswith(_PACKAGES) else None
     if not (isinstance(kind, type) and is_dataclass(kind)):
-        raise ValueError(f"{place} is no dataclass of this version")
+        raise ValueError(f"{place} is not a dataclass of this version")
     return kind

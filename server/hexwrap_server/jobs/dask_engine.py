@@ -19,8 +19,9 @@ from typing import Any
 
 from distributed import Client, get_worker
 
+from hexwrap_server.errors import ClusterError, WorkerDiedError
 from hexwrap_server.jobs.engine import ENGINE_PRELOAD
-from hexwrap_server.jobs.worker import Report, WorkerDiedError, WorkerProcess, WorkError
+from hexwrap_server.jobs.worker import Report, WorkerProcess
 from hexwrap_solver.errors import HexwrapError
 
 #: Seconds between two looks at whether the machine of a job is still there.
@@ -33,11 +34,6 @@ LOOK_SECONDS = 10.0
 STOP_SECONDS = 1.0
 _TOPIC = "hexwrap-progress"
 log = logging.getLogger("hexwrap.dask")
-
-
-class ClusterError(WorkError):
-    slug = "cluster"
-    title = "The cluster could not run the job"
 
 
 class DaskEngine:

@@ -5,13 +5,12 @@ from __future__ import annotations
 import contextlib
 import logging
 import os
-import sqlite3
 import time
 import uuid
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-from hexwrap_server.jobs.worker import WorkError
+from hexwrap_server.errors import StorageError
 
 #: Seconds for which pruning leaves a file alone.
 YOUNG = 300.0
@@ -20,28 +19,6 @@ PAUSES = (0.01, 0.05, 0.2, 0.5)
 #: Suffix of files that are being written.
 PART = ".part"
 log = logging.getLogger("hexwrap.disk")
-
-
-class StorageError(WorkError):
-    slug = "storage"
-    title = "The server cannot use its files"
-
-    @staticmethod
-    def of(error: Exception) -> StorageError:
-        if getattr(error, "sqlite_errorcode", 0) & 0xFF == sqlite3.SQLITE_BUSY:
-            return BusyError(
-                "Another program is using the server's list of jobs (hexwrap.sqlite3 in its data folder); "
-                "close it, and send the request again."
-            )
-        reason = getattr(error, "strerror", None) or error
-        return StorageError(
-            f"The server could not read or write in its data folder ({reason}); make room there, or start it "
-            "with another --data, and send the request again."
-        )
-
-
-class BusyError(StorageError):
-    """Another program holds the database; a moment later it may be free."""
 
 
 def make_private(folder: Path) -> None:
@@ -62,6 +39,21 @@ def write_whole(path: Path, content: Iterable[bytes | memoryview]) -> None:
         raise StorageError.of(error) from error
 
 
+def surface_file(folder: Path, id: str) -> Path:
+    return folder / f"{id}.surface"
+
+
+def keep_file(path: Path, data: bytes) -> None:
+    """Write a file, unless it is there as it should be. Raises StorageError."""
+    try:
+        is_kept = path.read_bytes() == data
+        os.utime(path)  # touch() would make an empty one in the place of one that was just pruned
+    except OSError:
+        is_kept = False
+    if not is_kept:
+        write_whole(path, [data])
+
+
 def put_in_place(part: Path, path: Path) -> None:
     """Rename part to path. Windows refuses that for the moment that somebody reads what is there."""
     for pause in PAUSES:
@@ -74,11 +66,16 @@ def put_in_place(part: Path, path: Path) -> None:
 
 
 def read_whole(path: Path, is_whole: Callable[[bytes], bool]) -> bytes | None:
-    """What a file holds. A damaged one is deleted, so that its work is done again when asked for."""
+    """What a file holds, None where there is none. Raises StorageError where it cannot be read.
+
+    A damaged one is deleted, so that its work is done again when asked for.
+    """
     try:
         data = path.read_bytes()
-    except OSError:
+    except FileNotFoundError:
         return None
+    except OSError as error:
+        raise StorageError.of(error) from error
     if is_whole(data):
         return data
     log.warning("a damaged file was deleted: %s", path.name)

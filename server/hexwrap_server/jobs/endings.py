@@ -1,4 +1,4 @@
-"""The ends of jobs: written, then told.
+"""The ends of jobs: written, then announced.
 
 A full disk must not keep a job from ending. An end that cannot be written is kept here until it can; if the
 server dies before, the job is taken up again as if it had still been running.
@@ -9,7 +9,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterable
 
-from hexwrap_server.jobs.disk import StorageError
+from hexwrap_server.errors import StorageError
 from hexwrap_server.jobs.store import Job, Store
 
 log = logging.getLogger("hexwrap.ledger")

@@ -13,8 +13,11 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Protocol
 
-from hexwrap_server.jobs.worker import Report, WorkerProcess, WorkError
+from hexwrap_server.errors import ShuttingDownError, WorkerDiedError, WorkError
+from hexwrap_server.jobs.worker import Report, WorkerProcess
 
+#: Seconds between two looks for idle workers that died.
+TEND_INTERVAL = 1.0
 #: What a worker process imports before it says that it is ready.
 ENGINE_PRELOAD = "hexwrap_server.jobs.work"
 log = logging.getLogger("hexwrap.engine")
@@ -41,11 +44,11 @@ class Engine(Protocol):
     async def start(self) -> None: ...
 
     async def stop(self) -> None:
-        """Kill whatever runs; afterwards no process of the engine is left."""
+        """Kill all running processes of the engine."""
         ...
 
     async def wait_for_place(self, seconds: float, told: Callable[[str], None]) -> None:
-        """Until there is any place where a call could run. told: what it waits for, if it has to.
+        """Until there is any place where a call could run. told: called with what it waits for, if it has to.
 
         Raises WorkError after seconds.
         """
@@ -61,15 +64,21 @@ def nobody(stage: str, fraction: float, what: str) -> None:
 
 
 class ProcessEngine:
-    """A number of worker processes on this machine."""
+    """A number of worker processes on this machine.
+
+    warm: how many of them are started at once, the others when they are needed; None: all.
+    """
 
     shares_disk = True
 
-    def __init__(self, workers: int, preload: str = ENGINE_PRELOAD) -> None:
+    def __init__(self, workers: int, preload: str = ENGINE_PRELOAD, warm: int | None = None) -> None:
         self._workers = [WorkerProcess(preload) for _ in range(workers)]
-        self._idle: asyncio.LifoQueue[WorkerProcess] = asyncio.LifoQueue()  # the one that remembers most
+        self._cold = self._workers[workers if warm is None else warm :]
+        # the last one used remembers most; None tells whoever waits that the engine stops
+        self._idle: asyncio.LifoQueue[WorkerProcess | None] = asyncio.LifoQueue()
         self._threads = ThreadPoolExecutor(2 * workers, thread_name_prefix="hexwrap-engine")
         self._starting: set[asyncio.Task[None]] = set()
+        self._tending: asyncio.Task[None] | None = None
         self._stopping = False
 
     @property
@@ -86,13 +95,21 @@ class ProcessEngine:
         return [w.pid for w in self._workers if w.is_alive]
 
     async def start(self) -> None:
-        for worker in self._workers:
+        for worker in self._workers[: len(self._workers) - len(self._cold)]:
             self._begin(worker)
+        self._tending = asyncio.create_task(self._tend())
 
-    async def stop(self) -> None:
+    def give_up(self) -> None:
+        """Kill all calls and refuse new ones; whoever waits for one is told that the server stops."""
         self._stopping = True
         for worker in self._workers:
             worker.stop()
+        self._idle.put_nowait(None)
+
+    async def stop(self) -> None:
+        self.give_up()
+        if self._tending:
+            self._tending.cancel()
         await asyncio.gather(*self._starting, return_exceptions=True)
         await asyncio.to_thread(self._threads.shutdown, wait=True)
         for worker in self._workers:
@@ -108,8 +125,7 @@ class ProcessEngine:
             with contextlib.suppress(RuntimeError):  # the loop is gone, and with it whoever listened
                 loop.call_soon_threadsafe(report, stage, fraction, what)
 
-        while not (worker := await self._idle.get()).is_alive:  # it died while it had nothing to do
-            self._begin(worker)
+        worker = await self._free()
         call = loop.run_in_executor(self._threads, worker.run, function, arguments, relay, seconds, mib)
         try:
             return await asyncio.shield(call)
@@ -118,13 +134,37 @@ class ProcessEngine:
             with contextlib.suppress(Exception):
                 await call
             raise
+        except WorkerDiedError:
+            if self._stopping:
+                raise ShuttingDownError from None
+            raise
         finally:
             if not call.done():
                 await asyncio.wait([call])
             self._hand_back(worker)
 
-    def _hand_back(self, worker: WorkerProcess) -> None:
-        if worker.is_alive:
+    async def _free(self) -> WorkerProcess:
+        while True:
+            if self._idle.empty() and self._cold and not self._stopping:
+                self._begin(self._cold.pop())
+            worker = await self._idle.get()
+            if worker is None:
+                self._idle.put_nowait(None)  # for the next one who waits
+                raise ShuttingDownError
+            if worker.is_alive:
+                return worker
+            self._begin(worker)
+
+    async def _tend(self) -> None:
+        """Replace idle workers that were killed from outside; until then they are zombies."""
+        while not self._stopping:
+            await asyncio.sleep(TEND_INTERVAL)
+            idle = [self._idle.get_nowait() for _ in range(self._idle.qsize())]
+            for worker in reversed(idle):
+                self._hand_back(worker)
+
+    def _hand_back(self, worker: WorkerProcess | None) -> None:
+        if worker is None or worker.is_alive:
             self._idle.put_nowait(worker)
         elif not self._stopping:
             self._begin(worker)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexwrap_server.cli.local import UsageError
+from hexwrap_server.errors import DrawingError, UsageError
 from hexwrap_server.input.curves import refined
 from hexwrap_server.input.readers.drawing import Curve
 from hexwrap_server.output.unrolled import plane
@@ -17,6 +17,8 @@ from hexwrap_solver.domain import flatten, lift
 
 #: Drawn lines are followed in steps of this part of the circumference.
 STEPS_AROUND = 400
+#: More points are not carried at once.
+MOST_POINTS = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -32,11 +34,12 @@ class Carried:
 def lift_curves(cmap: ConformalMap, curves: list[Curve], step: float | None) -> Carried:
     """Curves (k, 2) of the unrolled domain onto the surface; what lies outside is cut away.
 
+    Raises DrawingError.
+
     step: how closely lines are followed, in units of the domain; None: a 400th of the circumference.
     """
-    fine = [
-        refined(Curve(c.points[:, :2], c.closed), step or _once_around(cmap) / STEPS_AROUND) for c in curves
-    ]
+    flat = [Curve(c.points[:, :2], c.closed) for c in curves]
+    fine = _followed(flat, step or _once_around(cmap) / STEPS_AROUND)
     at = np.vstack([curve.points for curve in fine])
     there = lift(cmap, at[:, 0] + 1j * at[:, 1])
     carried: list[Curve] = []
@@ -48,11 +51,24 @@ def lift_curves(cmap: ConformalMap, curves: list[Curve], step: float | None) -> 
     return Carried(carried, outside=int(np.sum(~there.inside)))
 
 
+def _followed(curves: list[Curve], step: float) -> list[Curve]:
+    """The curves in steps. Raises DrawingError where that would be too many."""
+    with np.errstate(over="ignore"):
+        drawn = [np.vstack([c.points, c.points[:1]]) if c.closed else c.points for c in curves]
+        length = float(sum(np.linalg.norm(np.diff(points, axis=0), axis=1).sum() for points in drawn))
+    if not length / step <= MOST_POINTS:
+        raise DrawingError(
+            f"The lines of the drawing are {length:.3g} long; in steps of {step:.3g} that is more than "
+            f"{MOST_POINTS:,} points: draw within the domain, or choose a longer step."
+        )
+    return [refined(curve, step) for curve in curves]
+
+
 def flatten_curves(cmap: ConformalMap, curves: list[Curve], step: float | None) -> Carried:
     """Curves (k, 3) near the surface into the unrolled domain, each in one piece over several sheets."""
     if any(curve.points.shape[1] != 3 for curve in curves):
         raise UsageError("--flatten needs points in space: three numbers each.")
-    fine = [refined(curve, step) if step else curve for curve in curves]
+    fine = _followed(curves, step) if step else curves
     found = flatten(cmap, np.vstack([curve.points for curve in fine]))
     carried = []
     start = 0

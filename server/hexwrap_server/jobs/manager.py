@@ -1,4 +1,4 @@
-"""The queue: jobs come in, works are run, everybody who waits is told."""
+"""The queue: jobs come in, works are run, everybody who waits is notified."""
 
 from __future__ import annotations
 
@@ -8,25 +8,29 @@ import logging
 import time
 import uuid
 from collections import OrderedDict
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-import orjson
-from isal import isal_zlib
-
-from hexwrap_server.http.answers import GZIP_WINDOW
+from hexwrap_server.errors import (
+    AttemptsError,
+    BusyError,
+    FormError,
+    GoneError,
+    HttpError,
+    InternalError,
+    ShuttingDownError,
+    StorageError,
+    WorkerDiedError,
+    not_found,
+)
 from hexwrap_server.http.metrics import Metrics
-from hexwrap_server.input.finished_map import with_corners
 from hexwrap_server.input.requests import CacheSettings, Order, Outcome, ParsedRequest
 from hexwrap_server.jobs.codec import digest
-from hexwrap_server.jobs.disk import BusyError, StorageError
 from hexwrap_server.jobs.endings import Ledger
 from hexwrap_server.jobs.engine import Engine
-from hexwrap_server.jobs.parts import CORNERS, chosen, join_parts
 from hexwrap_server.jobs.store import Job, Store, Work
-from hexwrap_server.jobs.worker import InternalError, WorkerDiedError, WorkError
-from hexwrap_server.problems import FormError, HttpError, not_found, plain, problem
+from hexwrap_server.problems import plain, problem
 from hexwrap_server.settings import MIB, Settings
 from hexwrap_server.version import service_version
 from hexwrap_solver.errors import HexwrapError
@@ -42,11 +46,6 @@ PATIENCE, BUSY_INTERVAL = 10.0, 0.1
 #: Results kept in memory as they go over the wire.
 HOT_RESULT_BYTES = 64 * MIB
 log = logging.getLogger("hexwrap.jobs")
-
-
-class AttemptsError(WorkError):
-    slug = "too-many-attempts"
-    title = "The job was given up"
 
 
 @dataclass(eq=False)
@@ -75,6 +74,7 @@ class JobManager:
         self._hot: OrderedDict[str, bytes] = OrderedDict()
         self._chores: list[asyncio.Task[None]] = []
         self._closing = asyncio.Event()
+        self._turn = asyncio.Lock()
 
     @property
     def caching(self) -> CacheSettings:
@@ -122,8 +122,13 @@ class JobManager:
 
     # what clients do
 
-    def submit(self, parsed: ParsedRequest) -> Job:
+    async def submit(self, parsed: ParsedRequest) -> Job:
         """Raises HttpError when the queue is full, FormError when the surface is unknown."""
+        async with self._turn:
+            await asyncio.sleep(0)  # many at once leave the event loop to others in between
+            return self._submit(parsed)
+
+    def _submit(self, parsed: ParsedRequest) -> Job:
         identity = digest(service_version(), parsed.surface_id, parsed.wanted)
         job = Job(uuid.uuid4().hex, identity, parsed.name, created=time.time())
         finished = self.store.finished_work(identity)
@@ -156,13 +161,14 @@ class JobManager:
         item = self._live.get(id)
         job = item.jobs[id] if item else self._ledger.get(id) or self.store.job(id)
         if job is None:
-            raise not_found("job", f"There is no job '{id[:64]}' here; it may have been forgotten.")
+            raise not_found("job", f"No job '{id[:64]}' is kept here; it may have expired.")
         return job
 
-    def latest(self, limit: int) -> list[Job]:
-        """Newest first."""
-        listed = self.store.jobs(limit)
-        return [self.get(j.id) if j.id in self._live or j.id in self._ledger else j for j in listed]
+    async def latest(self, limit: int, before: str | None = None) -> list[dict[str, Any]]:
+        """Documents of jobs, newest first. before: only those older than this one."""
+        listed = await asyncio.to_thread(self.store.jobs, limit, before)
+        present = [self.get(j.id) if j.id in self._live or j.id in self._ledger else j for j in listed]
+        return [self.document(job) for job in present]
 
     def position(self, job: Job) -> int | None:
         """Number of works before this one, None unless it is queued."""
@@ -215,18 +221,28 @@ class JobManager:
             item.task.cancel()
             await asyncio.wait([item.task], timeout=2.0)
 
-    async def result(self, job: Job) -> tuple[bytes, Work]:
-        """The packed Result, and where its parts stand. Raises HttpError where there is none."""
-        work = self.store.finished_work(job.identity)
-        if work is None:
-            raise _gone()
+    async def result(self, job: Job) -> bytes:
+        """The packed Result. Raises GoneError, StorageError."""
+        self._kept(job)
         if job.identity not in self._hot:
             packed = await asyncio.to_thread(self.store.result, job.identity)
             if packed is None:
-                raise _gone()
+                raise GoneError
             self._heat(job.identity, packed)
         self._hot.move_to_end(job.identity)
-        return self._hot[job.identity], work
+        return self._hot[job.identity]
+
+    async def parts(self, job: Job, names: list[str], errand: Callable[..., Awaitable[bytes]]) -> bytes:
+        """Some parts of the Result as JSON. Raises GoneError, StorageError."""
+        timings = self._kept(job).timings
+        path = str(self.store.solution_path(job.identity))
+        return await errand("hexwrap_server.jobs.work:result_parts", path, names, timings)
+
+    def _kept(self, job: Job) -> Work:
+        work = self.store.finished_work(job.identity)
+        if work is None:
+            raise GoneError
+        return work
 
     # how works run
 
@@ -243,7 +259,7 @@ class JobManager:
         if work is None or not self.store.has_surface(work.surface):
             lost = InternalError("What this job needs was lost while the server was down; send it again.")
             self._end([_failed(job, lost)])
-        elif work.parts is not None and self.store.has_outcome(job.identity):
+        elif work.size and self.store.has_outcome(job.identity):
             self._end([_reused(job, work)])
         elif work.attempts >= MAX_ATTEMPTS:
             gave_up = AttemptsError(
@@ -290,7 +306,7 @@ class JobManager:
             self._take_back(item, begun)
             raise
         except HexwrapError as error:
-            told_to_end = isinstance(error, WorkerDiedError) and self._closing.is_set()
+            told_to_end = isinstance(error, (WorkerDiedError, ShuttingDownError)) and self._closing.is_set()
             if told_to_end:  # as this server was; the next one goes on with the job
                 self._take_back(item, begun)
             else:
@@ -320,9 +336,11 @@ class JobManager:
         self._settle(item.work.identity)
         try:
             ended = [_failed(job, error) for job in item.jobs.values()]
-        except Exception:  # whatever cannot be told must not keep the jobs from ending
-            log.exception("a problem cannot be told")
-            fault = InternalError(f"The job failed, and its problem cannot be told ({error}); report it.")
+        except Exception:  # a problem that cannot be written must not keep the jobs from ending
+            log.exception("a problem cannot be written as JSON")
+            fault = InternalError(
+                f"The job failed, and its problem cannot be written as JSON ({error}); report it."
+            )
             ended = [_failed(job, fault) for job in item.jobs.values()]
         self._end(ended)
 
@@ -424,26 +442,6 @@ async def _patiently(write: Callable[[], None]) -> None:
             if time.monotonic() > deadline:
                 raise
         await asyncio.sleep(BUSY_INTERVAL)
-
-
-def unpacked(packed: bytes, work: Work, include: list[str] | None) -> bytes:
-    """The Result as JSON, or some of its parts."""
-    text = isal_zlib.decompress(packed, GZIP_WINDOW)
-    if include is None:
-        return text
-    where = work.parts or {}
-    if CORNERS not in include:
-        return chosen(text, where, include)
-    mesh, found = (orjson.loads(text[slice(*where[name])]) for name in ("mesh", "map"))
-    parts = {name: text[slice(*where[name])] for name in include if name in where}
-    corners = orjson.dumps(with_corners(mesh, found), option=orjson.OPT_SERIALIZE_NUMPY)
-    return join_parts(parts | {"map": corners})
-
-
-def _gone() -> HttpError:
-    return HttpError(
-        410, "gone", "The result is no longer kept", "The result was pruned; send the job again."
-    )
 
 
 def _done(job: Job, outcome: Outcome) -> Job:

@@ -23,7 +23,7 @@ def pipes_of_child() -> tuple[IO[bytes], IO[bytes]]:
             signal.signal(getattr(signal, name), signal.SIG_IGN)
     inlet = os.fdopen(os.dup(0), "rb")
     outlet = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # whatever libraries print must not end up between the frames
+    os.dup2(2, 1)  # what libraries print must not end up between the frames
     _leave_standard_input()
     return inlet, outlet
 

@@ -1,31 +1,31 @@
 """What survives the server: jobs and works in SQLite, surfaces, results and solutions as files beside it.
 
 A *work* is what has to be computed, known by the SHA-256 of all it depends on; a *job* is one client's wish
-for it. Every transition is written here before anybody is told. The write-ahead log keeps what was written
+for it. Each transition is written here before it is announced. The write-ahead log keeps what was written
 when the process is killed at any moment.
 """
 
 from __future__ import annotations
 
 import contextlib
+import gzip
 import json
 import logging
 import os
 import re
 import sqlite3
 import time
+import zlib
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Literal
 
-from isal import isal_zlib
-
-from hexwrap_server.http.answers import GZIP_WINDOW
+from hexwrap_server.errors import CodecError, DamagedError, FolderInUseError, StorageError
 from hexwrap_server.input.requests import Outcome, Wanted
 from hexwrap_server.jobs import codec
-from hexwrap_server.jobs.disk import StorageError, make_private, prune, read_whole, write_whole
+from hexwrap_server.jobs.disk import keep_file, make_private, prune, read_whole, surface_file, write_whole
 
 Status = Literal["queued", "running", "done", "failed", "cancelled"]
 log = logging.getLogger("hexwrap.store")
@@ -41,7 +41,7 @@ HEX_ID = re.compile(r"[0-9a-f]{64}")
 _SCHEMA = """
 CREATE TABLE IF NOT EXISTS works (
     identity TEXT PRIMARY KEY, surface TEXT NOT NULL, wanted BLOB NOT NULL,
-    attempts INTEGER NOT NULL DEFAULT 0, parts TEXT, size INTEGER NOT NULL DEFAULT 0,
+    attempts INTEGER NOT NULL DEFAULT 0, size INTEGER NOT NULL DEFAULT 0,
     timings TEXT NOT NULL DEFAULT '{}', used REAL NOT NULL
 );
 CREATE TABLE IF NOT EXISTS jobs (
@@ -79,8 +79,7 @@ class Job:
 
     def document(self, position: int | None = None) -> dict[str, Any]:
         """The contract's Job. position: jobs that run before it."""
-        content = asdict(self)
-        del content["identity"]
+        content = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "identity"}
         for name in ("created", "started", "finished"):
             content[name] = content[name] and _iso(content[name])
         return content | {"queue_position": position}
@@ -88,13 +87,13 @@ class Job:
 
 @dataclass(frozen=True)
 class Work:
-    """parts: where each part stands in the unpacked result; None until it is finished."""
+    """size: bytes of its result; 0 until it is finished."""
 
     identity: str
     surface: str
     wanted: Wanted
     attempts: int = 0
-    parts: dict[str, tuple[int, int]] | None = None
+    size: int = 0
     timings: dict[str, float] = field(default_factory=dict)
 
 
@@ -113,14 +112,6 @@ class Kept:
     works: set[str]
     surfaces: set[str]
     oldest: float
-
-
-class FolderInUseError(Exception):
-    """Another server works in this folder."""
-
-
-class DamagedError(Exception):
-    """The folder's list of jobs cannot be read or written."""
 
 
 class Store:
@@ -173,14 +164,7 @@ class Store:
 
     def keep_surface(self, id: str, data: bytes) -> None:
         """Writes a file. Raises StorageError."""
-        path = self.surface_path(id)
-        try:
-            is_kept = path.read_bytes() == data
-            os.utime(path)  # touch() would make an empty one in the place of one that was just pruned
-        except OSError:
-            is_kept = False
-        if not is_kept:
-            write_whole(path, [data])
+        keep_file(self.surface_path(id), data)
 
     def has_surface(self, id: str) -> bool:
         return HEX_ID.fullmatch(id) is not None and self.surface_path(id).exists()
@@ -202,29 +186,29 @@ class Store:
         return read_whole(self.surface_path(id), codec.is_whole)
 
     def surface_path(self, id: str) -> Path:
-        return self.surfaces / f"{id}.surface"
+        return surface_file(self.surfaces, id)
 
     # works
 
     def work(self, identity: str) -> Work | None:
         rows = self._rows(
-            "SELECT identity, surface, wanted, attempts, parts, timings FROM works WHERE identity = ?",
+            "SELECT identity, surface, wanted, attempts, size, timings FROM works WHERE identity = ?",
             identity,
         )
         if not rows:
             return None
-        identity, surface, wanted, attempts, parts, timings = rows[0]
+        identity, surface, wanted, attempts, size, timings = rows[0]
         try:
             asked = codec.decode(wanted)
-        except codec.CodecError as error:
+        except CodecError as error:
             log.warning("a work of another version cannot be read: %s", error)
             return None
-        return Work(identity, surface, asked, attempts, json.loads(parts or "null"), json.loads(timings))
+        return Work(identity, surface, asked, attempts, size, json.loads(timings))
 
     def finished_work(self, identity: str) -> Work | None:
         """The work, if its result is there."""
         work = self.work(identity)
-        if work is None or work.parts is None or not self.has_outcome(identity):
+        if work is None or not work.size or not self.has_outcome(identity):
             return None
         with contextlib.suppress(StorageError):  # it can be read all the same
             self._write("UPDATE works SET used = ? WHERE identity = ?", time.time(), identity)
@@ -271,7 +255,7 @@ class Store:
             self._db.execute(f"INSERT INTO jobs ({_COLUMNS}) VALUES ({marks})", _row(job))
 
     def start_work(self, identity: str) -> None:
-        self._write("UPDATE works SET attempts = attempts + 1, parts = NULL WHERE identity = ?", identity)
+        self._write("UPDATE works SET attempts = attempts + 1, size = 0 WHERE identity = ?", identity)
 
     def take_back(self, identity: str) -> None:
         """The server stops before the work is done, through no fault of the work."""
@@ -283,8 +267,7 @@ class Store:
 
     def finish_work(self, identity: str, outcome: Outcome) -> None:
         self._write(
-            "UPDATE works SET attempts = 0, parts = ?, size = ?, timings = ?, used = ? WHERE identity = ?",
-            json.dumps(outcome.parts),
+            "UPDATE works SET attempts = 0, size = ?, timings = ?, used = ? WHERE identity = ?",
             outcome.size,
             json.dumps(outcome.timings),
             time.time(),
@@ -304,9 +287,11 @@ class Store:
         rows = self._rows(f"SELECT {_COLUMNS} FROM jobs WHERE id = ?", id)
         return _job(rows[0]) if rows else None
 
-    def jobs(self, limit: int) -> list[Job]:
-        """Newest first."""
-        rows = self._rows(f"SELECT {_COLUMNS} FROM jobs ORDER BY number DESC LIMIT ?", limit)
+    def jobs(self, limit: int, before: str | None = None) -> list[Job]:
+        """Newest first. before: only those older than this one."""
+        older = "" if before is None else "WHERE number < (SELECT number FROM jobs WHERE id = ?)"
+        statement = f"SELECT {_COLUMNS} FROM jobs {older} ORDER BY number DESC LIMIT ?"
+        rows = self._rows(statement, *([] if before is None else [before]), limit)
         return [_job(row) for row in rows]
 
     def unfinished(self) -> list[Job]:
@@ -355,7 +340,7 @@ class Store:
         return found
 
     def prune_files(self, kept: Kept, stage_bytes: float) -> None:
-        """Delete the files that nobody needs any more. Touches many files."""
+        """Delete files that are no longer needed. Touches many files."""
         prune(self.results, 0.0, keep=lambda name: name.partition(".")[0] in kept.works)
         prune(self.surfaces, 0.0, keep=lambda name: name.partition(".")[0] in kept.surfaces)
         prune(self.stages, stage_bytes, oldest=kept.oldest)
@@ -418,15 +403,14 @@ def _divided(
 def _is_packed(data: bytes) -> bool:
     """Whether gzip data is complete and its checksum right."""
     try:
-        gunzip: Any = isal_zlib.decompressobj(GZIP_WINDOW)
-        gunzip.decompress(data)
-        return bool(gunzip.eof)
-    except isal_zlib.error:  # type: ignore[misc]
+        gzip.decompress(data)
+    except (OSError, EOFError, zlib.error):
         return False
+    return True
 
 
 def _locked(path: Path) -> sqlite3.Connection:
-    """A lock that every system frees when the process ends, in whatever way."""
+    """A lock that every system frees when the process ends, even by a crash."""
     try:
         lock = sqlite3.connect(path, timeout=0, check_same_thread=False, isolation_level=None)
     except sqlite3.DatabaseError as error:

@@ -8,6 +8,7 @@ parent dies, however it dies, the worker reads the end of its input and leaves.
 from __future__ import annotations
 
 import contextlib
+import gc
 import logging
 import os
 import pickle
@@ -23,8 +24,7 @@ from typing import IO, Any
 import psutil
 
 from hexwrap_server import logs
-from hexwrap_server.jobs import garbage, later
-from hexwrap_server.jobs.heap import Heap
+from hexwrap_server.errors import InternalError, MemoryLimitError, TimeLimitError, WorkerDiedError, WorkError
 from hexwrap_server.jobs.pipes import pipes_of_child, read_frame, write_frame
 from hexwrap_solver.errors import HexwrapError
 
@@ -52,40 +52,12 @@ KEEP_MEMORY = {
 WATCH_INTERVAL = 0.1
 #: Seconds between two progress messages of one job.
 REPORT_INTERVAL = 0.05
-#: Seconds after an answer within which the worker leaves the processor to whoever waits for it.
-PAUSE = 0.02
-#: Seconds after which a thread makes way for another: stages wait for the packing of results otherwise.
-SWITCH_INTERVAL = 0.0005
 log = logging.getLogger("hexwrap.worker")
 
 #: A function's name and its arguments.
 Call = tuple[str, tuple[Any, ...]]
 #: A function's listener: stage, fraction of the whole 0..1, a few words.
 Report = Callable[[str, float, str], None]
-
-
-class WorkError(HexwrapError):
-    """The work ended without a result, and not because of what was asked."""
-
-
-class TimeLimitError(WorkError):
-    slug = "time-limit"
-    title = "The job took too long"
-
-
-class MemoryLimitError(WorkError):
-    slug = "memory-limit"
-    title = "The job needed too much memory"
-
-
-class WorkerDiedError(WorkError):
-    slug = "worker-died"
-    title = "The worker process died"
-
-
-class InternalError(WorkError):
-    slug = "internal"
-    title = "A fault in hexwrap"
 
 
 class WorkerProcess:
@@ -155,7 +127,7 @@ class WorkerProcess:
             watch.join()
 
     def stop(self) -> None:
-        """Kill the worker, whatever it does. Safe from any thread."""
+        """Kill the worker at once. Safe from any thread."""
         self._stopped = True
         process = self._process
         if process is not None:
@@ -179,8 +151,10 @@ class WorkerProcess:
         deadline = time.monotonic() + seconds
         try:
             process = self._seen or psutil.Process(self.pid)
+            used = 0.0
             while not done.wait(WATCH_INTERVAL):
-                used = process.memory_info().rss / 2**20
+                with contextlib.suppress(OSError):  # no file handle is free to look
+                    used = process.memory_info().rss / 2**20
                 if time.monotonic() > deadline:
                     self._reason = _too_long(seconds)
                 elif used > mib:
@@ -236,24 +210,11 @@ def main() -> None:
     logs.set_up_logging(sys.argv[1])
     for module in filter(None, sys.argv[2:]):
         import_module(module)
-    garbage.look_no_more()
-    sys.setswitchinterval(SWITCH_INTERVAL)
+    gc.freeze()  # half a million objects of modules need not be searched for garbage
     write_frame(outlet, ("ready",))
-    heap = Heap()
     while True:
-        function, arguments = _next(calls, heap)
+        function, arguments = calls.get()
         _say(outlet, _answer(function, arguments, _reporter(outlet)))
-
-
-def _next(calls: queue.SimpleQueue[Call], heap: Heap) -> Call:
-    """The next call. What was put off is done in a pause, or else just before it."""
-    call = None
-    with contextlib.suppress(queue.Empty):
-        call = calls.get(timeout=PAUSE)
-    later.catch_up()
-    if call is None:
-        heap.fetch()
-    return call or calls.get()
 
 
 def _say(outlet: IO[bytes], answer: tuple[Any, ...]) -> None:
@@ -269,7 +230,7 @@ def _listen(inlet: IO[bytes], calls: queue.SimpleQueue[Call]) -> None:
         while (call := read_frame(inlet)) is not None:
             calls.put((call[0], call[1]))
     except Exception:  # such as MemoryError: nothing that comes later can be understood
-        log.exception("what the server says cannot be read")
+        log.exception("cannot decode a message from the server")
     finally:
         os._exit(0)
 

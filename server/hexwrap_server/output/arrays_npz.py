@@ -19,12 +19,14 @@ Arrays = dict[str, NDArray[np.generic]]
 
 
 def result_npz(solution: Solution, meta: Meta) -> bytes:
-    """Compressed, without pickles. Keys are ``part.field`` as in the JSON result.
+    """Compressed, without pickles. Keys are ``part.field`` as in the JSON result; ``unit`` is empty where it
+    is not known.
 
     Rows of different lengths are two arrays: ``….values`` and ``….offsets``; row i is
     ``values[offsets[i]:offsets[i + 1]]``. Per-panel figures of the quality stand under ``quality``.
     """
-    arrays = {"name": np.array(meta.name), **_map(solution.map)}
+    unit = solution.map.surface.unit or ""
+    arrays = {"name": np.array(meta.name), "unit": np.array(unit), **_map(solution.map)}
     if solution.pattern is not None:
         arrays |= _pattern(solution.pattern)
     if solution.panels is not None:

@@ -15,7 +15,7 @@ def domain_dxf(solution: Solution, meta: Meta) -> bytes:
     """Boundary loops, the cut, corners (points) and the pattern's cells, each on a layer of its own."""
     cmap, pattern = solution.map, solution.pattern
     names = [f"loop-{number}" for number in range(len(cmap.surface.loops))]
-    document = grey_drawing(meta.name, *names, "cut", "corners", "pattern")
+    document = grey_drawing(meta, *names, "cut", "corners", "pattern")
     space = document.modelspace()
     unrolled = Unrolled.of(cmap)
     for layer, sides in (*zip(names, unrolled.loops, strict=True), ("cut", unrolled.cut)):

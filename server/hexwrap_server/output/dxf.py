@@ -17,7 +17,7 @@ TEXT = 0.16
 def panels_dxf(solution: Solution, meta: Meta) -> bytes:
     """AutoCAD 2010 DXF; labels lie in the planes of their panels, read from outside."""
     pattern, panels = panels_of(solution, "panels.dxf")
-    document = drawing(panels, meta.name, "labels")
+    document = drawing(panels, meta, "labels")
     space = document.modelspace()
     layers = {size: layer.name for size, layer in size_layers(panels).items()}
     for points, size in zip(panels.polygons.to_lists(), panels.size.tolist(), strict=True):

@@ -6,13 +6,15 @@ matplotlib is loaded when a picture is made: it takes half a second that most pr
 from __future__ import annotations
 
 import io
+import textwrap
 import warnings
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hexwrap_server.output import colours, text
 from hexwrap_server.output.meta import Meta
+from hexwrap_server.output.units import behind
 from hexwrap_solver.arrays import Floats
 from hexwrap_solver.panels.types import Panels
 
@@ -23,46 +25,65 @@ if TYPE_CHECKING:
 WIDTH, ROW, DPI = 420, 54, 100
 #: More sizes than this are shown as a bar of colours.
 ROWS = 24
+#: Letters of the title in a line, and lines before it becomes smaller.
+LETTERS, LINES = 18, 4
 INK, GREY = "#23262b", "#70757d"
 
 
-def compose(image: Floats, panels: Panels, meta: Meta) -> bytes:
-    """PNG of the image (h, w, 3) with the legend on its right."""
+def compose(image: Floats, panels: Panels, meta: Meta, unit: str | None = None) -> bytes:
+    """PNG of the image (h, w, 3) in 0..1 with the legend on its right. unit: of the lengths."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
+    from PIL import Image
 
-    height, width = image.shape[:2]
-    figure = Figure(figsize=((width + WIDTH) / DPI, height / DPI), dpi=DPI, facecolor="white")
-    FigureCanvasAgg(figure)
-    picture = figure.add_axes((0, 0, width / (width + WIDTH), 1))
-    picture.imshow(np.rint(255 * image).astype(np.uint8), interpolation="none", aspect="auto")
-    picture.set_axis_off()
-    axes = figure.add_axes((width / (width + WIDTH), 0, WIDTH / (width + WIDTH), 1))
+    height = image.shape[0]
+    figure = Figure(figsize=(WIDTH / DPI, height / DPI), dpi=DPI, facecolor="white")
+    canvas: Any = FigureCanvasAgg(figure)
+    axes = figure.add_axes((0, 0, 1, 1))
     axes.set(xlim=(0, WIDTH), ylim=(height, 0))
     axes.set_axis_off()
-    _legend(axes, height, panels, meta)
-    out = io.BytesIO()
+    _legend(axes, height, panels, meta, behind(unit))
     with warnings.catch_warnings():  # a name in a script that the bundled font lacks shows boxes, no warning
         warnings.simplefilter("ignore", UserWarning)
-        figure.savefig(out, format="png", dpi=DPI)
+        canvas.draw()
+    legend = np.asarray(canvas.buffer_rgba())[:height, :WIDTH, :3]
+    pixels = np.concatenate([np.rint(255 * image).astype(np.uint8), legend], axis=1)
+    out = io.BytesIO()
+    Image.fromarray(pixels).save(out, "png", compress_level=4, dpi=(DPI, DPI))
     return out.getvalue()
 
 
-def _legend(axes: Axes, height: int, panels: Panels, meta: Meta) -> None:
+def _title(axes: Axes, top: float, name: str) -> None:
+    """The name above the legend, its last line at ``top``, in as many lines as it needs."""
+    lines = textwrap.wrap(name, LETTERS, break_on_hyphens=False) or [""]
+    size = 25
+    if len(lines) > LINES:
+        lines, size = textwrap.wrap(name, int(LETTERS * 25 / 15), break_on_hyphens=False), 15
+    step = size * 1.35 * DPI / 72
+    canvas: Any = axes.figure.canvas
+    renderer = canvas.get_renderer()
+    for k, line in enumerate(reversed(lines)):
+        place: dict[str, Any] = {"color": INK, "va": "center", "weight": "bold"}
+        shown = axes.text(0, top - k * step, line.replace("$", r"\$"), size=size, **place)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)
+            width = shown.get_window_extent(renderer).width
+        shown.set_fontsize(size * min(1.0, (WIDTH - 12) / max(width, 1.0)))
+
+
+def _legend(axes: Axes, height: int, panels: Panels, meta: Meta, unit: str) -> None:
     n_sizes = len(panels.class_length)
     rows = n_sizes if n_sizes <= ROWS else 10
     cut = int(np.sum(panels.size < 0))
     top = (height - ROW * (rows + (cut > 0))) / 2
-    title = text.one_line(meta.name)
-    title = title if len(title) <= 28 else title[:27] + "…"
-    axes.text(0, top - 96, title.replace("$", r"\$"), size=25, color=INK, va="center", weight="bold")
+    _title(axes, top - 96, text.one_line(meta.name))
     named = panels.n_sizes
     sizes = {0: "", 1: ", 1 size"}.get(named, f", {named:,} sizes")
     axes.text(0, top - 48, f"{panels.n_panels:,} panels{sizes}", size=17, color=GREY, va="center")
     if n_sizes <= ROWS:
-        _swatches(axes, top, panels)
+        _swatches(axes, top, panels, unit)
     else:
-        _bar(axes, top, rows * ROW - 20, panels)
+        _bar(axes, top, rows * ROW - 20, panels, unit)
     if cut:
         y = top + ROW * (rows + 0.5)
         _swatch(axes, y, panels, colours.UNSIZED)
@@ -70,25 +91,25 @@ def _legend(axes: Axes, height: int, panels: Panels, meta: Meta) -> None:
         axes.text(WIDTH - 60, y, f"{cut:,}", size=17, color=GREY, va="center", ha="right")
 
 
-def _swatches(axes: Axes, top: float, panels: Panels) -> None:
+def _swatches(axes: Axes, top: float, panels: Panels, unit: str) -> None:
     """One row per size: colour, edge length, how many."""
     counts, words = panels.class_count.tolist(), text.lengths(panels.class_length.tolist())
     for i, colour in enumerate(colours.class_colours(panels)):
         y = top + ROW * (i + 0.5)
         _swatch(axes, y, panels, colour, int(panels.class_sides[i]))
-        axes.text(64, y, words[i], size=17, color=INK, va="center")
+        axes.text(64, y, words[i] + unit, size=17, color=INK, va="center")
         axes.text(WIDTH - 60, y, f"{counts[i]:,}", size=17, color=GREY, va="center", ha="right")
 
 
 def _swatch(axes: Axes, y: float, panels: Panels, colour: str, sides: int = 0) -> None:
-    """A polygon of so many corners, or as many as most panels have, standing on a side."""
+    """A polygon with this number of corners (None: as most panels have), standing on a side."""
     from matplotlib.patches import RegularPolygon
 
     p = sides or int(np.bincount(panels.polygons.lengths, minlength=7)[3:7].argmax()) + 3
     axes.add_patch(RegularPolygon((22, y), p, radius=20, orientation=np.pi / p, color=colour))
 
 
-def _bar(axes: Axes, top: float, length: float, panels: Panels) -> None:
+def _bar(axes: Axes, top: float, length: float, panels: Panels, unit: str) -> None:
     """A bar from the shortest edge to the longest, for many sizes."""
     steps = colours.gradient(np.linspace(0, 1, 256))[:, None]
     axes.imshow(steps, extent=(2, 42, top + length, top), aspect="auto", interpolation="bilinear")
@@ -96,4 +117,4 @@ def _bar(axes: Axes, top: float, length: float, panels: Panels) -> None:
     at = np.linspace(0, panels.n_sizes - 1, 5).round().astype(int)
     words = text.lengths(panels.class_length[at].tolist())
     for share, word in zip(np.linspace(0, 1, 5).tolist(), words, strict=True):
-        axes.text(64, top + share * length, word, size=17, color=INK, va="center")
+        axes.text(64, top + share * length, word + unit, size=17, color=INK, va="center")

@@ -1,28 +1,38 @@
-"""What the writers are told besides the solution, and how they say that there is nothing to write."""
+"""What writers get besides the solution, and their errors."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 from hexwrap_solver.errors import HexwrapError
 from hexwrap_solver.panels.types import Panels
 from hexwrap_solver.pattern.types import Pattern
 from hexwrap_solver.pipeline import Solution
 
+#: How ``flat.dxf`` can gather panels on its sheets.
+GROUPS = ("size", "ring", "zone")
+Group = Literal["size", "ring", "zone"]
+
 
 @dataclass(frozen=True)
 class Meta:
     """name: of the job, any text. timings: seconds per stage.
 
-    sheet: width and height of the sheets of ``flat.dxf`` in model units; None takes a size that holds
-    about six by four of the largest panels.
+    unit: of all lengths (``m``, ``cm``, ``mm``, ``ft``, ``in``); None: the surface's own, if it has one.
+    sheet: width and height of the sheets of ``flat.dxf`` in model units; None: 3 × 1.5 m, or, where panels
+    are larger than that, a size that holds about six by four of the largest. group: what shares a sheet
+    there.
+    storey: height of the storeys of ``panels.ifc`` in model units, None: no storeys.
     """
 
     name: str = "hexwrap"
     timings: Mapping[str, float] = field(default_factory=dict)
     sheet: tuple[float, float] | None = None
+    unit: str | None = None
+    group: Group = "size"
+    storey: float | None = None
 
 
 class NotMadeError(HexwrapError):

@@ -19,7 +19,7 @@ SINK = 0.2
 def panels_png(solution: Solution, meta: Meta) -> bytes:
     """A picture of 1600 pixels in height on white."""
     _, panels = panels_of(solution, "panels.png")
-    return compose(render(panels_scene(solution)), panels, meta)
+    return compose(render(panels_scene(solution)), panels, meta, solution.map.surface.unit)
 
 
 def panels_scene(solution: Solution) -> Scene:

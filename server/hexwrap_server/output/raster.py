@@ -106,16 +106,17 @@ def draw(camera: Camera, polygons: Polygons) -> tuple[NDArray[np.int32], Floats]
     cuts = np.searchsorted(ends, np.arange(CHUNK, n_samples, CHUNK)).tolist()
     for start, stop in pairwise(sorted({0, *cuts, len(ends)})):
         part = slice(start, stop)
-        length = last[part] - first[part]
-        which = np.repeat(np.arange(len(length)), length)
-        x = np.arange(len(which)) - np.repeat(np.cumsum(length) - length, length) + first[part][which]
-        owns, line = row[part][which], y[part][which]
-        a, b, c = inverse[owns].T
-        depth = a * (x + 0.5) + b * (line + 0.5) + c
-        at = line * camera.width + x
+        rows, lines, column = row[part], y[part], first[part]
+        length = last[part] - column
+        # What changes only from run to run is worked out once per run.
+        a, b, c = inverse[rows].T
+        start_depth = a * (column + 0.5) + b * (lines + 0.5) + c
+        along = np.arange(int(length.sum())) - np.repeat(np.cumsum(length) - length, length)
+        depth = np.repeat(start_depth, length) + np.repeat(a, length) * along
+        at = np.repeat(lines * camera.width + column, length) + along
         np.maximum.at(nearest, at, depth)
         front = depth >= nearest[at]
-        owner[at[front]] = owns[front]
+        owner[at[front]] = np.repeat(rows, length)[front]
     shape = camera.height, camera.width
     return owner.reshape(shape), nearest.reshape(shape)
 

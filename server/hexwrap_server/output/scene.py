@@ -15,14 +15,17 @@ from hexwrap_solver.arrays import Bools, Floats
 #: Pixels: the model is fitted into this box, with room around it for its shadow on the ground.
 HEIGHT, WIDTH, MARGIN = 1600, 1460, 100
 #: Samples per pixel and direction.
-FINE = 3
+FINE = 2
 #: Degrees: small, so that parallels stay nearly parallel.
 FIELD = 22.0
 #: The sun, relative to the view: right, up, towards the viewer. Its distance in radii of the model.
 SUN, SUN_DISTANCE = (-0.52, 0.62, 0.72), 40.0
-#: Samples of the map of distances from the sun; places looked up per pixel; blur of a shadow's edge on the
-#: model and on the ground, in those samples; how much nearer, in radii, a thing must be to cast a shadow.
-SUN_MAP, TAPS, PENUMBRA, GROUND_BLUR, BIAS = 1200, 24, 5.0, 26.0, 0.012
+#: Samples of the map of distances from the sun; how much nearer, in radii, a thing must be to cast a shadow.
+SUN_MAP, BIAS = 700, 0.014
+#: Places looked up for a shadow, and the blur of its edge in samples of the map: on the model, and on the
+#: ground, where it is so soft that one pixel in so many is enough.
+TAPS, PENUMBRA = 6, 2.2
+GROUND_TAPS, GROUND_BLUR, GROUND_STEP = 24, 15.0, 6
 SUNLIGHT, SKYLIGHT, GLOSS, GLOSS_EXPONENT = 0.70, 0.52, 0.10, 40.0
 #: Blur radii in pixels, depths in radii of the model, over which hollows darken; pixels per blurred one.
 HOLLOWS = ((6.0, 0.03, 2), (40.0, 0.25, 8))
@@ -31,7 +34,9 @@ SHELL, BACK, BACK_COLOUR = "#4a4f58", "#b3b0ab", 0.25
 #: How far behind the shell a panel is still seen, in parts of its radius.
 DIP = 0.6
 #: What is left of the light on an outline; the panel width in pixels from which outlines have full strength.
-OUTLINE, OUTLINE_FULL = 0.25, 22.0
+OUTLINE, OUTLINE_FULL = 0.40, 22.0
+#: Steps of light that are told apart before it becomes colour.
+SHADES = 4096
 #: Darkest shadow on the ground; it fades towards the rim of the picture over this many pixels.
 GROUND_SHADOW, FADE = 0.32, 220.0
 
@@ -69,13 +74,18 @@ def render(scene: Scene) -> Floats:
     # Half the memory of the usual numbers, and twice the speed: these are millions of samples.
     tables = direct.astype(np.float32), sky.astype(np.float32)
     lights = lit.astype(np.float32)[..., None], sky_seen.astype(np.float32)[..., None]
-    image = np.zeros((*middle.shape, 3), dtype=np.float32)
-    for i in range(FINE):
-        for j in range(FINE):
-            of = owner[i::FINE, j::FINE]
-            light = tables[0][of] * lights[0] + tables[1][of] * lights[1]
-            image += light * outline[i::FINE, j::FINE, None]
-    return encoded(image.astype(np.float64) / FINE**2)
+    image = tables[0][-1] * lights[0] + tables[1][-1]  # the ground alone
+    samples = [(slice(i, None, FINE), slice(j, None, FINE)) for i in range(FINE) for j in range(FINE)]
+    shown = np.any([owner[of] >= 0 for of in samples], axis=0)
+    sun_there, sky_there = (light[shown] for light in lights)
+    model = np.zeros((int(shown.sum()), 3), dtype=np.float32)
+    for of in samples:
+        row = owner[of][shown]
+        light = tables[0][row] * sun_there + tables[1][row] * sky_there
+        model += light * outline[of][shown, None]
+    image[shown] = model / FINE**2
+    steps = (image * SHADES).clip(0, SHADES).astype(np.int32)
+    return np.asarray(encoded(np.arange(SHADES + 1) / SHADES)[steps])
 
 
 def _visible(camera: Camera, panels: Polygons, shell: Polygons) -> tuple[NDArray[np.int32], Floats]:
@@ -122,13 +132,13 @@ class Sun:
     nearest: Floats
     direction: Floats
 
-    def reaches(self, points: Floats, blur: float, bias: float) -> Floats:
-        """(n,) share of the sun, 0..1, that reaches the points, with edges blurred over so many samples."""
+    def reaches(self, points: Floats, blur: float, bias: float, taps: int) -> Floats:
+        """(n,) share of the sun, 0..1, that reaches the points, with edges blurred over this many samples."""
         seen = self.camera.see(points)
         at, limit = self.camera.project(seen), 1.0 / (seen[:, 2] - bias)
         share = np.zeros(len(points))
-        for k in range(TAPS):  # Vogel's spiral: even over the disk
-            turn, reach = k * np.pi * (3 - np.sqrt(5)), blur * np.sqrt((k + 0.5) / TAPS)
+        for k in range(taps):  # Vogel's spiral: even over the disk
+            turn, reach = k * np.pi * (3 - np.sqrt(5)), blur * np.sqrt((k + 0.5) / taps)
             x = np.floor(at[:, 0] + reach * np.cos(turn)).astype(np.int64)
             y = np.floor(at[:, 1] + reach * np.sin(turn)).astype(np.int64)
             inside = (x >= 0) & (x < self.camera.width) & (y >= 0) & (y < self.camera.height)
@@ -138,7 +148,7 @@ class Sun:
                 0.0,
             )
             share += near < limit
-        return share / TAPS
+        return share / taps
 
 
 def _sun(scene: Scene, points: Floats, radius: float) -> Sun:
@@ -183,24 +193,31 @@ def _lit(
     radius: float,
 ) -> Floats:
     """(h, w) share of the sun at each pixel, of the model and of the ground under it."""
-    y, x = np.meshgrid(*(np.arange(n) * FINE + FINE / 2 for n in owner.shape), indexing="ij")
-    rays = camera.rays(x, y)
     lit = np.ones(owner.shape)
-    hit = owner >= 0
-    a, b, c = planes(camera, drawn)[owner[hit]].T
-    depth = 1.0 / np.maximum(a * x[hit] + b * y[hit] + c, 1e-12 / radius)
-    places = rays[hit] * depth[:, None] @ camera.axes + camera.position
-    lit[hit] = sun.reaches(places, PENUMBRA, BIAS * radius)
     if scene.view[2] > 0:
-        down = rays[~hit] @ camera.axes
-        floor = points[:, 2].min()
-        meets = down[:, 2] < -1e-6
-        depth = np.where(meets, (floor - camera.position[2]) / np.where(meets, down[:, 2], 1.0), 0.0)
-        near = meets & (depth < 4 * np.linalg.norm(camera.position))
-        share = np.ones(len(down))
-        share[near] = sun.reaches(down[near] * depth[near, None] + camera.position, GROUND_BLUR, 0.0)
-        lit[~hit] = 1 - (1 - share) * _fade(owner.shape)[~hit]
+        some = _on_the_ground(camera, owner.shape, sun, float(points[:, 2].min()))
+        lit = 1 - (1 - _enlarged(some, owner.shape)) * _fade(owner.shape)
+    hit = owner >= 0
+    row, column = np.nonzero(hit)
+    x, y = (np.asarray(FINE * (at + 0.5), dtype=np.float64) for at in (column, row))
+    a, b, c = planes(camera, drawn)[owner[hit]].T
+    depth = 1.0 / np.maximum(a * x + b * y + c, 1e-12 / radius)
+    places = camera.rays(x, y) * depth[:, None] @ camera.axes + camera.position
+    lit[hit] = sun.reaches(places, PENUMBRA, BIAS * radius, TAPS)
     return lit
+
+
+def _on_the_ground(camera: Camera, shape: tuple[int, ...], sun: Sun, floor: float) -> Floats:
+    """Share of the sun on the ground, one pixel in ``GROUND_STEP``; 1 where a ray does not meet it."""
+    y, x = np.meshgrid(*(FINE * (np.arange(0, n, GROUND_STEP) + 0.5) for n in shape), indexing="ij")
+    down = camera.rays(x, y) @ camera.axes
+    meets = down[..., 2] < -1e-6
+    depth = np.where(meets, (floor - camera.position[2]) / np.where(meets, down[..., 2], 1.0), 0.0)
+    near = meets & (depth < 4 * np.linalg.norm(camera.position))
+    share = np.ones(near.shape)
+    places = down[near] * depth[near, None] + camera.position
+    share[near] = sun.reaches(places, GROUND_BLUR, 0.0, GROUND_TAPS)
+    return share
 
 
 def _fade(shape: tuple[int, ...]) -> Floats:
@@ -226,10 +243,15 @@ def _openness(nearest: Floats, radius: float) -> Floats:
 
 
 def _enlarged(image: Floats, shape: tuple[int, ...]) -> Floats:
-    """A coarse image at the size of a fine one, linearly between its pixels."""
-    rows, columns = (np.arange(n) * c / n for n, c in zip(shape, image.shape, strict=True))
-    there = np.meshgrid(rows, columns, indexing="ij")
-    return np.asarray(ndimage.map_coordinates(image, there, order=1, mode="nearest"))
+    """A coarse image at the size of a fine one, linearly between its pixels: first down, then across."""
+    for axis, n in enumerate(shape):
+        most = image.shape[axis] - 1
+        at = np.minimum(np.arange(n) * image.shape[axis] / n, most)
+        low = np.floor(at).astype(np.int64)
+        part = (at - low).astype(image.dtype).reshape((-1, 1) if axis == 0 else (1, -1))
+        before = np.take(image, low, axis)
+        image = before + part * (np.take(image, np.minimum(low + 1, most), axis) - before)
+    return image
 
 
 def _outline(owner: NDArray[np.int32], n_panels: int) -> NDArray[np.float32]:

@@ -8,14 +8,19 @@ import io
 import numpy as np
 
 from hexwrap_server.output.meta import Meta, panels_of
+from hexwrap_server.output.units import heading
 from hexwrap_solver.arrays import Floats, Ints
 from hexwrap_solver.panels.types import Panels
 from hexwrap_solver.pattern.types import Pattern
 from hexwrap_solver.pipeline import Solution
 
+#: Columns of lengths begin so.
+LENGTHS = ("edge_length", "limit", "center_", "surface_distance", "gap_")
+
 
 def panels_csv(solution: Solution, meta: Meta) -> bytes:
-    """UTF-8, comma separated, a heading row. Lengths in model units, angles in radians.
+    """UTF-8, comma separated, a heading row. Lengths in model units, which the headings name where they are
+    known (``edge_length [mm]``); angles in radians.
 
     ``neighbours`` names the panels across each edge in order, ``-`` where there is none; gaps are to
     those neighbours, along the surface (``tangential``) and across it (``normal``).
@@ -24,7 +29,7 @@ def panels_csv(solution: Solution, meta: Meta) -> bytes:
     known = columns(solution)
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\r\n")  # RFC 4180
-    writer.writerow(known)
+    writer.writerow(heading(name, meta.unit if name.startswith(LENGTHS) else None) for name in known)
     writer.writerows(zip(*known.values(), strict=True))
     return text.getvalue().encode()
 

@@ -10,9 +10,8 @@ import numpy as np
 import orjson
 from numpy.typing import NDArray
 
-from hexwrap_server.jobs.parts import PARTS, join_parts
 from hexwrap_server.output.colours import class_colours
-from hexwrap_solver.arrays import Complexes, Floats, Ints, Ragged
+from hexwrap_solver.arrays import Complexes, Floats, Ragged
 from hexwrap_solver.conformal.net import Net
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.panels.types import Components, Panels, Support, TradeOff
@@ -20,19 +19,21 @@ from hexwrap_solver.pattern.types import Pattern
 from hexwrap_solver.pipeline import Solution
 from hexwrap_solver.surface.types import Surface
 
+#: The parts of a Result, in its order.
+PARTS = ("unit", "mesh", "map", "pattern", "panels", "sizes", "quality", "components", "support", "timings")
+#: Asked for beside parts: ``map`` then has ``corners``, whatever its kind.
+CORNERS = "corners"
+
 
 def result_json(
     solution: Solution, timings: dict[str, float] | None = None, include: Sequence[str] = PARTS
 ) -> bytes:
-    """The Result as JSON. include: the parts wanted."""
-    return join_parts(parts_json(solution, timings or {}, include))
-
-
-def parts_json(
-    solution: Solution, timings: dict[str, float], include: Sequence[str] = PARTS
-) -> dict[str, bytes]:
-    """The JSON of each part of the Result."""
-    return {name: dump(part(solution, name, timings)) for name in PARTS if name in include}
+    """The Result as JSON. include: the parts wanted; with CORNERS among them, ``map`` has ``corners``."""
+    wanted = {*include, "map"} if CORNERS in include else include
+    document = {name: part(solution, name, timings or {}) for name in PARTS if name in wanted}
+    if CORNERS in include:
+        document["map"]["corners"] = plane(solution.map.corners())
+    return dump(document)
 
 
 def part(solution: Solution, name: str, timings: dict[str, float]) -> Any:
@@ -40,12 +41,14 @@ def part(solution: Solution, name: str, timings: dict[str, float]) -> Any:
     match name:
         case "mesh":
             return mesh(solution.map.surface)
+        case "unit":
+            return solution.map.surface.unit
         case "map":
             return conformal(solution.map)
         case "pattern":
             return solution.pattern and pattern(solution.pattern)
         case "panels":
-            return solution.panels and panels(solution)
+            return panels(solution)
         case "sizes":
             return sizes(solution.panels)
         case "quality":
@@ -84,7 +87,7 @@ def conformal(cmap: ConformalMap) -> dict[str, Any]:
         sheets = {
             "cone_angle": float(domain.deck.angle),
             "uv": plane(domain.uv),
-            "sheet": mostly_zero(domain.sheet),
+            "sheet": flat(domain.sheet),
             "deck": {"angle": float(domain.deck.angle), "translation": [shift.real, shift.imag]},
             "circumference": float(domain.circumference),
             "apex": None if apex is None else [apex.real, apex.imag],
@@ -130,14 +133,10 @@ def pattern(laid: Pattern) -> dict[str, Any]:
     }
 
 
-def panels(solution: Solution) -> dict[str, Any]:
-    assert solution.panels is not None
-    assert solution.pattern is not None
-    return shapes(solution.panels, solution.pattern) | measures(solution)
-
-
-def shapes(made: Panels, laid: Pattern) -> dict[str, Any]:
-    """What is known of the panels before they are measured."""
+def panels(solution: Solution) -> dict[str, Any] | None:
+    made, laid, measured = solution.panels, solution.pattern, solution.quality
+    if made is None or laid is None:
+        return None
     labels = laid.labels()
     return {
         "mode": made.mode,
@@ -151,15 +150,6 @@ def shapes(made: Panels, laid: Pattern) -> dict[str, Any]:
         "normal": flat(made.normal),
         "whole": flat(made.whole),
         "outside": flat(made.outside),
-    }
-
-
-def measures(solution: Solution) -> dict[str, Any]:
-    """What is measured on each panel."""
-    made, laid, measured = solution.panels, solution.pattern, solution.quality
-    assert made is not None
-    assert laid is not None
-    return {
         "planarity": flat(measured.planarity),
         "edge_deviation": flat(measured.edge_deviation),
         "angle_deviation": flat(measured.angle_deviation),
@@ -274,15 +264,6 @@ def rows(ragged: Ragged) -> Any:
 def flat(array: NDArray[Any] | None) -> Any:
     """What orjson asks of an array: contiguous."""
     return None if array is None else np.ascontiguousarray(array)
-
-
-def mostly_zero(table: Ints) -> orjson.Fragment:
-    """(n, 3) integers, few of them other than 0, as text: only the seam is written, a third of the work."""
-    other = np.flatnonzero(table[:, 0] | table[:, 1] | table[:, 2])
-    zeros = np.diff(other, prepend=-1, append=len(table)) - 1
-    written = [b"", *(b"[%d,%d,%d]," % tuple(row) for row in table[other].tolist())]
-    rows = b"".join([row + b"[0,0,0]," * n for row, n in zip(written, zeros.tolist(), strict=True)])
-    return orjson.Fragment(b"[" + rows[:-1] + b"]")
 
 
 def plane(z: Complexes) -> Floats:

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from hexwrap_server.input.requests import Wanted
 from hexwrap_server.output.arrays_npz import result_npz
+from hexwrap_server.output.cutting import cutting_list
 from hexwrap_server.output.domain_dxf import domain_dxf
 from hexwrap_server.output.domain_svg import domain_svg
 from hexwrap_server.output.dxf import panels_dxf
 from hexwrap_server.output.flat import flat_dxf
+from hexwrap_server.output.glb import panels_glb
+from hexwrap_server.output.ifc import panels_ifc
 from hexwrap_server.output.meta import Meta, NotMadeError, SheetError, check_stages
 from hexwrap_server.output.obj import panels_obj
 from hexwrap_server.output.picture import panels_png
@@ -24,6 +28,9 @@ WRITERS: dict[str, Callable[[Solution, Meta], bytes]] = {
     "panels.3dm": panels_3dm,
     "panels.dxf": panels_dxf,
     "panels.csv": panels_csv,
+    "panels.ifc": panels_ifc,
+    "panels.glb": panels_glb,
+    "cutting-list.csv": cutting_list,
     "flat.dxf": flat_dxf,
     "domain.svg": domain_svg,
     "domain.dxf": domain_dxf,
@@ -38,7 +45,7 @@ WITHOUT_PANELS = {"domain.svg", "domain.dxf", "result.json", "result.npz"}
 
 def write(name: str, solution: Solution, meta: Meta) -> bytes:
     """The file of that name. Raises KeyError for an unknown name, HexwrapError where it cannot be made."""
-    return WRITERS[name](solution, meta)
+    return WRITERS[name](solution, replace(meta, unit=meta.unit or solution.map.surface.unit))
 
 
 def check_wanted(name: str, wanted: Wanted) -> None:

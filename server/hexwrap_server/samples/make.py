@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import rhino3dm
 
-from hexwrap_solver.arrays import Floats
+from hexwrap_solver.arrays import Floats, Ints
 from hexwrap_solver.surface import NurbsSurface
 from hexwrap_solver.surface.nurbs import domain, evaluate_points
 
@@ -148,19 +149,110 @@ def body(name: str, surface: NurbsSurface, max_edge: float | None = None, **requ
     return {"name": name, "surface": {"nurbs": nurbs, **mesh}, **request}
 
 
-def requests() -> list[tuple[NurbsSurface, dict[str, Any]]]:
+@dataclass(frozen=True)
+class Facets:
+    """A mesh as it is sent. points: (n, 3). faces: (m, 4) quads, or triangles whose last corner comes twice,
+    as Rhino keeps them."""
+
+    points: Floats
+    faces: Ints
+
+    def rows(self) -> list[list[int]]:
+        """Three corners of triangles, four of quads."""
+        return [row[:3] if row[2] == row[3] else row for row in self.faces.tolist()]
+
+
+def shell() -> Facets:
+    """The roof of a market hall, 42 m × 28 m: vaulted between four straight eaves, higher at one end."""
+    n, m = 60, 40
+    u, v = (t.ravel() for t in np.meshgrid(np.linspace(0, 1, n + 1), np.linspace(0, 1, m + 1)))
+    rise = (4 * u * (1 - u)) ** 0.8 * (4 * v * (1 - v)) ** 0.8
+    points = np.stack([42 * u, 28 * v, 6 + (4.6 + 2.2 * u) * rise], axis=1)
+    i, j = (t.ravel() for t in np.meshgrid(np.arange(n), np.arange(m)))
+    a = i + (n + 1) * j
+    return Facets(points.round(DIGITS), np.stack([a, a + 1, a + n + 2, a + n + 1], axis=1))
+
+
+def cupola() -> Facets:
+    """An oval dome, 40 m × 32 m and 13 m high: rings of 6, 12, 18 … vertices around the crown."""
+    rings = 36
+    start = np.cumsum([0, 1, *(6 * r for r in range(1, rings + 1))])
+    points, faces = [np.zeros((1, 2))], []
+    for r in range(1, rings + 1):
+        turn = 2 * np.pi * np.arange(6 * r) / (6 * r)
+        points.append(np.sin(r / rings * np.pi / 2.2) * np.stack([np.cos(turn), np.sin(turn)], axis=1))
+        sector, k = (t.ravel() for t in np.meshgrid(np.arange(6), np.arange(r), indexing="ij"))
+        outer = start[r] + np.stack([sector * r + k, (sector * r + k + 1) % (6 * r)], axis=1)
+        inner = (sector * (r - 1) + k)[:, None] + [0, 1]
+        inner = start[r - 1] + inner % max(6 * (r - 1), 1)
+        faces.append(np.stack([outer[:, 0], outer[:, 1], inner[:, 0], inner[:, 0]], axis=1))
+        full = k < r - 1
+        faces.append(np.stack([inner[:, 0], outer[:, 1], inner[:, 1], inner[:, 1]], axis=1)[full])
+    xy = np.concatenate(points)
+    height = 13 * (np.sqrt(np.maximum(1 - (xy**2).sum(axis=1), 0)) - np.cos(np.pi / 2.2))
+    return Facets(
+        np.column_stack([20 * xy[:, 0], 16 * xy[:, 1], height]).round(DIGITS), np.concatenate(faces)
+    )
+
+
+def house() -> Facets:
+    """A round tower of 27 m with a door and twelve windows."""
+    n, m = 96, 72
+    turn, t = 2 * np.pi * np.arange(n) / n, np.linspace(0, 1, m + 1)[:, None]
+    radius = (7.2 + 1.5 * np.cos(2.6 * t - 0.3)) * (1 + 0.06 * t * np.cos(2 * turn))
+    points = np.stack([radius * np.cos(turn), radius * np.sin(turn), 27 * t + 0 * turn], axis=2).reshape(
+        -1, 3
+    )
+    i, j = (k.ravel() for k in np.meshgrid(np.arange(n), np.arange(m)))
+    openings = [(77, 83, 2, 10)]  # the door: columns, then rows
+    for floor, row in enumerate((18, 33, 48)):
+        openings += [(24 * k + 5 + 8 * floor, 24 * k + 10 + 8 * floor, row, row + 7) for k in range(4)]
+    wall = np.ones(len(i), dtype=bool)
+    for left, right, low, high in openings:
+        column = (i - left) % n
+        wall &= ~((column < right - left) & (j >= low) & (j < high))
+    i, j = i[wall], j[wall]
+    a, b = i + n * j, (i + 1) % n + n * j
+    faces = np.stack([a, b, b + n, a + n], axis=1)
+    used, faces = np.unique(faces, return_inverse=True)
+    return Facets(points[used].round(DIGITS), faces.reshape(-1, 4))
+
+
+def requests() -> list[tuple[NurbsSurface | Facets, dict[str, Any]]]:
     """Every sample: its surface and its request body."""
-    return [
-        _tower(),
-        _facade(),
-        _waist(),
-        _cone(),
-        _isometric(),
-        _entrance(),
-        _diagrid(),
-        _ring(),
-        _singular(),
-    ]
+    tubes = [_tower(), _facade(), _waist(), _cone(), _isometric(), _entrance(), _diagrid(), _ring()]
+    return [*tubes, _singular(), _roof(), _dome(), _openings()]
+
+
+def _of_mesh(name: str, mesh: Facets, **request: Any) -> tuple[Facets, dict[str, Any]]:
+    surface = {"vertices": mesh.points.tolist(), "faces": mesh.rows()}
+    return mesh, {"name": name, "surface": surface, **request}
+
+
+def _roof() -> tuple[Facets, dict[str, Any]]:
+    """A rectangle, four corners of π/2: quads fit all four sides."""
+    corners = [{"vertex": v, "angle": 0.5} for v in (0, 60, 61 * 41 - 1, 61 * 40)]
+    return _of_mesh(
+        "roof",
+        shell(),
+        boundary={"mode": "angles", "angles": corners, "angle_unit": "pi"},
+        pattern={"kind": "quad", "edge_length": 1.25},
+    )
+
+
+def _dome() -> tuple[Facets, dict[str, Any]]:
+    """One loop, whose length is kept; cells at the ground are cut."""
+    return _of_mesh(
+        "dome",
+        cupola(),
+        boundary={"mode": "isometric"},
+        pattern={"kind": "hex", "edge_length": 0.85, "boundary": "trim"},
+    )
+
+
+def _openings() -> tuple[Facets, dict[str, Any]]:
+    """The pattern runs past door and windows, and is cut there."""
+    return _of_mesh("openings", house(), pattern={"kind": "hex", "around": 54, "boundary": "trim"})
 
 
 def _tower() -> tuple[NurbsSurface, dict[str, Any]]:
@@ -282,13 +374,29 @@ def rhino_model(name: str, surface: NurbsSurface) -> rhino3dm.File3dm:
     return model
 
 
+def mesh_model(name: str, mesh: Facets) -> rhino3dm.File3dm:
+    """The mesh as Rhino keeps it."""
+    out = rhino3dm.Mesh()
+    for x, y, z in mesh.points.tolist():
+        out.Vertices.Add(x, y, z)
+    for face in mesh.faces.tolist():
+        out.Faces.AddFace(*face)
+    model = rhino3dm.File3dm()
+    model.Settings.ModelUnitSystem = rhino3dm.UnitSystem.Meters
+    attributes = rhino3dm.ObjectAttributes()
+    attributes.Name = name
+    model.Objects.Add(out, attributes)
+    return model
+
+
 def make(folder: Path) -> None:
     """Writes NAME.json and NAME.3dm of every sample."""
     for surface, request in requests():
         name = request["name"]
         text = json.dumps(request, separators=(",", ":")) + "\n"
         (folder / f"{name}.json").write_text(text, encoding="utf-8", newline="\n")
-        rhino_model(name, surface).Write(str(folder / f"{name}.3dm"), 7)
+        model = mesh_model(name, surface) if isinstance(surface, Facets) else rhino_model(name, surface)
+        model.Write(str(folder / f"{name}.3dm"), 7)
 
 
 if __name__ == "__main__":

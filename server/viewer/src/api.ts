@@ -166,6 +166,7 @@ function upload(file: File): RequestInit {
 }
 
 export const FILES = [
-  "panels.obj", "panels.3dm", "panels.dxf", "panels.csv", "flat.dxf",
+  "panels.obj", "panels.3dm", "panels.dxf", "panels.csv",
+  "panels.ifc", "panels.glb", "cutting-list.csv", "flat.dxf",
   "domain.svg", "domain.dxf", "panels.png", "result.json", "result.npz",
 ];

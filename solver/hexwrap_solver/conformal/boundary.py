@@ -11,11 +11,7 @@ from hexwrap_solver.arrays import Floats
 from hexwrap_solver.conformal.types import Cones, Targets
 from hexwrap_solver.errors import BoundaryError
 from hexwrap_solver.surface.types import Surface
-
-#: A cone angle this near to a multiple of π/6 (that holds all quanta) is that multiple: sums of many angles
-#: carry rounding, and g must be an exact symmetry of the pattern. Near 0 the domain is a cylinder.
-SNAP = 1e-9
-
+from hexwrap_solver.tolerances import ANGLE
 
 #: What a loop may be asked for: prescribed angle sums (k,), u = 0 (the angles come out), or a prescribed
 #: curvature Σκ with u constant on the loop.
@@ -105,9 +101,11 @@ def curvatures(targets: Targets, sums: Floats, surface: Surface, cones: Cones | 
 
 
 def snapped(angle: float) -> float:
-    """The cone angle without rounding, see SNAP."""
+    """The cone angle without rounding: a multiple of π/6, which holds all quanta, that is as good as it.
+
+    g must be an exact symmetry of the pattern."""
     nearest = nearest_multiple(angle, np.pi / 6)
-    return nearest if abs(angle - nearest) < SNAP else angle
+    return nearest if abs(angle - nearest) < ANGLE else angle
 
 
 def nearest_multiple(angle: float, quantum: float) -> float:
@@ -155,6 +153,6 @@ def rounded_jointly(found: Floats, quantum: float, total: float) -> Floats:
     steps += np.bincount(order[np.arange(abs(missing)) % len(found)], minlength=len(found)) * np.sign(missing)
     rounded = steps * quantum
     rest = total - float(rounded.sum())
-    if abs(rest) > SNAP:
+    if abs(rest) > ANGLE:
         rounded[-1] += rest
     return np.asarray(rounded)

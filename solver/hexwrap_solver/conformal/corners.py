@@ -22,6 +22,8 @@ from hexwrap_solver.conformal.types import (
 from hexwrap_solver.errors import BoundaryError, GaussBonnetError, SingularitiesError
 from hexwrap_solver.surface.types import Surface
 
+#: A point belongs to the boundary up to this part of its size away, or up to its longest edge.
+FAR = 0.02
 #: Equation (1) may miss by this much in total, radians: angles are often typed with four digits.
 GAUSS_BONNET_TOLERANCE = 1e-3
 
@@ -203,7 +205,20 @@ def _nearest(surface: Surface, points: Floats, entries: Ints, field: list[Field]
             field=(*field[bad[0]], "point"),
         )
     boundary = np.concatenate(surface.loops)
-    return np.asarray(boundary[cKDTree(surface.vertices[boundary]).query(points[entries])[1]])
+    at = surface.vertices[boundary]
+    distance, nearest = (np.asarray(x) for x in cKDTree(at).query(points[entries]))
+    steps = [np.linalg.norm(np.diff(surface.vertices[loop], axis=0), axis=1).max() for loop in surface.loops]
+    allowed = max(*steps, FAR * float(np.linalg.norm(np.ptp(at, axis=0))))
+    far = np.flatnonzero(distance > allowed)
+    if len(far):
+        entry = entries[far[0]]
+        place, foot = (", ".join(f"{x:.6g}" for x in p) for p in (points[entry], at[nearest[far[0]]]))
+        raise BoundaryError(
+            f"The point ({place}) is {distance[far[0]]:.4g} away from the boundary, whose nearest vertex "
+            f"stands at ({foot}): angles are for points on the boundary.",
+            field=(*field[entry], "point"),
+        )
+    return np.asarray(boundary[nearest])
 
 
 def _check_distinct(surface: Surface, placed: Ints, field: list[Field]) -> None:

@@ -16,11 +16,10 @@ from hexwrap_solver.conformal.net import Net
 from hexwrap_solver.conformal.types import Deck, Unrolled
 from hexwrap_solver.surface.topology import next_half_edge
 from hexwrap_solver.surface.types import Surface
+from hexwrap_solver.tolerances import is_zero
 
 Numbers = TypeVar("Numbers", Floats, Complexes)
 
-#: Cone angles nearer than this to a multiple of 2π count as one: g is a translation (see Deck).
-FULL_TURN = 1e-9
 #: An apex further away than this many times the size of the domain is not made the origin: coordinates would
 #: lose the digits in which they agree.
 FAR = 100.0
@@ -160,9 +159,10 @@ def _glue(surface: Surface, corners: Complexes, cut: Cut, angle: Floats) -> _Glu
     # At both ends of every edge of the cut, the corners to its left and to its right, each pair of fans once.
     corner = np.stack([cut.left, next_half_edge(cut.left)], axis=1).ravel()
     opposite = np.stack([next_half_edge(right), right], axis=1).ravel()
-    _, first = np.unique(cut.fan[corner] * fans + cut.fan[opposite], return_index=True)
-    once = np.sort(first)
-    vertex = surface.faces.ravel()[corner[once]]
+    vertex = surface.faces.ravel()[corner]
+    pair = (vertex * fans + cut.fan[corner]) * fans + cut.fan[opposite]
+    once = np.sort(np.unique(pair, return_index=True)[1])
+    vertex = vertex[once]
     one, other = cut.fan[corner[once]], cut.fan[opposite[once]]
     piece = np.repeat(cut.piece, 2)[once]
     turn = np.exp(1j * angle)
@@ -245,7 +245,7 @@ def normalise(
         length = abs(deck.angle) * radius if around else _loop_length(surface, uv, sheet, deck)
         moved, deck = _upright(uv, deck, foot) if far else _about(apex, uv, deck, foot)
         return moved, deck, length
-    if abs(deck.angle) < FULL_TURN:
+    if is_zero(deck.angle):
         moved, deck = _upright(uv, deck, foot)
         moved -= 1j * moved[loops[0]].imag.mean()
         return moved, Deck(deck.angle, complex(deck.translation.real)), abs(deck.translation)

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints
+from hexwrap_solver.surface.topology import next_half_edge
 
 #: Two images of an edge are one where they differ by less, relative to the domain's size.
 SAME = 1e-7
@@ -64,6 +65,18 @@ class Net:
     def apply(self, motion: Ints, z: Complexes) -> Complexes:
         """M(z) for arrays of motions and places."""
         return np.asarray(np.exp(1j * self.angle[motion]) * z + self.translation[motion])
+
+    def gap(self, twin: Ints) -> float:
+        """How far edges are from being one, seen from both their faces, over the diameter of the net. twin:
+        (3m,) half-edge on the other side, −1 at the boundary."""
+        h = np.flatnonzero(self.crossing.ravel() > 0)
+        if not len(h):
+            return 0.0
+        flat, motion, other = self.corners.ravel(), self.crossing.ravel()[h], twin[h]
+        start = self.apply(motion, flat[next_half_edge(other)]) - flat[h]
+        end = self.apply(motion, flat[other]) - flat[next_half_edge(h)]
+        size = 2 * float(np.abs(self.corners - self.corners.mean()).max())
+        return float(np.maximum(np.abs(start), np.abs(end)).max()) / size
 
     def moved(self, factor: complex, shift: complex) -> Net:
         """The same net after z ↦ factor · z + shift."""

@@ -56,8 +56,9 @@ def faithful(found: ConformalMap) -> bool:
 @dataclass(frozen=True)
 class DrawnErrors:
     """angle: how far the angles drawn at the boundary are off ``boundary_angles``, beyond the rounding of
-    corners, which short edges far from the origin cannot do without. turn: how far the loops are from turning
-    by their curvature, per √n of their n vertices: as single roundings add up."""
+    corners, which short edges far from the origin cannot do without. turn: how far the first loop of an
+    annulus is from turning by the cone angle, per √n of its n vertices, as single roundings add up; of other
+    nets, how far the edges across the cut are from closing, over the diameter."""
 
     angle: float
     turn: float
@@ -76,9 +77,10 @@ def _off_told(found: ConformalMap, sums: Floats) -> Floats:
 
 
 def _off_turn(found: ConformalMap, sums: Floats) -> float:
-    """Where the curvature is known from elsewhere: of loop 0 of an annulus."""
+    """Of annuli, how far loop 0 is from turning by the cone angle; of other nets, how far the edges across
+    the cut are from closing."""
     if isinstance(found.domain, Net):
-        return 0.0
+        return found.domain.gap(found.surface.twin)
     n = len(found.surface.loops[0])
     return abs(float((np.pi - sums[:n]).sum()) - found.deck.angle) / float(np.sqrt(n))
 

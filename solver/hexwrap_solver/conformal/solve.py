@@ -26,12 +26,16 @@ from hexwrap_solver.conformal.types import (
     Targets,
     Unrolled,
 )
-from hexwrap_solver.errors import SingularitiesError
+from hexwrap_solver.errors import ConvergenceError, SingularitiesError
 from hexwrap_solver.surface.holes import fill_openings
 from hexwrap_solver.surface.types import Surface
+from hexwrap_solver.tolerances import ANGLE
 
-#: Cone angles this near to a multiple of the quantum are one, radians.
-NOISE = 1e-9
+#: A cone angle this near to a multiple of π/6 is made one, radians, where the map does not come out with the
+#: angle as it is: its apex would lie so far away that coordinates lose the digits in which they differ.
+NEARLY = 1e-7
+#: Relative errors of boundary lengths that are told.
+TELLING = 1e-6
 NO_ANGLES = (
     "The boundary's mode is angles, but its list of angles is empty: every boundary angle is 180°, as with"
     " straight."
@@ -83,7 +87,7 @@ def check_cones(surface: Surface, cones: Cones) -> None:
         )
     if len(np.unique(cones.vertex)) < len(cones):
         raise SingularitiesError("Two singularities stand at one vertex of the mesh; place them apart.")
-    sharp = np.flatnonzero(cones.curvature >= 2 * np.pi - NOISE)
+    sharp = np.flatnonzero(cones.curvature >= 2 * np.pi - ANGLE)
     if len(sharp):
         raise SingularitiesError(
             f"Singularity {sharp[0]} has index {cones.index[sharp[0]]}, which would leave nothing of the "
@@ -111,9 +115,16 @@ def _isometric(
     total = boundary.gauss_bonnet(surface) - float(cones.curvature.sum())
     total -= sum(boundary.cone_angle(listed) for listed in angles if listed is not None)
     quantum = QUANTA.get(condition.quantum)
+    refusal: ConvergenceError | None = None
     if quantum is None or len(free) == 1:  # what Gauss–Bonnet leaves to a single loop cannot be rounded
-        found = map_to(surface, targets, cones, None, progress)
-        return found if quantum is None else scaled(found, -_mean_on(found, free))
+        try:
+            found = map_to(surface, targets, cones, None, progress)
+            found = replace(found, notes=(*found.notes, *_rim_notes(found, free)))
+            return found if quantum is None else scaled(found, -_mean_on(found, free))
+        except ConvergenceError as error:
+            if len(free) == 1:
+                raise
+            quantum, refusal = np.pi / 6, error
     plain = _plain(surface, targets, None, _part(progress, 0.0))
     first = plain.metric if plain.holds else metric_with_flips(surface, targets, progress, plain.start, cones)
     inserted = len(first.surface.vertices) - len(surface.vertices)
@@ -122,13 +133,38 @@ def _isometric(
     curvature = np.array([boundary.cone_angle(sums[i]) for i in free])
     curvature -= (curvature.sum() - total) / len(free)
     rounded = boundary.rounded_jointly(curvature, quantum, total)
+    if refusal is not None and np.abs(curvature - rounded).max() > NEARLY:
+        raise refusal
     asked = [first.targets.angle[loop] for loop in surface.loops]
     for i, K in zip(free, rounded, strict=True):
         asked[i] = float(K) if condition.spread == "optimal" else boundary.spread_evenly(sums[i], K)
     targets = boundary.targets(surface, asked, cones)
     second = map_to(surface, targets, cones, first.u, _part(progress, 0.5), flips=not plain.holds)
     second = with_inserted(scaled(second, -_mean_on(second, free)), inserted)
-    return replace(second, notes=(*_rounding_notes(surface, free, curvature, rounded), *second.notes))
+    notes = (*_rounding_notes(surface, free, curvature, rounded), *second.notes, *_rim_notes(second, free))
+    return replace(second, notes=notes)
+
+
+def _rim_notes(found: ConformalMap, loops: list[int]) -> tuple[str, ...]:
+    """How far edges of isometric loops are from their length, where flips have taken other edges for them."""
+    if not found.flips:
+        return ()
+    surface, u = found.surface, found.log_scale
+    on_loop = np.zeros(len(u), dtype=bool)
+    for i in loops:
+        on_loop[surface.loops[i]] = True
+    h = np.flatnonzero((surface.twin < 0) & on_loop[surface.faces.ravel()])
+    face, c = h // 3, h % 3
+    corners = found.corners()
+    drawn = np.abs(corners[face, (c + 1) % 3] - corners[face, c])
+    ends = surface.faces[face, c], surface.faces[face, (c + 1) % 3]
+    off = np.abs(np.log(drawn / surface.lengths.ravel()[h]) - (u[ends[0]] + u[ends[1]]) / 2)
+    if float(off.max(initial=0)) < TELLING:
+        return ()
+    return (
+        f"Where edges were flipped, those of the isometric boundary keep their lengths only to within "
+        f"{100 * np.expm1(off.max()):.2g} %.",
+    )
 
 
 def _part(progress: Progress, begin: float) -> Progress:
@@ -137,7 +173,7 @@ def _part(progress: Progress, begin: float) -> Progress:
 
 
 def _rounding_notes(surface: Surface, free: list[int], found: Floats, rounded: Floats) -> tuple[str, ...]:
-    changed = np.flatnonzero(np.abs(found - rounded) > NOISE)
+    changed = np.flatnonzero(np.abs(found - rounded) > ANGLE)
     if not len(changed):
         return ()
     if len(surface.loops) == 2 == len(free):

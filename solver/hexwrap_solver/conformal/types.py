@@ -14,6 +14,7 @@ from hexwrap_solver.conformal.net import Net
 from hexwrap_solver.errors import SettingError
 from hexwrap_solver.setting import Setting
 from hexwrap_solver.surface.types import Surface
+from hexwrap_solver.tolerances import is_whole_turn, is_zero
 
 AngleUnit = Literal["rad", "deg", "pi"]
 #: Radians of one unit.
@@ -171,7 +172,7 @@ class Deck:
     @property
     def is_translation(self) -> bool:
         """K a multiple of 2π (cylinders, and flat rings): g has no fixed point."""
-        return abs(self.reduced) < 1e-9
+        return is_whole_turn(self.angle)
 
     @property
     def reduced(self) -> float:
@@ -292,7 +293,7 @@ class ConformalMap:
     def kind(self) -> Literal["cylinder", "cone", "net"]:
         if isinstance(self.domain, Net):
             return "net"
-        return "cylinder" if abs(self.domain.deck.angle) < 1e-9 else "cone"
+        return "cylinder" if is_zero(self.domain.deck.angle) else "cone"
 
     @property
     def unrolled(self) -> Unrolled:

@@ -18,6 +18,9 @@ from hexwrap_solver.arrays import Bools, Floats, Ints
 LEAF = 160
 #: Steps that bring each cutting plane to its part's median.
 MEDIAN_STEPS = 3
+#: Where a plane leaves so much more than half of its part on one side, as happens where vertices were
+#: inserted in clusters, the median is found by sorting.
+LOPSIDED = 0.2
 #: Planes are found from about so many unknowns per part, and from one in four of all at most: a plane that is
 #: a little off costs nothing.
 SAMPLE, SHARE = 512, 4
@@ -119,7 +122,19 @@ def _planes(points: Floats, part: Ints, parts: int) -> tuple[Floats, Floats]:
     for _ in range(MEDIAN_STEPS):
         share = np.bincount(part, weights=along > threshold[part], minlength=parts) / weight
         threshold += (share - 0.5) * step
+    share = np.bincount(part, weights=along > threshold[part], minlength=parts) / weight
+    lopsided = np.abs(share - 0.5) > LOPSIDED
+    if lopsided.any():
+        threshold = np.where(lopsided, _medians(along, part, parts, threshold), threshold)
     return axis, threshold
+
+
+def _medians(along: Floats, part: Ints, parts: int, otherwise: Floats) -> Floats:
+    """(parts,) exact medians of the numbers (k,) of each part; ``otherwise`` where it has none."""
+    order = np.lexsort((along, part))
+    count = np.bincount(part, minlength=parts)
+    middle = np.minimum(np.cumsum(count) - count + (count - 1) // 2, len(order) - 1)
+    return np.where(count > 0, along[order[np.maximum(middle, 0)]], otherwise)
 
 
 def _on_thinner_side(half: Ints, level: int) -> Bools:

@@ -17,6 +17,7 @@ from scipy.linalg.blas import dgemv, dsyrk, dtrsm, dtrsv
 from scipy.linalg.lapack import dpotrf
 
 from hexwrap_solver.arrays import Floats, Ints
+from hexwrap_solver.errors import ConvergenceError
 from hexwrap_solver.linalg.dissection import Dissection, dissect
 from hexwrap_solver.linalg.workspace import borrow
 
@@ -25,6 +26,9 @@ from hexwrap_solver.linalg.workspace import borrow
 LARGE = 8000
 #: Adding one slice costs as much as adding this many entries one by one.
 ENTRIES_PER_SLICE = 600
+#: A factor of more numbers than this, for all and for each unknown, is not begun: meshes of a surface need
+#: some 60 for each of a million vertices.
+MOST, MOST_EACH = 50_000_000, 300
 
 
 class _Front(NamedTuple):
@@ -67,7 +71,13 @@ class Factorisation:
         low, high = np.minimum(one, other), np.maximum(one, other)
         self._fronts, visits, stacks = _analyse(tree, low, high)
         size, self._diagonal_at, self._off_diagonal_at = self._addresses(low, high)
-        memory = borrow(size + sum(stacks), self)
+        needed = size + sum(stacks)
+        if needed > MOST + MOST_EACH * self.n:
+            raise ConvergenceError(
+                f"The equations of {self.n} unknowns would take {8e-9 * needed:.1f} GB to solve: the mesh "
+                "joins distant places by single edges or vertices; remesh it more evenly."
+            )
+        memory = borrow(needed, self)
         self._factor, *self._stacks = np.split(memory, np.cumsum([size, *stacks])[:-1])
         self._visits = visits
         self._blocks = [self._block(front) for front in self._fronts]
@@ -216,7 +226,26 @@ def _distinct(keys: Ints) -> Ints:
 
 def _analyse(tree: Dissection, low: Ints, high: Ints) -> tuple[list[_Front], list[int], list[int]]:
     """Fronts in elimination order (deepest level first), with the boundaries that elimination creates; the
-    order in which to visit them; and the sizes of the two stacks of updates."""
+    order in which to visit them; and the sizes of the two stacks of updates.
+
+    Node k of the tree has the front nodes − 1 − k, so that children come before parents and front i's own
+    unknowns are [start[i], start[i + 1]) in the order of elimination. Eliminating them joins all unknowns
+    that they touch and that are not eliminated yet: the front's boundary. By the choice of separators
+    these lie in ancestors of the node. So
+
+        boundary(i) = (neighbours of own(i) in the matrix  ∪  boundaries of both children)  −  own(i),
+
+    which is found level by level, for all fronts of a level at once: a set of pairs (front, unknown) is one
+    sorted array of keys front · n + unknown; the union sorts two such arrays together and drops what occurs
+    twice. What a front hands on to its parent are the keys whose unknown the parent does not own, with the
+    parent's number in front. An entry of the matrix between unknowns low < high belongs to the front that
+    owns low; it starts a boundary entry where another front owns high. (The entries of one front's own
+    block need no key: the block is dense.)
+
+    Of each front's boundary, those owned by the parent come first, as its unknowns are eliminated before
+    all of its own boundary: so one number, ``split``, says where the part that goes into the parent's own
+    rows (``into_own``) ends and the part that goes into its boundary (``into_rest``) begins.
+    """
     n = len(tree.order)
     nodes = len(tree.start) - 1
     size = np.diff(tree.start)

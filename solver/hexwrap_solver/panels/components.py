@@ -141,7 +141,7 @@ def _solids(outline: Ragged, normal: Floats, thickness: float) -> tuple[Ragged, 
     sides = np.stack([local, following, following + n, local, following + n, local + n], axis=1).reshape(
         -1, 2, 3
     )
-    corners = _triangles(outline, normal)
+    corners = triangulated(outline, normal)
     row, inner = outline.row, np.repeat(np.arange(outline.n_rows), count - 2)
     lower, upper = corners[:, ::-1], corners + count[inner][:, None]
     owner = np.concatenate([np.repeat(row, 2), inner, inner])
@@ -151,7 +151,7 @@ def _solids(outline: Ragged, normal: Floats, thickness: float) -> tuple[Ragged, 
     return Ragged(vertices, 2 * offsets), Ragged(triangles[order].ravel(), face_offsets)
 
 
-def _triangles(outline: Ragged, normal: Floats) -> Ints:
+def triangulated(outline: Ragged, normal: Floats) -> Ints:
     """(·, 3) each outline cut into n − 2 triangles, row by row, by numbers of its corners.
 
     Fans from the corner with the greatest interior angle; outlines with several reflex corners, which no fan

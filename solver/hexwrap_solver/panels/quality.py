@@ -106,7 +106,7 @@ def _bare_note(pattern: Pattern, share: float) -> tuple[str, ...]:
     if share >= 1 - BARE:
         return ()
     trim = "; with boundary 'trim' cells reach its edges" if pattern.whole.all() else ""
-    return (f"The cells take up {share:.0%} of the surface, and coverage is a share of the cells{trim}.",)
+    return (f"Cells cover {share:.0%} of the surface; coverage is relative to them{trim}.",)
 
 
 def _movement(pattern: Pattern, panels: Panels) -> float:

@@ -145,9 +145,12 @@ def _least_worst(
     """Starts of the classes with the least greatest loss, and that loss; found, high: any that will do."""
     low = 0.0
     while low < high:
-        starts, reached, more = _greedy(length, floored, low if low == 0 else (low + high) / 2, classes)
+        middle = low if low == 0 else (low + high) / 2
+        if low and not low < middle < high:  # neighbouring floating-point numbers
+            break
+        starts, reached, more = _greedy(length, floored, middle, classes)
         if starts is None:
-            low = more
+            low = max(more, middle)  # more may be rounded down
         else:
             found, high = starts, reached
     return found, high

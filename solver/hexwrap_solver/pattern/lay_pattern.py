@@ -33,6 +33,7 @@ from hexwrap_solver.pattern.lay.nodes import Nodes, find_nodes
 from hexwrap_solver.pattern.place.choose import Placing
 from hexwrap_solver.pattern.place.placement import Placement, anchor_vertex, edge_angle
 from hexwrap_solver.pattern.place.rotation import with_rotation
+from hexwrap_solver.pattern.place.sense import check_edge, too_many
 from hexwrap_solver.pattern.place.size import ASKED, fitting_number
 from hexwrap_solver.pattern.trim.arrangement import Points
 from hexwrap_solver.pattern.trim.boundary import Boundary, boundary_of
@@ -60,6 +61,7 @@ def lay_pattern(cmap: ConformalMap, settings: PatternSettings, progress: Progres
     Raises NotAdaptedError where the cone angle does not suit the kind of pattern, PatternError where the
     cells are too many (``settings.max_cells``) or too large to close up around the surface.
     """
+    check_edge(cmap, settings)
     lattice = LATTICES[settings.kind]
     settings, notes = with_rotation(cmap, lattice, settings)
     placing = Placing.of(cmap, lattice, settings)
@@ -159,11 +161,7 @@ def _check_count(cmap: ConformalMap, layout: Layout, settings: PatternSettings) 
             data={"cells": cells, "limit": settings.max_cells},
         )
     if cells > settings.max_cells:
-        raise PatternError(
-            f"About {cells:,.0f} cells would be needed, over the limit of {settings.max_cells:,}: ask for "
-            "a larger edge length or fewer cells around.",
-            data={"cells": int(cells), "limit": settings.max_cells},
-        )
+        raise too_many(cmap, settings, cells)
 
 
 def _finish(

@@ -22,7 +22,7 @@ LISTED = 1000
 
 
 def check_arrays(sent: SentMesh) -> None:
-    """Raises SurfaceError for empty or misshapen arrays, coordinates that are no finite numbers, faces
+    """Raises SurfaceError for empty or misshapen arrays, coordinates that are not finite numbers, faces
     with other than 3 or 4 corners, and indices out of range."""
     if sent.vertices.ndim != 2 or sent.vertices.shape[1] != 3 or sent.faces.values.ndim != 1:
         raise ShapeError(

@@ -40,7 +40,7 @@ class ShapeError(SurfaceError):
 
 class NonFiniteError(SurfaceError):
     slug = "not-finite"
-    title = "The surface has coordinates that are no finite numbers"
+    title = "The surface has coordinates that are not finite numbers"
 
 
 class IndexRangeError(SurfaceError):

@@ -131,7 +131,7 @@ def _pinched(faces: Ints, twin: Ints, n: int, names: SentNames) -> NonManifoldVe
     fans = np.unique(np.stack([faces.ravel(), fan], axis=1), axis=0)[:, 0]
     vertices = names.vertex[np.flatnonzero(np.bincount(fans, minlength=n) > 1)]
     return NonManifoldVertexError(
-        f"The surface touches itself in {_count(len(vertices), 'single vertex', 'single vertices')}, the "
+        f"The surface is non-manifold at {_count(len(vertices), 'vertex', 'vertices')}, the "
         f"first is vertex {vertices[0]}: faces must surround every vertex in one fan, so pull the parts "
         "apart there or join them along an edge.",
         vertices=vertices[:LISTED],

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from hexwrap_solver.arrays import Bools, Ints
 from hexwrap_solver.errors import SurfaceError
+from hexwrap_solver.surface.caps import caps_of, kept
 from hexwrap_solver.surface.checks import LISTED, check_arrays, check_extent
 from hexwrap_solver.surface.degenerate import flat, repair_flat
 from hexwrap_solver.surface.duplicates import first_of_equals
 from hexwrap_solver.surface.errors import DegeneratePolygonError, NotOrientableError
+from hexwrap_solver.surface.features import chained, folds
 from hexwrap_solver.surface.genus import (
     SentNames,
     check_connected,
@@ -23,15 +25,24 @@ from hexwrap_solver.surface.normals import sent_normals
 from hexwrap_solver.surface.orient import flipped
 from hexwrap_solver.surface.topology import vertex_normals
 from hexwrap_solver.surface.triangulate import triangulate
-from hexwrap_solver.surface.types import SentMesh, Surface, Triangles
+from hexwrap_solver.surface.types import (
+    Feature,
+    FeatureSettings,
+    SentMesh,
+    Surface,
+    SurfaceSettings,
+    Triangles,
+)
 from hexwrap_solver.surface.weld import TOLERANCE, relabelled, weldings
 
 
-def surface_from_mesh(sent: SentMesh) -> Surface:
+def surface_from_mesh(sent: SentMesh, settings: SurfaceSettings | None = None) -> Surface:
     """The surface that a sent mesh describes, repaired as far as that leaves its shape alone.
 
+    Flat caps of a closed mass are taken off, and creases found, as the settings say.
     Vertices keep the order in which they were sent. Raises SurfaceError: one child of it per way to fail.
     """
+    settings = settings or SurfaceSettings()
     check_arrays(sent)
     vertices = np.ascontiguousarray(sent.vertices, dtype=float)
     triangles, polygon = triangulate(vertices, sent.faces)
@@ -42,7 +53,7 @@ def surface_from_mesh(sent: SentMesh) -> Surface:
     mesh = Triangles(vertices, triangles)
     for label in weldings(mesh, TOLERANCE * size):
         try:
-            return _build(sent, mesh, polygon, label)
+            return _build(sent, mesh, polygon, label, settings)
         except NotOrientableError:  # without the weld at its seam a Möbius band would pass for a strip
             raise
         except SurfaceError as error:  # less welding may help; where it does not, the fullest one's is told
@@ -78,7 +89,7 @@ class _Draft:
             self.faces, self.polygon = self.faces[keep], self.polygon[keep]
 
 
-def _build(sent: SentMesh, mesh: Triangles, polygon: Ints, label: Ints) -> Surface:
+def _build(sent: SentMesh, mesh: Triangles, polygon: Ints, label: Ints, settings: SurfaceSettings) -> Surface:
     """The surface that comes of one way of welding: label (n,) the lowest vertex each one is welded to."""
     vertices, n = mesh.vertices, len(mesh.vertices)
     draft = _Draft(relabelled(mesh, label), polygon, [])
@@ -97,6 +108,8 @@ def _build(sent: SentMesh, mesh: Triangles, polygon: Ints, label: Ints) -> Surfa
     check_edges(draft.faces, *draft.mesh.edge_groups, names)
     _orient(draft, names)
     _flatten(draft)
+    if settings.caps == "drop":
+        _uncap(draft)
 
     index = np.flatnonzero(_mark(draft.faces, n))
     new = np.full(n, -1, dtype=np.int64)
@@ -106,11 +119,48 @@ def _build(sent: SentMesh, mesh: Triangles, polygon: Ints, label: Ints) -> Surfa
     stand = np.where(used, new[label], -1)
     normals = vertex_normals(vertices[index], faces)
     if sent.normals is not None:
-        normals, sentence = sent_normals(normals, sent.normals, stand)
+        own = normals
+        normals, sentence = sent_normals(own, sent.normals, stand)
         draft.repairs.extend(sentence)
+        if sent.creases is not None:  # one sent normal for both sides, of which one may be gone with a cap
+            crease = stand[np.unique(sent.creases)]
+            crease = crease[crease >= 0]
+            normals[crease] = own[crease]
     # Leaving out vertices keeps the order of the others, and so that of the edges.
     repairs = tuple(draft.repairs)
-    return Surface(vertices[index], faces, loops, index, stand, normals, repairs).knowing(draft.mesh)
+    surface = Surface(vertices[index], faces, loops, index, stand, normals, repairs).knowing(draft.mesh)
+    return replace(surface, features=_features(surface, sent, settings)).knowing(draft.mesh)
+
+
+def _features(surface: Surface, sent: SentMesh, settings: SurfaceSettings) -> tuple[Feature, ...]:
+    """Creases that were sent, else the folds of the mesh; in any case inside the surface."""
+    asked = (settings.features or FeatureSettings()).angle
+    if sent.creases is not None and sent.fold is not None:
+        edges, fold = surface.vertex_of_input[sent.creases], sent.fold
+        inner = (edges >= 0).all(axis=1) & (edges[:, 0] != edges[:, 1])
+        edges, fold = edges[inner], fold[inner]
+    elif asked is None:
+        return ()
+    else:
+        edges, fold = folds(surface, np.deg2rad(asked))
+    rim = np.zeros(len(surface.vertices), dtype=bool)
+    for loop in surface.loops:
+        rim[loop] = True
+    # Edges of the boundary are no creases; nor are edges that a repair has taken out of the mesh.
+    low, high = surface.edge_ends
+    n = len(surface.vertices)
+    inside = (low * n + high)[np.diff(surface.edge_groups[1]) == 2]
+    keep = np.isin(edges.min(axis=1) * n + edges.max(axis=1), inside)
+    return chained(surface.vertices, edges[keep], fold[keep], rim)
+
+
+def _uncap(draft: _Draft) -> None:
+    """Takes flat caps off a closed mass. The closed surface is kept where that would tear it apart."""
+    chosen, sentence = caps_of(draft.mesh)
+    if chosen:
+        keep = kept(draft.mesh, chosen)
+        draft.repairs.append(sentence)
+        draft.faces, draft.polygon = draft.faces[keep], draft.polygon[keep]
 
 
 def _mark(faces: Ints, n: int) -> Bools:

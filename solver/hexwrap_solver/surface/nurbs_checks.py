@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from hexwrap_solver.arrays import Floats
-from hexwrap_solver.surface.checks import check_extent, check_finite
+from hexwrap_solver.surface.checks import LARGEST, SMALLEST, check_extent, check_finite
 from hexwrap_solver.surface.errors import HandlesError, NotClosedError, NurbsDataError, PoleError
 from hexwrap_solver.surface.nurbs import domain, evaluate_points
 from hexwrap_solver.surface.types import NurbsSurface
@@ -68,10 +68,10 @@ def check_data(nurbs: NurbsSurface) -> None:
             field=("control_points",),
         )
     check_finite(net.reshape(-1, 4), "Control point", ("control_points",))
-    if not (net[..., 3] > 0).all():
-        i, j = np.argwhere(~(net[..., 3] > 0))[0]
+    if not (net[..., 3] >= SMALLEST).all():
+        i, j = np.argwhere(~(net[..., 3] >= SMALLEST))[0]
         raise NurbsDataError(
-            f"Control point [{i}][{j}] has the weight {net[i, j, 3]:g}: weights must be positive.",
+            f"Control point [{i}][{j}] has the weight {net[i, j, 3]:g}: at least {SMALLEST:g} is needed.",
             field=("control_points", int(i), int(j), 3),
         )
     for direction in (0, 1):
@@ -98,6 +98,11 @@ def _check_knots(nurbs: NurbsSurface, direction: int) -> None:
         raise wrong(f"The knots in {name} must be finite numbers that never decrease.")
     if not knots[n] > knots[p]:
         raise wrong(f"The domain in {name}, from knot {p} to knot {n}, is empty.")
+    if np.abs(knots).max() > LARGEST or knots[n] - knots[p] < SMALLEST:
+        raise wrong(
+            f"The knots in {name} run from {knots[p]:g} to {knots[n]:g}: they must lie within ±{LARGEST:g} "
+            f"and span at least {SMALLEST:g}."
+        )
     inner = knots[(knots > knots[p]) & (knots < knots[n])]
     torn = [x for x, count in zip(*np.unique(inner, return_counts=True), strict=True) if count > p]
     if torn:

@@ -14,6 +14,7 @@ from hexwrap_solver.surface.closest import TriangleTree
 from hexwrap_solver.surface.topology import edge_groups, edge_lengths, half_edges, twins_of
 
 Openings = Literal["cut", "loop"]
+Caps = Literal["drop", "keep"]
 
 
 @dataclass(frozen=True)
@@ -21,11 +22,15 @@ class SentMesh:
     """A polygon mesh as it was sent, nothing checked yet.
 
     vertices: (n, 3). faces: rows of 3 or 4 vertex indices. normals: (n, 3), any length, or None.
+    creases: (k, 2) vertex pairs, edges at which the exact surface folds, and fold: (k,) by how much, radians;
+    None where that is to be seen from the mesh.
     """
 
     vertices: Floats
     faces: Ragged
     normals: Floats | None = None
+    creases: Ints | None = None
+    fold: Floats | None = None
 
 
 @dataclass(frozen=True)
@@ -48,9 +53,22 @@ class MeshSettings:
 
 
 @dataclass(frozen=True)
+class FeatureSettings:
+    """Which edges of the mesh are lines of the pattern."""
+
+    angle: Annotated[
+        float | None,
+        Setting(
+            "mesh edges that fold by more are lines of the pattern; null: none", ge=1, lt=180, unit="degrees"
+        ),
+    ] = 30.0
+
+
+@dataclass(frozen=True)
 class SurfaceSettings:
     """How a sent surface is taken in.
 
+    caps ``drop``: flat caps of a closed mass are taken off. ``keep``: the closed surface is meant.
     openings ``cut``: loops beyond the two longest are filled smoothly, mapped as wall, and cut out again.
     ``loop``: each is a boundary of its own.
     """
@@ -59,6 +77,10 @@ class SurfaceSettings:
     openings: Annotated[
         Openings, Setting("what loops beyond the two longest are: holes to cut out, or boundaries")
     ] = "cut"
+    caps: Annotated[Caps, Setting("flat caps of a closed mass: taken off, or kept")] = "drop"
+    features: Annotated[
+        FeatureSettings | None, Setting("lines that the pattern follows; null: as by default", rare=True)
+    ] = None
     unit: Annotated[
         Literal["m", "cm", "mm", "ft", "in"] | None,
         Setting("unit of lengths; a file's own, where it has one, if it is not given"),
@@ -137,6 +159,19 @@ class Triangles:
 
 
 @dataclass(frozen=True)
+class Feature:
+    """A line along which the surface folds, from a junction, a corner or the boundary to the next.
+
+    vertices: (k,) of the mesh, neighbours joined by edges; a closed line ends where it begins. fold: mean
+    angle between the faces beside it, radians.
+    """
+
+    vertices: Ints
+    fold: float
+    closed: bool
+
+
+@dataclass(frozen=True)
 class Surface(Triangles):
     """A triangle mesh of genus 0: connected, oriented, manifold, without handles.
 
@@ -147,6 +182,7 @@ class Surface(Triangles):
     vertex_of_input: (n_sent,) the vertex at which each sent vertex stands, or −1 where it was dropped.
     normals: (n, 3) unit vertex normals (sent ones, the NURBS surface's, or area-weighted face normals).
     repairs: one sentence each.
+    features: creases of the surface as chains of mesh edges.
     openings: so many loops, the last ones, are openings of the wall: the map is found with them filled, and
     they are cut out of it. patch: (m,) on a filled surface, the faces that fill openings; None if there
     are none.
@@ -164,6 +200,7 @@ class Surface(Triangles):
     parameters: Floats | None = None
     openings: int = 0
     patch: Bools | None = None
+    features: tuple[Feature, ...] = ()
     unit: str | None = None
     origin: Origin = field(default_factory=Origin)
 

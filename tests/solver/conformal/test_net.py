@@ -169,3 +169,15 @@ def test_noisy_surfaces_need_flips_and_get_them() -> None:
         found = conformal_map(noisy, BoundaryCondition("isometric", quantum="hex"), cones=cones)
         check(found)
         assert found.flips > 100
+
+
+def test_cones_side_by_side() -> None:
+    """Paths of a single edge, whose both ends are cones of one fan each."""
+    z, faces = disk(8)
+    surface = sent(flat(z), faces)
+    for index in ([1, -1], [-1, 1], [1, 1, -1]):
+        ring = np.array([0, 1, 8][: len(index)])
+        found = conformal_map(
+            surface, BoundaryCondition("isometric", quantum="hex"), cones=Cones.at(ring, np.array(index), HEX)
+        )
+        check(found)

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial import Delaunay
 
 from hexwrap_solver.arrays import Floats, Ints
 from hexwrap_solver.conformal.boundary import constant_on_loops, straight
 from hexwrap_solver.conformal.energy import Energy
+from hexwrap_solver.errors import ConvergenceError
 from hexwrap_solver.linalg.dissection import LEAF, dissect
 from hexwrap_solver.linalg.factor import Factorisation
 from tests.solver.conformal.annuli import bump
@@ -48,7 +50,9 @@ def test_random_graphs(n: int, seed: int, tied: bool) -> None:
 @pytest.mark.parametrize("tied", [False, True])
 def test_hessians(tied: bool) -> None:
     surface = bump(60, 30)
-    energy = Energy(surface, constant_on_loops(surface, [0.0, -np.pi / 3]) if tied else straight(surface))
+    energy = Energy(
+        surface, constant_on_loops(surface, (-np.pi / 3, np.pi / 3)) if tied else straight(surface)
+    )
     diagonal, off_diagonal = energy.hessian(energy.corners(np.zeros(energy.n)))
     factorisation = Factorisation(energy.points, energy.rows, energy.columns)
     factorisation.factorise(diagonal, off_diagonal)
@@ -95,3 +99,31 @@ def test_what_stood_in_the_memory_before_does_not_matter() -> None:
         solutions.append(factorisation.solve(right))
     for solution in solutions[1:]:
         np.testing.assert_array_equal(solution, solutions[0])
+
+
+def test_clusters_of_unknowns_are_halved_as_well() -> None:
+    """Inserted vertices come in clusters of ever smaller size; planes through a mean would leave them
+    whole."""
+    random = np.random.default_rng(4)
+    spread = random.uniform(-1, 1, (2_000, 2))
+    centre = np.repeat(random.uniform(-1, 1, (5, 2)), 2_000, axis=0)
+    size = 10.0 ** random.uniform(-9, -1, len(centre))
+    flat = np.concatenate([spread, centre + size[:, None] * random.standard_normal(centre.shape)])
+    triangles = Delaunay(flat).simplices
+    sides = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    pairs = np.unique(np.sort(sides), axis=0)
+    points = np.column_stack([flat, np.zeros(len(flat))])
+    tree = dissect(points, pairs[:, 1], pairs[:, 0])
+    assert np.diff(tree.start).max() < 4 * LEAF
+    Factorisation(points, pairs[:, 1], pairs[:, 0])
+
+
+def test_what_would_take_all_memory_is_refused() -> None:
+    """Every unknown joined to every other one: a dense matrix of 1.6 GB."""
+    n = 20_000
+    random = np.random.default_rng(0)
+    rows = np.repeat(np.arange(n), 12)
+    columns = random.integers(0, n, len(rows))
+    apart = rows != columns
+    with pytest.raises(ConvergenceError, match="GB to solve"):
+        Factorisation(random.standard_normal((n, 3)), rows[apart], columns[apart])

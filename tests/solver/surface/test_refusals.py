@@ -26,6 +26,7 @@ from hexwrap_solver.surface.errors import (
     SeveralComponentsError,
     ShapeError,
 )
+from hexwrap_solver.surface.types import SurfaceSettings
 from tests.solver.surface.shapes import mesh, triangles, tube
 
 
@@ -216,7 +217,7 @@ def test_any_number_of_loops_the_longest_first() -> None:
     ends = [np.arange(7), 35 + np.arange(7)]
     caps = [[end[0], end[k], end[k + 1]] for end in ends for k in range(1, 6)]
     triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]], caps])
-    assert surface_from_mesh(mesh(vertices, triangles)).loops == ()
+    assert surface_from_mesh(mesh(vertices, triangles), SurfaceSettings(caps="keep")).loops == ()
 
 
 def test_the_reported_indices_are_the_sent_ones() -> None:

@@ -11,18 +11,22 @@ from typing import Any
 
 import numpy as np
 
-from hexwrap_server.http.hops.components import COMPONENTS, LIFT, PANELS, HopsError
+from hexwrap_server.errors import HopsError
+from hexwrap_server.http.hops.components import COMPONENTS, LIFT, PANELS
 from hexwrap_server.http.hops.values import output, read_inputs
-from hexwrap_server.input.json_text import loads, packed
+from hexwrap_server.input.bodies import Body
+from hexwrap_server.input.json_text import loads
 from hexwrap_server.input.readers.drawing import Curve
 from hexwrap_server.input.readers.rhino import convert
 from hexwrap_server.input.readers.rhino_curves import rhino_curve
 from hexwrap_server.input.requests import ParsedRequest, SentSurface, Wanted
 from hexwrap_server.input.schemas import Request, parse_request
 from hexwrap_server.jobs.lift_curves import lift_curves
+from hexwrap_server.jobs.reading import kept
 from hexwrap_server.jobs.work import solution_at
 from hexwrap_server.jobs.worker import Report
 from hexwrap_server.output import wire
+from hexwrap_server.settings import Settings
 from hexwrap_solver.pipeline import Solution
 from hexwrap_solver.surface.brep import Brep
 from hexwrap_solver.surface.types import MeshSettings, SentMesh, SurfaceSettings
@@ -42,22 +46,22 @@ class Call:
     curves: tuple[Curve, ...] = ()
 
 
-def read_call(report: Report, text: bytes, max_vertices: int, max_panels: int) -> Call:
+def read_call(report: Report, body: Body, settings: Settings, folder: str) -> Call:
     """The body of POST /solve. Raises HopsError, FormError, UnreadableFileError."""
-    body = loads(text)
-    pointer = body.get("pointer") if isinstance(body, dict) else None
-    if not isinstance(body, dict) or not isinstance(pointer, str):
+    sent = loads(body.plain(settings.max_body_mib))
+    pointer = sent.get("pointer") if isinstance(sent, dict) else None
+    if not isinstance(sent, dict) or not isinstance(pointer, str):
         raise HopsError("The body must be an object with 'pointer' and 'values'.")
     pointer = "/" + pointer.split("//")[-1].partition("/")[2] if "//" in pointer else pointer
     if pointer not in COMPONENTS:
-        raise HopsError(f"There is no component at '{pointer[:100]}'; there are {', '.join(COMPONENTS)}.")
-    values, branch = read_inputs(COMPONENTS[pointer].inputs, body.get("values"))
+        raise HopsError(f"No component is at '{pointer[:100]}'; choose one of {', '.join(COMPONENTS)}.")
+    values, branch = read_inputs(COMPONENTS[pointer].inputs, sent.get("values"))
     if pointer == LIFT:
         curves = tuple(rhino_curve(curve) for curve in values["Curves"])
         return Call(pointer, tuple(branch), job=values["Job"].strip().rpartition("/")[2], curves=curves)
-    wanted = _wanted(values, max_vertices, max_panels)
-    surface = _surface(values["Mesh"], max_vertices)
-    return Call(pointer, tuple(branch), packed(Request("hops", surface, wanted)))
+    wanted = _wanted(values, settings.max_vertices, settings.max_panels)
+    surface = _surface(values["Mesh"], settings.max_vertices)
+    return Call(pointer, tuple(branch), kept(Request("hops", surface, wanted), folder))
 
 
 def _wanted(values: dict[str, Any], max_vertices: int, max_panels: int) -> Wanted:

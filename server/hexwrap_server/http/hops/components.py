@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from hexwrap_server.problems import HttpError
-
 #: What Hops takes for "as many as there are".
 MANY = 2**31 - 1
 
@@ -45,13 +43,6 @@ RESULT_TYPES = {
     "Point": "Rhino.Geometry.Point3d",
     "Text": "System.String",
 }
-
-
-class HopsError(HttpError):
-    """A call that does not fit the component."""
-
-    def __init__(self, detail: str) -> None:
-        super().__init__(422, "hops", "The call does not fit the component", detail)
 
 
 @dataclass(frozen=True)

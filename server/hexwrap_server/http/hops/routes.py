@@ -6,18 +6,17 @@ is the protocol of Rhino Compute. Only answers with status 200 are kept by Hops,
 
 from __future__ import annotations
 
-import asyncio
 from typing import TYPE_CHECKING
 
 from fastapi import APIRouter, Request
 from starlette.responses import Response
 
+from hexwrap_server.errors import HopsError, JobFailedError
 from hexwrap_server.http.answers import json_response
-from hexwrap_server.http.bodies import read_body
-from hexwrap_server.http.hops.components import COMPONENTS, LIFT, PANELS, HopsError
+from hexwrap_server.http.bodies import sent_body
+from hexwrap_server.http.hops.components import COMPONENTS, LIFT, PANELS
 from hexwrap_server.http.service import Service
 from hexwrap_server.jobs.store import Job
-from hexwrap_server.problems import HttpError
 from hexwrap_solver.errors import HexwrapError
 
 if TYPE_CHECKING:  # reading geometry is left to a worker; this process need not load what it takes
@@ -51,11 +50,10 @@ def hops_router() -> APIRouter:
 
 async def _solve(request: Request) -> Response:
     service: Service = request.app.state.service
-    settings = service.settings
-    body = await read_body(request, settings.max_body_mib)
-    call: Call = await service.reading(
-        "hexwrap_server.http.hops.calls:read_call", body, settings.max_vertices, settings.max_panels
-    )
+    async with sent_body(request) as body:
+        call: Call = await service.read(
+            "hexwrap_server.http.hops.calls:read_call", body, str(service.store.surfaces)
+        )
     if call.request is None:
         job = _finished(service.manager.get(call.job))
         answer = await service.errand(
@@ -73,9 +71,7 @@ async def _run(service: Service, call: Call) -> Job:
     """The finished job of a call. Raises HexwrapError."""
     parsed = call.request
     assert parsed is not None
-    if parsed.surface is not None:
-        await asyncio.to_thread(service.store.keep_surface, parsed.surface_id, parsed.surface)
-    job = service.manager.submit(parsed)
+    job = await service.manager.submit(parsed)
     return _finished(await service.manager.wait(job.id, PATIENCE))
 
 
@@ -88,5 +84,5 @@ def _finished(job: Job) -> Job:
     if job.status == "done":
         return job
     if job.status == "failed" and job.problem:
-        raise HttpError(job.problem["status"], "", job.problem["title"], job.problem["detail"])
+        raise JobFailedError(job.problem)
     raise HopsError(f"The job is {job.status}. Recompute to see whether it is done; it goes on meanwhile.")

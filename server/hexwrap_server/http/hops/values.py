@@ -11,7 +11,8 @@ from typing import Any
 
 import rhino3dm
 
-from hexwrap_server.http.hops.components import RESULT_TYPES, HopsError, Parameter
+from hexwrap_server.errors import HopsError
+from hexwrap_server.http.hops.components import RESULT_TYPES, Parameter
 
 
 def read_inputs(parameters: tuple[Parameter, ...], values: object) -> tuple[dict[str, Any], list[int]]:
@@ -22,7 +23,7 @@ def read_inputs(parameters: tuple[Parameter, ...], values: object) -> tuple[dict
     trees = _trees(values)
     unknown = trees.keys() - {p.name for p in parameters}
     if unknown:
-        raise HopsError(f"There is no input {sorted(unknown)[0]!r}; place the Hops component anew.")
+        raise HopsError(f"Unknown input {sorted(unknown)[0]!r}; place the Hops component anew.")
     found: dict[str, Any] = {}
     branch = [0]
     for number, parameter in enumerate(parameters):
@@ -62,7 +63,7 @@ def _branch(path: str) -> list[int]:
     try:
         return [int(word) for word in path.strip("{} ").split(";")]
     except ValueError:
-        raise HopsError(f"'{path[:40]}' is no path of a data tree.") from None
+        raise HopsError(f"'{path[:40]}' is not a path of a data tree.") from None
 
 
 def _is_null(item: Any) -> bool:
@@ -87,7 +88,7 @@ def _read(parameter: Parameter, item: Any) -> Any:
     except (ValueError, TypeError, KeyError, RuntimeError, OverflowError):
         decoded = None
     if decoded is None:
-        raise HopsError(f"{parameter.name}: an item is no {parameter.kind.lower()} that can be read.")
+        raise HopsError(f"{parameter.name}: an item cannot be read as a {parameter.kind.lower()}.")
     if not isinstance(decoded, _GEOMETRY[parameter.kind]):
         came, needed = type(decoded).__name__, _NEEDED[parameter.kind]
         raise HopsError(f"{parameter.name}: a {came} came, but {needed} is needed.")

@@ -1,1 +1,1 @@
-"""Readers of single file formats: bytes → SentMesh or NurbsSurface. They raise whatever they stumble over."""
+"""Readers of single file formats: bytes → SentMesh or NurbsSurface. They may raise any exception."""

@@ -1,4 +1,4 @@
-"""What a drawing holds, whatever file it came in."""
+"""What a drawing of any format holds."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from hexwrap_server.errors import DrawingError
 from hexwrap_solver.arrays import Floats
-from hexwrap_solver.errors import HexwrapError
 
 #: Arcs and splines become polylines at most this far from them, in parts of the drawing's size.
 FLATNESS = 1e-5
@@ -17,11 +17,6 @@ FLATNESS = 1e-5
 MOST_OBJECTS = 200_000
 #: Blocks within blocks, at most so deep.
 DEEPEST = 32
-
-
-class DrawingError(HexwrapError):
-    slug = "drawing"
-    title = "The drawing cannot be read"
 
 
 @dataclass(frozen=True)

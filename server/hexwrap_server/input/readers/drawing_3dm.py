@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import rhino3dm
 
-from hexwrap_server.input.readers.drawing import Drawing, DrawingError, curve, too_many
+from hexwrap_server.errors import DrawingError
+from hexwrap_server.input.readers.drawing import Drawing, curve, too_many
 from hexwrap_server.input.readers.rhino_curves import rhino_curve, xyz
 from hexwrap_server.input.readers.rhino_model import Model, Placed, TooManyObjectsError
 
@@ -14,7 +15,7 @@ def read_3dm_drawing(data: bytes) -> Drawing:
     """Visible points, point clouds and curves, blocks resolved. Raises DrawingError."""
     model = Model.read(data)
     if model is None:
-        raise DrawingError("The drawing is no Rhino file, or it is cut short.")
+        raise DrawingError("The drawing is not a Rhino file, or is truncated.")
     try:
         objects = model.objects()
     except TooManyObjectsError:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import csv
 import re
 
-from hexwrap_server.input.readers.drawing import Drawing, DrawingError, curve
+from hexwrap_server.errors import DrawingError
+from hexwrap_server.input.readers.drawing import Drawing, curve
 from hexwrap_server.input.readers.text import as_utf8
 
 _LINE_ENDS = re.compile(r"\r\n|\r|\n")
@@ -14,7 +15,7 @@ _SEPARATOR = re.compile(r"sep=(.)", re.IGNORECASE)
 _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 #: 1.234.567,8 and 1,234,567.8
 _GROUPED = re.compile(r"[+-]?\d{1,3}(?:([.,])\d{3})(?:\1\d{3})*([.,])\d+")
-#: What looks like a number although it is none was meant to be one, and is no heading.
+#: What looks almost like a number was meant to be one, and is not a heading.
 _NEARLY = re.compile(r"[+-]?[.,]?\d")
 
 

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hexwrap_server.errors import DrawingError
 from hexwrap_server.input.readers.drawing import (
     DEEPEST,
     FLATNESS,
     MOST_OBJECTS,
     Drawing,
-    DrawingError,
     curve,
     too_many,
 )
@@ -40,14 +40,14 @@ _CURVES = {
 def read_dxf(data: bytes) -> Drawing:
     """Points, curves, and outlines of areas in the model space, blocks resolved.
 
-    What is on layers that are off or frozen, and what is no curve, is left out. Raises DrawingError.
+    What is on layers that are off or frozen, and what is not a curve, is left out. Raises DrawingError.
     """
     try:
         document = _document(data)
     except DrawingError:
         raise
     except Exception as error:  # damaged structures show as any kind of error
-        raise DrawingError(f"The drawing is no DXF file, or it is damaged: {error}.") from None
+        raise DrawingError(f"The drawing is not a DXF file, or is damaged: {error}.") from None
     drawing = Drawing()
     hidden = {layer.dxf.name.lower() for layer in document.layers if layer.is_off() or layer.is_frozen()}
     paths: list[Any] = []
@@ -79,7 +79,7 @@ def _document(data: bytes) -> Document:
     binary = data.startswith(_BINARY)
     text = data if binary else _LINE_END.sub(b"\n", as_utf8(data))
     if not text[-_TAIL:].rstrip(b"\0\r\n\t \x1a").upper().endswith(b"EOF"):
-        raise DrawingError("The drawing is no DXF file, or it is cut short: it does not end with EOF.")
+        raise DrawingError("The drawing is not a DXF file, or is truncated: it does not end with EOF.")
     if binary:
         return Document.load(binary_tags_loader(data, errors="surrogateescape"))
     return recover.read(io.BytesIO(text.strip() + b"\n"))[0]
@@ -98,7 +98,7 @@ class _Budget:
 
 
 def _resolved(entities: Iterable[Any], drawing: Drawing, budget: _Budget, depth: int) -> Iterator[Any]:
-    """Entities that are no block references, wherever they stand; multilines as the lines they show."""
+    """Entities other than block references, at any depth; multilines as the lines they show."""
     for entity in entities:
         kind = entity.dxftype()
         if kind == "INSERT":

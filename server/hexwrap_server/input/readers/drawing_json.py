@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 
-from hexwrap_server.input.readers.drawing import Drawing, DrawingError, curve
+from hexwrap_server.errors import DrawingError
+from hexwrap_server.input.readers.drawing import Drawing, curve
 from hexwrap_server.input.readers.text import as_utf8
 
 

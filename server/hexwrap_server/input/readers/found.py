@@ -1,4 +1,4 @@
-"""What a file holds, whatever its format: objects that can be chosen, its unit and its tolerance."""
+"""What a file of any format holds: objects that can be chosen, its unit and its tolerance."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class FileContent:
     the format has none. others: what else is there, by kind.
 
     mesh, owner: where the objects are faces (m,) of one table of vertices, the whole table; its vertices keep
-    their numbers whatever is chosen. is_whole: the mesh is one object, and known to be one piece.
+    their numbers, independent of the choice. is_whole: the mesh is one object, and known to be one piece.
     """
 
     objects: tuple[Found, ...]
@@ -66,7 +66,7 @@ def of_mesh(mesh: SentMesh, names: Sequence[tuple[str, str]] = (), owner: Ints |
     """
     try:
         check_arrays(mesh)
-    except SurfaceError:  # told when the mesh is taken in
+    except SurfaceError:  # reported when the mesh is taken in
         return FileContent((_object("0", "", mesh),), mesh=mesh, owner=_none(mesh), is_whole=True)
     if owner is not None and len(names) > 1:
         parts = [only(mesh, np.flatnonzero(owner == i)) for i in range(len(names))]

@@ -51,7 +51,7 @@ def _array(archive: zipfile.ZipFile, name: str) -> np.ndarray[Any, np.dtype[Any]
         shape, _, dtype = read_header(stream)
         header = stream.tell()
     if dtype.kind not in "iuf" or header + int(np.prod(shape, dtype=object)) * dtype.itemsize != size:
-        raise UnreadableFileError(f"The array {name} is no plain array of numbers, or it is cut short.")
+        raise UnreadableFileError(f"The array {name} is not a plain array of numbers, or is truncated.")
     with archive.open(name) as stream:
         return np.asarray(npy.read_array(stream, allow_pickle=False))
 

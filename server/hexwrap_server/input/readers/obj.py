@@ -20,7 +20,7 @@ _OTHERS = {b"surf": "NURBS surfaces", b"curv": "curves", b"l": "lines", b"p": "p
 
 
 def read_obj(data: bytes) -> FileContent:
-    """Every ``v`` and ``f`` of the file; its objects, or else its groups, can be told apart.
+    """Every ``v`` and ``f`` of the file; its objects, or else its groups, remain separate.
 
     Raises UnreadableFileError.
     """
@@ -85,7 +85,7 @@ def _checked(named: Ints, before: Ints, n: int, lengths: Ints) -> Ints:
         face = int(np.searchsorted(np.cumsum(lengths), wrong[0], side="right"))
         raise UnreadableFileError(
             f"Face {face} of the OBJ file names vertex {named[wrong[0]]}, but the file holds {n}, counted "
-            f"from 1 ({len(wrong)} such corners in all): it is cut short or damaged, so export it again."
+            f"from 1 ({len(wrong)} such corners in all): it is truncated or damaged, so export it again."
         )
     return index
 

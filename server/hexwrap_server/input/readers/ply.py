@@ -75,7 +75,7 @@ def _head(data: bytes) -> tuple[str, list[_Element], bytes]:
         data = as_utf8(data)
     end = _END.search(data)
     if not data[:3].lower() == b"ply" or end is None:
-        raise UnreadableFileError("The file is no PLY file: it has no header from 'ply' to 'end_header'.")
+        raise UnreadableFileError("The file is not a PLY file: it has no header from 'ply' to 'end_header'.")
     start = end.end()
     if end[1] == b"\r\n" and b"\r\n" not in data[: end.start()]:
         start -= 1  # lines end with \r alone, and the first byte of the body happens to be a \n
@@ -226,7 +226,7 @@ def _places(body: bytes, at: int, element: _Element, order: str) -> tuple[Ints, 
 
 def _cut_short(element: _Element, held: int) -> UnreadableFileError:
     return UnreadableFileError(
-        f"The PLY file announces {element.count} rows of '{element.name}' but holds {held}: it is cut short "
+        f"The PLY file announces {element.count} rows of '{element.name}' but holds {held}: it is truncated "
         "or damaged, so export it again."
     )
 

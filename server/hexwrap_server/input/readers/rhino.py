@@ -27,7 +27,7 @@ def read_3dm(data: bytes) -> FileContent:
     """Raises UnreadableFileError."""
     model = Model.read(data)
     if model is None:
-        raise UnreadableFileError("The file is no Rhino file, or it is cut short: save it again from Rhino.")
+        raise UnreadableFileError("The file is not a Rhino file, or is truncated: save it again from Rhino.")
     try:
         placed = model.objects()
     except TooManyObjectsError:

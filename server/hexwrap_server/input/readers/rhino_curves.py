@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import rhino3dm
 
-from hexwrap_server.input.readers.drawing import FLATNESS, Curve, DrawingError, curve
+from hexwrap_server.errors import DrawingError
+from hexwrap_server.input.readers.drawing import FLATNESS, Curve, curve
 from hexwrap_solver.arrays import Floats
 
 #: Places within an interval of parameters where the curve is compared with its chord.

@@ -12,7 +12,7 @@ import rhino3dm
 
 from hexwrap_solver.arrays import Floats
 
-#: Blocks within blocks, at most so deep, and so many objects in all.
+#: Blocks within blocks, at most this deep, and this many objects in all.
 DEEPEST, MOST_OBJECTS = 32, 200_000
 _NO_LAYER = "00000000-0000-0000-0000-000000000000"
 
@@ -51,7 +51,7 @@ class Model:
 
     @classmethod
     def read(cls, data: bytes) -> Model | None:
-        """None: no Rhino file, or cut short."""
+        """None: not a Rhino file, or truncated."""
         file: Any = rhino3dm.File3dm.FromByteArray(data)
         return None if file is None else cls(file)
 

@@ -22,7 +22,7 @@ _WORD = re.compile(rb"\b(facet|vertex|endfacet)\b", re.IGNORECASE)
 
 
 def read_stl(data: bytes) -> FileContent:
-    """All facets, as one mesh; the solids of a text file can be told apart. Raises UnreadableFileError."""
+    """All facets as one mesh; solids of a text file remain separate objects. Raises UnreadableFileError."""
     announced = int.from_bytes(data[80:HEADER], "little") if len(data) >= HEADER else -1
     if announced > 0 and len(data) == HEADER + announced * _TRIANGLE.itemsize:
         return _binary(data, announced)
@@ -30,11 +30,11 @@ def read_stl(data: bytes) -> FileContent:
     if _TEXT.match(text) and 0 not in text[: HEADER + _TRIANGLE.itemsize]:
         return _text(text)
     if announced < 0:
-        raise UnreadableFileError("The file is no STL file: it is shorter than the header of one.")
+        raise UnreadableFileError("The file is not an STL file: it is shorter than the header of one.")
     held = (len(data) - HEADER) // _TRIANGLE.itemsize
     if held < announced or announced == 0:
         raise UnreadableFileError(
-            f"The STL file announces {announced} triangles but holds {held}: it is cut short or damaged, so "
+            f"The STL file announces {announced} triangles but holds {held}: it is truncated or damaged, so "
             "export it again."
         )
     return _binary(data, announced)
@@ -67,7 +67,7 @@ def _text(text: bytes) -> FileContent:
     if len(incomplete) or words[-1] != b"endfacet":
         facet = incomplete[0] if len(incomplete) else facets - 1
         raise UnreadableFileError(
-            f"Facet {facet} of the STL file, of {facets}, is incomplete: it is cut short or damaged, so "
+            f"Facet {facet} of the STL file, of {facets}, is incomplete: it is truncated or damaged, so "
             "export it again."
         )
     rows = [behind[i].split()[:3] for i in at_vertex]

@@ -77,7 +77,7 @@ def _no_number(words: Sequence[bytes], what: str, kind: Callable[[bytes], float]
 
 
 def count(word: bytes) -> int:
-    """Raises ValueError where the word is no count."""
+    """Raises ValueError where the word is not a count."""
     if not word.isdigit():
         raise ValueError(word)
     return int(word)
@@ -94,7 +94,7 @@ def rows(lines: list[list[bytes]], parts: Sequence[tuple[str, int, Width]]) -> l
     held = sum(map(len, lines))
     if total > held:  # before a list of that length is made
         raise UnreadableFileError(
-            f"The file announces {total} rows but holds {held} numbers: it is cut short, so export it again."
+            f"The file announces {total} rows but holds {held} numbers: it is truncated, so export it again."
         )
     flat = [(what, k, width) for what, number, width in parts for k in range(number)]
     if len(lines) < total:
@@ -165,8 +165,8 @@ def _streamed(words: list[bytes], flat: Sequence[tuple[str, int, Width]]) -> lis
         end = at + _needed(words, at, width)
         if end > len(words):
             raise UnreadableFileError(
-                f"The file ends before {what} {k}, of the {len(flat)} rows that it announces: it is cut "
-                "short, so export it again."
+                f"The file ends before {what} {k}, of the {len(flat)} rows that it announces: it is "
+                "truncated, so export it again."
             )
         found.append(words[at:end])
         at = end

@@ -9,9 +9,30 @@ it keeps. ``ptolemy``: l_e' = (l_a l_c + l_b l_d) / l_e, those of the hyperbolic
 conformal metrics share (Gillespie, Springborn, Crane 2021). The latter are sums of positive terms, taken in
 logarithms: no cancellation and no overflow, however strong the grading.
 
-Mirror symmetry leaves three kinds of flips, each one or several symmetric flips of the double: ``across`` two
-front triangles; ``down``: a triangle over its edge that bounds a cell, so that its apex gets a crossing edge;
-``up``: the reverse, a crossing edge goes and the two cells beside it become a triangle and a cell.
+Mirror symmetry leaves three kinds of flips, each one or several symmetric flips of the double:
+
+``across``: two front triangles (i, j, k) and (j, i, l) get the diagonal kl. Ptolemy: l_kl l_ij = l_jk l_il +
+l_ki l_jl.
+
+``down``: a triangle (i, j, x) is flipped away over its edge ij, below which the mirror lies. The cell
+there is the isosceles trapezoid (j, i, i', j') with sides e = ij = i'j', crossing edges m_i = ii' and m_j
+= jj', and diagonals d = ij' = ji', so d² = e² + m_i m_j (Ptolemy in the trapezoid, which has a
+circumcircle). Three flips in the double bring the edge xx': ij becomes xj' or xi' in the hexagon (x, i,
+i', x', j', j), the mirror image likewise, and last the middle one. Written out, with a = xi and b = xj,
+
+    m_x = (a² m_j + b² m_i + 2 a b d) / e².
+
+In Euclidean lengths the height of x is that of i, plus what the
+edge from i to x rises: the triangle's apex in the frame of ij, turned by the slope of ij against the mirror.
+
+``up``: the reverse. The crossing edge xx' goes; the cells below jx and xi become the triangle (i, j, x)
+and the cell below ij. Of the same hexagon, with d_b² = b² + m m_j and d_a² = a² + m m_i the diagonals of
+the two cells,
+
+    l_ij = (a d_b + b d_a) / m,
+
+Ptolemy's relation for the quad (j, x, i, x') with diagonals ij and xx', whose sides are b, a, and d_a = ix',
+d_b = jx'. In Euclidean lengths ij is the sum of two vectors: their parts along the mirror, and their slopes.
 """
 
 from __future__ import annotations

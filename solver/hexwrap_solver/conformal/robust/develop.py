@@ -9,10 +9,10 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import breadth_first_order
 
 from hexwrap_solver.arrays import Complexes, Floats, Ints
-from hexwrap_solver.conformal.layout import FULL_TURN
 from hexwrap_solver.conformal.robust.metric import Metric
 from hexwrap_solver.conformal.robust.mirror import MirrorMesh
 from hexwrap_solver.conformal.types import Deck
+from hexwrap_solver.tolerances import is_zero
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ def _around(uv: Complexes, deck: Deck) -> Floats:
     apex = deck.apex
     if apex is not None:
         return np.asarray(abs(deck.angle) * np.abs(uv - apex))
-    if abs(deck.angle) < FULL_TURN:
+    if is_zero(deck.angle):
         return np.full(len(uv), abs(deck.translation))
     return np.full(len(uv), abs(deck.angle) * float(np.abs(uv - uv.mean()).mean()))
 

@@ -7,10 +7,25 @@ the circumcircle of a triangle, (corner − centre, radius). So in a metric in w
 kinds of coordinates are the same, and from one metric to the next v_i grows by e^{u_i} (Springborn 2020;
 Gillespie, Springborn, Crane 2021: maps that are projective between circumcircles).
 
+Why the two agree: four points of a circle, written as light-like vectors, satisfy one linear relation, the
+same that their places (x, y, 1) satisfy. With the vectors scaled as above, ⟨v_i, v_j⟩ = −l_ij²/2 says how
+to read it off lengths. A flip of the diagonal ij of the quad (i, l, j, k) to kl expresses the old corner
+that the point loses by the other three: v_l = β_i v_i + β_j v_j + β_k v_k. Products with v_j, v_i and v_k
+give, since ⟨v, v⟩ = 0 and by Ptolemy's relation,
+
+    β_i = l_lj l_kl / (l_ij l_ki),   β_j = l_il l_kl / (l_ij l_jk),   β_k = −l_lj l_il / (l_jk l_ki).
+
+Of a point w_i v_i + w_j v_j + w_k v_k in the old triangle (i, j, k) one of the first two weights is taken
+off: on the side of i, w_j = (w_j/β_j) β_j, so that (w_j/β_j) v_l replaces w_j v_j, and w_i and w_k change
+by −(w_j/β_j) times β_i and β_k. The point lies on that side of kl where what is left of w_i is not
+negative, and then all three new weights are positive: no subtraction of nearly equal numbers is left that
+matters.
+
 A cell counts as a triangle (i, j, K): K is the unit vector at right angles to the mirror line, towards the
 mirror; ⟨v_i, K⟩ = −m_i / 2 and ⟨K, K⟩ = 1, with m_i the length of the crossing edge at i. All kinds of flips
-then put the other diagonal into a quad (i, l, j, k), any of which may be K, with one relation
-v_l = β_i v_i + β_j v_j + β_k v_k, where β_k < 0 < β_i, β_j.
+then put the other diagonal into a quad (i, l, j, k), any of which may be K, with the same relation, where
+β_k < 0 < β_i, β_j. Down, the diagonal ij becomes the one from x to K (k = x, l = K). Up, the diagonal from
+x to K becomes ij.
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ from hexwrap_solver.pattern.lay.layout import Layout
 #: Incidences are told apart by one integer each.
 MOST_KEYS = 1 << 62
 UNCLEAR = (
-    "Rounding hides which cells lie in the domain: it is too large for the cells, or too uneven. Ask for "
+    "Rounding error is too large relative to the cell size to decide which cells lie in the domain. Ask for "
     "larger cells."
 )
 

@@ -1,4 +1,32 @@
-"""Placement where the boundary has corners: every straight side on a lattice line (Figures 5–7)."""
+"""Placement where the boundary has corners: every straight side on a lattice line (Figures 5–7).
+
+The lattice is W = s·(z − a) + o before any deformation: a is the apex (or the layout's origin), o where it
+stands on the lattice, s scale and rotation. A side k with inward unit normal n_k, at mean depth
+h_k = Re(n̄_k·(z − a)) in the domain, then lies at depth |s|·h_k + Re(n̄_k·o) on the lattice. Its lattice lines
+lie at depths first + period·m (``Rows``), m an integer per side:
+
+                 domain                        lattice, normals upwards
+          ______________ side k          - - - - - - - - - - first + 2·period
+         |      | h_k   |                ================== |s|·h_k + Re(n̄_k·o)   side k as it comes
+         |      a       |                - - - - - - - - - - first + period       where it is moved to
+         |______________|                - - - - - - - - - - first
+
+What is free, and how it is chosen:
+
+1. *Directions.* The sides of one loop differ by multiples of the quantum, so that one rotation brings all of
+   them onto directions of the lattice; the loops of a cone may each need their own (``_turns``).
+2. *Origin.* On a cone o must be a centre of symmetry of the kind that the cone angle needs
+   (``symmetry_centres``). For a translation, or a disk, two sides that are not parallel are put on lines:
+   o is the place where these meet (``meeting``), one choice for each way of picking the second line.
+3. *Scale.* |s| is tried over the range that the size asked for leaves open.
+4. *Lines.* Each side moves to its nearest line by δ_k; the layout follows, conformally by least squares.
+   That response is linear in δ, so that its error is a quadratic form, computed once (``Strain``); single
+   lines change as long as that lessens it.
+5. *Corners.* Two successive sides meet in a place of the lattice that should be a node, or, where three edges
+   meet at nodes, one about which the lattice is mirrored along with the corner (``_misplaced_corners``).
+
+The placements that cost least are then deformed for good (``deform``), and the best one is kept.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +40,7 @@ from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.pattern.lattice import Isometry, Lattice
 from hexwrap_solver.pattern.place.deform import System, deform, distortion_of
 from hexwrap_solver.pattern.place.glued import Glued
+from hexwrap_solver.pattern.place.meeting import meeting
 from hexwrap_solver.pattern.place.placement import Placement, edge_angle
 from hexwrap_solver.pattern.place.rows import Rows, rows_along
 from hexwrap_solver.pattern.place.sides import Lines, Sides, lines_of, sides_of
@@ -244,7 +273,7 @@ def _origins(frame: _Frame, scale: complex) -> list[tuple[Isometry, complex]]:
     p, q = normal[0], normal[across[0]]
     d = rows.first - depth[0]
     lines = rows.first + rows.period * np.arange(lattice.cosets) - depth[across[0]]
-    return [(motion, complex(1j * (e * p - d * q) / (np.conj(p) * q).imag)) for e in lines]
+    return [(motion, complex(origin)) for origin in meeting(p, d, q, lines)]
 
 
 def _translation(frame: _Frame, wanted: complex) -> Ints:
@@ -294,10 +323,10 @@ def _misplaced_corners(frame: _Frame, motion: Isometry, line: Floats) -> float:
     e = line[following] + (q.conj() * shift).real
     area = (p.conj() * q).imag
     inner = abs(area) > 1e-6
-    p, q, d, e, area = p[inner], q[inner], d[inner], e[inner], area[inner]
-    if not len(area):
+    p, q, d, e = p[inner], q[inner], d[inner], e[inner]
+    if not len(p):
         return 0.0
-    corner = 1j * (e * p - d * q) / area
+    corner = meeting(p, d, q, e)
     point = np.rint(lattice.coordinates(corner)).astype(np.int64)
     on_lattice = abs(lattice.position(point) - corner) < 1e-6
     on_node = on_lattice & lattice.is_node(point)

@@ -17,6 +17,7 @@ from hexwrap_solver.arrays import Complexes, Floats, Ints
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.linalg.normal_matrix import NormalMatrix
 from hexwrap_solver.pattern.place.glued import Glued
+from hexwrap_solver.pattern.place.meeting import meeting
 
 #: Weight of sizes against angles.
 SIZE = 0.1
@@ -136,8 +137,9 @@ class Freedom:
         p, q = self.normal.T
         d, e = np.where(self.normal != 0, depth, 0.0).T
         both = (p != 0) & (q != 0)
-        area = np.where(both, (p.conj() * q).imag, 1.0)
-        return np.asarray(np.where(both, 1j * (e * p - d * q) / area, p * d + q * e))
+        place = p * d + q * e
+        place[both] = meeting(p[both], d[both], q[both], e[both])
+        return np.asarray(place)
 
 
 class System:

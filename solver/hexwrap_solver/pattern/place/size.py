@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 
 from hexwrap_solver.arrays import Floats
 from hexwrap_solver.conformal.types import ConformalMap
-from hexwrap_solver.errors import PatternError
 from hexwrap_solver.pattern.lattice import Lattice
 from hexwrap_solver.pattern.place.placement import is_disk, main_loops
+from hexwrap_solver.pattern.place.sense import too_many
 from hexwrap_solver.pattern.types import PatternSettings
 
 #: Where neither a number nor a length is asked for: so many cells around, but fewer where that would make
@@ -130,11 +132,7 @@ def edges_around(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings
     """
     edges = cmap.circumference / wanted_edge(cmap, lattice, settings, angle)
     if not edges <= EDGES_PER_CELL * settings.max_cells:
-        raise PatternError(
-            f"About {edges / EDGES_PER_CELL:,.0f} cells would be needed around the surface alone, over the "
-            f"limit of {settings.max_cells:,}: ask for a larger edge length or fewer cells around.",
-            data={"limit": settings.max_cells},
-        )
+        raise too_many(cmap, settings, min(edges / EDGES_PER_CELL, sys.float_info.max))
     return edges
 
 

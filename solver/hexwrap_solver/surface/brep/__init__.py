@@ -2,6 +2,7 @@
 
 from hexwrap_solver.surface.brep.join import Joints, joined
 from hexwrap_solver.surface.brep.mesh import BrepMesh, mesh_brep
+from hexwrap_solver.surface.brep.surface import surface_from_brep, surface_from_patch
 from hexwrap_solver.surface.brep.types import Brep, Edge, Face, NurbsCurve, Trim, together
 from hexwrap_solver.surface.brep.whole import brep_of_surface
 
@@ -16,5 +17,7 @@ __all__ = [
     "brep_of_surface",
     "joined",
     "mesh_brep",
+    "surface_from_brep",
+    "surface_from_patch",
     "together",
 ]

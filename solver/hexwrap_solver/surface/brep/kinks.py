@@ -14,11 +14,12 @@ import shapely
 
 from hexwrap_solver.arrays import Floats
 from hexwrap_solver.surface.brep.face import Outline, polygon_of
-from hexwrap_solver.surface.brep.pull import Patch, pull
+from hexwrap_solver.surface.brep.pull import Patch, patch_of, pull
 from hexwrap_solver.surface.brep.sizes import Field, bilinear
 from hexwrap_solver.surface.mesh_sizes import cumulated
 from hexwrap_solver.surface.nurbs import evaluate, evaluate_points
 from hexwrap_solver.surface.topology import angles_between
+from hexwrap_solver.surface.types import NurbsSurface
 
 #: Normals that turn by more than this across a knot make a kink, radians.
 KINK = np.deg2rad(1.0)
@@ -40,17 +41,33 @@ def kinks_of(patch: Patch, outline: shapely.Geometry) -> list[tuple[int, float]]
         inner, count = np.unique(knots, return_counts=True)
         for x in inner[(count >= p) & (inner > box[0, d] + margin) & (inner < box[1, d] - margin)]:
             across = np.linspace(box[0, 1 - d], box[1, 1 - d], PLACES)[1:-1]
-            if _turn(patch, d, float(x), across) > KINK:
+            sides = x + np.array([-1e-9, 1e-9]) * patch.width[d]
+            if _turn(patch, d, sides, across) > KINK:
                 found.append((d, float(x)))
     return found
 
 
-def _turn(patch: Patch, direction: int, x: float, across: Floats) -> float:
-    sides = []
-    for side in (-1, 1):
-        uv = np.stack([np.full_like(across, x + side * 1e-9 * patch.width[direction]), across], axis=1)
-        sides.append(evaluate(patch.opened, uv if direction == 0 else uv[:, ::-1]).normal)
-    return float(angles_between(*sides).max())
+def is_smooth(nurbs: NurbsSurface) -> bool:
+    """Whether the surface has no kinks inside, nor where it closes up."""
+    patch = patch_of(nurbs, 0.0)
+    box = shapely.box(*patch.low, *(patch.low + patch.width))
+    if kinks_of(patch, box):
+        return False
+    ends = np.array([patch.low, patch.low + patch.width])
+    return not any(
+        _turn(patch, d, ends[:, d], np.linspace(ends[0, 1 - d], ends[1, 1 - d], PLACES)[1:-1]) > KINK
+        for d in (0, 1)
+        if patch.surface.closed[d]
+    )
+
+
+def _turn(patch: Patch, direction: int, at: Floats, across: Floats) -> float:
+    """The greatest angle between normals on two lines of constant parameters at (2,), radians."""
+    one, two = (np.stack([np.full_like(across, x), across], axis=1) for x in at)
+    if direction == 1:
+        one, two = one[:, ::-1], two[:, ::-1]
+    normals = (evaluate(patch.opened, uv).normal for uv in (one, two))
+    return float(angles_between(*normals).max())
 
 
 def crossings(

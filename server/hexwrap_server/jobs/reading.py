@@ -1,0 +1,103 @@
+"""Bodies and files → requests and surfaces. Runs in a process under the limits of reading."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import orjson
+
+from hexwrap_server.input.bodies import Body
+from hexwrap_server.input.json_text import loads
+from hexwrap_server.input.requests import CacheSettings, Intake, ParsedRequest, SentSurface
+from hexwrap_server.input.schemas import Request, parse_request, parse_surface
+from hexwrap_server.input.surface_files import FromFile
+from hexwrap_server.input.uploads import sent_file
+from hexwrap_server.jobs import codec
+from hexwrap_server.jobs.cache import CachingRunner
+from hexwrap_server.jobs.disk import keep_file, surface_file
+from hexwrap_server.jobs.work import stages, take_in
+from hexwrap_server.jobs.worker import Report
+from hexwrap_server.problems import body_is_the_surface
+from hexwrap_server.settings import Settings
+
+
+def read_request(report: Report, body: Body, settings: Settings, folder: str) -> ParsedRequest:
+    """JSON → request. folder: where its surface is kept. Raises FormError, HttpError, StorageError."""
+    document = loads(body.plain(settings.max_body_mib))
+    return kept(parse_request(document, settings.max_vertices, settings.max_panels), folder)
+
+
+def kept(request: Request, folder: str) -> ParsedRequest:
+    """The request, its surface written into folder and known by its content. Raises StorageError."""
+    if isinstance(request.surface, str):
+        return ParsedRequest(request.name, request.surface, request.wanted)
+    return ParsedRequest(request.name, _keep(request.surface, folder), request.wanted)
+
+
+@body_is_the_surface()
+def read_surface(
+    report: Report, body: Body, settings: Settings, folder: str, caching: CacheSettings
+) -> Intake:
+    """JSON → checked surface. Raises FormError, HttpError, SurfaceError, StorageError."""
+    sent = parse_surface(loads(body.plain(settings.max_body_mib)), settings.max_vertices)
+    return _checked(report, sent, folder, caching)
+
+
+@body_is_the_surface(is_file=True)
+def read_upload(
+    report: Report,
+    body: Body,
+    settings: Settings,
+    folder: str,
+    caching: CacheSettings,
+    content_type: str,
+    name: str,
+) -> Intake:
+    """A file sent raw (with its name) or in a form → checked surface, with the objects of the file.
+
+    Fields of the form choose among these, as ``surface.object`` and the like do. Raises UploadError,
+    HttpError, SurfaceError, StorageError.
+    """
+    read = _file(body, settings, content_type, name)
+    intake = _checked(report, read.sent, folder, caching)
+    return replace(intake, answer=intake.answer | {"objects": read.objects})
+
+
+@body_is_the_surface(is_file=True)
+def preview(report: Report, body: Body, settings: Settings, content_type: str, name: str) -> bytes:
+    """Vertices and faces of a file as JSON, unchecked. Raises UploadError, HttpError, SurfaceError."""
+    sent = _file(body, settings, content_type, name).sent
+    if sent.mesh is None:
+        meshed = take_in(sent)
+        vertices, faces = meshed.vertices, meshed.faces.tolist()
+    else:
+        vertices, faces = sent.mesh.vertices, sent.mesh.faces.to_lists()
+    return orjson.dumps({"vertices": vertices, "faces": faces}, option=orjson.OPT_SERIALIZE_NUMPY)
+
+
+def _file(body: Body, settings: Settings, content_type: str, name: str) -> FromFile:
+    data = body.plain(settings.max_body_mib)
+    return sent_file(data, content_type, name, settings.max_vertices, settings.max_body_mib)
+
+
+def _checked(report: Report, sent: SentSurface, folder: str, caching: CacheSettings) -> Intake:
+    runner = CachingRunner(stages(caching), report)
+    surface = runner("surface", (codec.digest(sent), None), lambda progress: take_in(sent))
+    loops = [surface.input_vertex[loop].tolist() for loop in surface.loops]
+    answer = {
+        "vertices": len(surface.vertices),
+        "faces": len(surface.faces),
+        "loops": loops,
+        "repairs": list(surface.repairs),
+        "unit": surface.unit,
+        "objects": [],
+    }
+    return Intake(_keep(sent, folder), answer)
+
+
+def _keep(sent: SentSurface, folder: str) -> str:
+    """The id of the surface, which is on disk from now on."""
+    id = codec.digest(sent)
+    keep_file(surface_file(Path(folder), id), codec.encode(sent))
+    return id

@@ -1,0 +1,54 @@
+"""From a Brep, or any NURBS surface, to the surface that is mapped.
+
+The mesh of a Brep, with its exact normals and creases, is taken in as any mesh. Smooth tubes without trims
+have a mesher of their own, whose rows have no seam.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hexwrap_solver.arrays import Ragged
+from hexwrap_solver.surface.brep.kinks import is_smooth
+from hexwrap_solver.surface.brep.mesh import mesh_brep
+from hexwrap_solver.surface.brep.types import Brep
+from hexwrap_solver.surface.brep.whole import brep_of_surface
+from hexwrap_solver.surface.errors import NotClosedError, PoleError
+from hexwrap_solver.surface.intake import surface_from_mesh
+from hexwrap_solver.surface.meshing import surface_from_nurbs
+from hexwrap_solver.surface.nurbs_checks import TOLERANCE, check_data, checked
+from hexwrap_solver.surface.types import NurbsSurface, SentMesh, Surface, SurfaceSettings
+
+
+def surface_from_brep(brep: Brep, settings: SurfaceSettings | None = None) -> Surface:
+    """input_vertex numbers the vertices of the mesh. Raises SurfaceError."""
+    settings = settings or SurfaceSettings()
+    return surface_from_mesh(sent_of_brep(brep, settings), settings)
+
+
+def surface_from_patch(
+    nurbs: NurbsSurface, settings: SurfaceSettings | None = None, tolerance: float | None = None
+) -> Surface:
+    """A NURBS surface without trims: a tube, a dome, an open sheet, smooth or with corners.
+
+    tolerance: ends closer than this are one seam; None: a millionth of the size. Raises SurfaceError.
+    """
+    settings = settings or SurfaceSettings()
+    check_data(nurbs)
+    try:
+        checked(nurbs)
+        if is_smooth(nurbs):
+            return surface_from_nurbs(nurbs, settings.mesh)
+    except PoleError:
+        pass
+    except NotClosedError:
+        if any(nurbs.closed):
+            raise
+    size = float(np.linalg.norm(np.ptp(nurbs.control_points[..., :3].reshape(-1, 3), axis=0)))
+    return surface_from_brep(brep_of_surface(nurbs, max(tolerance or 0.0, TOLERANCE * size)), settings)
+
+
+def sent_of_brep(brep: Brep, settings: SurfaceSettings) -> SentMesh:
+    mesh = mesh_brep(brep, settings.mesh)
+    faces = Ragged.from_table(mesh.faces)
+    return SentMesh(mesh.vertices, faces, mesh.normals, mesh.creases, np.asarray(mesh.fold))

@@ -1,0 +1,199 @@
+"""Flat caps of closed masses: what a modeller closes a tower with, and a facade leaves open.
+
+A cap is a flat or nearly flat region of faces, bounded by sharp folds all around, above whose rim nothing
+else of the surface rises. A closed prism has many such regions: its walls are some, too. Ends of a tube do
+not touch each other, and look in opposite directions; of several such pairs the upright one is taken, unless
+another is much longer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from hexwrap_solver.arrays import Bools, Floats, Ints
+from hexwrap_solver.surface.topology import (
+    angles_between,
+    boundary_loops,
+    face_graph,
+    face_normals,
+    half_edges,
+    sum_rows,
+    unit,
+)
+from hexwrap_solver.surface.types import Triangles
+
+#: Regions are bounded by folds sharper than this, radians …
+SHARP = np.deg2rad(44.0)
+#: … and are caps if no face of theirs leans more than this against the whole.
+SHALLOW = np.deg2rad(15.0)
+#: Others rise above the rim of a cap by no more than this part of the size.
+ROUNDING = 1e-4
+#: Ends look away from each other: the cosine between their normals is below the negative of this.
+OPPOSITE = 0.5
+#: A cap is upright whose normal is within 45° of the vertical.
+UPRIGHT = np.sqrt(0.5)
+#: So many times longer than the upright pair another one must be to be taken.
+LONGER = 2.5
+#: More flat regions than this make a faceted surface, not a mass with caps.
+MOST = 60
+#: The open end opposite to a cap lies within this part of the height from the lower end.
+END = 0.35
+
+
+@dataclass(frozen=True)
+class Cap:
+    """faces: of the region, ascending. normal: outward, (3,). centre: (3,). area. vertices: it touches."""
+
+    faces: Ints
+    normal: Floats
+    centre: Floats
+    area: float
+    vertices: Ints
+
+
+def caps_of(mesh: Triangles) -> tuple[list[Cap], str]:
+    """The caps to be taken off so that a tube or a dome is left, and a sentence about them; or none.
+
+    The mesh must be oriented, with at most two faces per edge. With two boundary loops or more nothing is
+    taken off: it is a tube already.
+    """
+    rim = np.flatnonzero(mesh.twin < 0)
+    start, _ = half_edges(mesh.faces)
+    if len(rim) and len(np.unique(start[rim])) < len(rim):
+        return [], ""
+    loops = boundary_loops(mesh.faces, mesh.twin) if len(rim) else []
+    if len(loops) > 1:
+        return [], ""
+    found = _regions(mesh)
+    pairs = [pair for pair in combinations(found, 2) if _is_pair(*pair)]
+    upright = [pair for pair in pairs if all(abs(cap.normal[2]) > UPRIGHT for cap in pair)]
+    chosen: list[Cap] = []
+    if loops:
+        if upright:
+            chosen = list(max(upright, key=_length))
+        else:
+            chosen = _opposite(mesh, found, loops[0])
+    elif pairs:
+        best = max(pairs, key=_length)
+        if upright and _length(best) <= LONGER * _length(max(upright, key=_length)):
+            best = max(upright, key=_length)
+        chosen = list(best)
+    else:
+        low = [cap for cap in found if cap.normal[2] < -UPRIGHT]
+        chosen = low[:1] if len(low) == 1 else found if len(found) == 1 else []
+    if not chosen or not _leaves_one_piece(mesh, chosen):
+        return [], ""
+    return chosen, _sentence(chosen, len(pairs))
+
+
+def _regions(mesh: Triangles) -> list[Cap]:
+    """All flat regions that could be caps, the largest first."""
+    m = len(mesh.faces)
+    area2 = face_normals(mesh.vertices, mesh.faces)
+    normal = unit(area2)
+    h = np.flatnonzero(mesh.twin > np.arange(3 * m))
+    one, two = h // 3, mesh.twin[h] // 3
+    smooth = angles_between(normal[one], normal[two]) <= SHARP
+    graph = coo_array((np.ones(int(smooth.sum()), dtype=np.int8), (one[smooth], two[smooth])), shape=(m, m))
+    count, region = connected_components(graph, directed=False)
+    total = sum_rows(area2, region.astype(np.int64), count)
+    size = np.linalg.norm(total, axis=1)
+    lean = np.zeros(count)
+    np.maximum.at(lean, region, angles_between(normal, total[region]) * (np.linalg.norm(area2, axis=1) > 0))
+    likely = np.flatnonzero((lean <= SHALLOW) & (size > 1e-6 * size.sum()))
+    if len(likely) > MOST:
+        return []
+    box = float(np.linalg.norm(np.ptp(mesh.vertices[mesh.faces.ravel()], axis=0)))
+    out = []
+    for k in likely[np.argsort(-size[likely], kind="stable")]:
+        own = region == k
+        if own.all():
+            continue
+        faces = np.flatnonzero(own)
+        direction = total[k] / size[k]
+        vertices = np.unique(mesh.faces[faces])
+        others = np.unique(mesh.faces[~own])
+        rim = np.intersect1d(vertices, others)
+        if len(rim) == 0:
+            continue
+        height = mesh.vertices @ direction
+        if height[others].max() > height[rim].max() + ROUNDING * box:
+            continue
+        weight = np.linalg.norm(area2[faces], axis=1)
+        centre = np.average(mesh.vertices[mesh.faces[faces]].mean(axis=1), axis=0, weights=weight)
+        centre = np.where(np.abs(centre) < 1e-6 * box, 0.0, centre)
+        out.append(Cap(faces, direction, centre, float(size[k] / 2), vertices))
+    return out
+
+
+def _is_pair(one: Cap, two: Cap) -> bool:
+    apart = len(np.intersect1d(one.vertices, two.vertices)) == 0
+    return apart and float(one.normal @ two.normal) < -OPPOSITE
+
+
+def _length(pair: Iterable[Cap]) -> float:
+    one, two = pair
+    return float(np.linalg.norm(one.centre - two.centre))
+
+
+def _opposite(mesh: Triangles, found: list[Cap], loop: Ints) -> list[Cap]:
+    """The cap that closes the end opposite to a boundary loop, if there is just one."""
+    rim = mesh.vertices[loop]
+    out = []
+    for cap in found:
+        if len(np.intersect1d(cap.vertices, loop)):
+            continue
+        height = mesh.vertices[np.unique(mesh.faces)] @ cap.normal
+        low, high = float(height.min()), float(height.max())
+        away = cap.centre - rim.mean(axis=0)
+        ends = (rim @ cap.normal).max() <= low + END * (high - low)
+        cut_into = any(len(np.intersect1d(other.vertices, loop)) for other in found)
+        if ends and not cut_into and float(away @ cap.normal) > UPRIGHT * float(np.linalg.norm(away)):
+            out.append(cap)
+    return out if len(out) == 1 else []
+
+
+def _leaves_one_piece(mesh: Triangles, chosen: list[Cap]) -> bool:
+    keep = kept(mesh, chosen)
+    if not keep.any():
+        return False
+    graph = face_graph(mesh.twin)[keep][:, keep]
+    return int(connected_components(graph, directed=False)[0]) == 1
+
+
+def kept(mesh: Triangles, chosen: list[Cap]) -> Bools:
+    """(m,) the faces that are left."""
+    keep = np.ones(len(mesh.faces), dtype=bool)
+    for cap in chosen:
+        keep[cap.faces] = False
+    return keep
+
+
+def _sentence(chosen: list[Cap], pairs: int) -> str:
+    chosen = sorted(chosen, key=lambda cap: cap.normal[2])
+    places = " and ".join(
+        f"the {_side(cap.normal)} (around {_at(cap.centre)}, area {cap.area:.4g})" for cap in chosen
+    )
+    what = f"A flat cap at {places} was" if len(chosen) == 1 else f"Flat caps at {places} were"
+    others = f", one of {pairs} pairs of opposite flat sides" if pairs > 1 and len(chosen) == 2 else ""
+    return f'{what} taken off{others}; surface.caps "keep" leaves them on.'
+
+
+def _side(normal: Floats) -> str:
+    """The direction in words."""
+    axis = int(np.abs(normal).argmax())
+    if abs(normal[axis]) < 0.9 and abs(normal[2]) <= UPRIGHT:
+        return f"side facing ({normal[0]:.2f}, {normal[1]:.2f}, {normal[2]:.2f})"
+    if axis == 2 or abs(normal[2]) > UPRIGHT:
+        return "top" if normal[2] > 0 else "bottom"
+    return f"side facing {'−+'[int(normal[axis] > 0)]}{'xyz'[axis]}"
+
+
+def _at(point: Floats) -> str:
+    return "({})".format(", ".join(f"{x:.4g}" for x in point))

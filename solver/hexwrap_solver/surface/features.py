@@ -1,0 +1,79 @@
+"""Lines on a surface that a pattern should follow: creases, as chains of mesh edges from end to end."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import coo_array, csr_array
+from scipy.sparse.csgraph import breadth_first_order, connected_components
+
+from hexwrap_solver.arrays import Bools, Floats, Ints
+from hexwrap_solver.surface.topology import angles_between, face_normals, half_edges, unit
+from hexwrap_solver.surface.types import Feature, Triangles
+
+#: A chain that turns by more than this at a vertex is two, radians.
+CORNER = np.deg2rad(40.0)
+
+
+def folds(mesh: Triangles, angle: float) -> tuple[Ints, Floats]:
+    """(k, 2) inner edges at which the mesh folds by more than an angle, radians, and (k,) by how much."""
+    normal = unit(face_normals(mesh.vertices, mesh.faces))
+    h = np.flatnonzero(mesh.twin > np.arange(len(mesh.twin)))
+    fold = angles_between(normal[h // 3], normal[mesh.twin[h] // 3])
+    start, end = half_edges(mesh.faces)
+    h, fold = h[fold > angle], fold[fold > angle]
+    return np.stack([start[h], end[h]], axis=1), fold
+
+
+def chained(vertices: Floats, edges: Ints, fold: Floats, stops: Bools) -> tuple[Feature, ...]:
+    """Edges (k, 2) joined end to end, sorted by their lowest vertices.
+
+    Chains end at junctions, at corners, and at stops (n,), such as vertices of the boundary. Closed chains
+    name their first vertex again at the end.
+    """
+    if len(edges) == 0:
+        return ()
+    k = len(edges)
+    incident = edges.ravel()
+    order = np.argsort(incident, kind="stable")
+    degree = np.bincount(incident, minlength=len(vertices))
+    first = np.concatenate([[0], np.cumsum(degree)])
+    through = (degree == 2) & ~stops
+    v = np.flatnonzero(through)
+    one, two = order[first[v]], order[first[v] + 1]
+    # Slots are ends of edges, 2 per edge; the direction from v along each edge tells a corner.
+    a, b = (vertices[incident[slot ^ 1]] - vertices[v] for slot in (one, two))
+    smooth = angles_between(a, -b) <= CORNER
+    one, two = one[smooth], two[smooth]
+    # Nodes are slots, made one where a chain goes through; edges join their two slots.
+    label = np.arange(2 * k)
+    label[two] = one
+    graph = coo_array((np.ones(k, dtype=np.int8), (label[0::2], label[1::2])), shape=(2 * k, 2 * k)).tocsr()
+    _, part = connected_components(graph, directed=False)
+    ends = np.bincount(label, minlength=2 * k)
+    own = part[label[0::2]]
+    out = []
+    for chain in np.unique(own):
+        mine = np.flatnonzero(own == chain)
+        nodes = np.unique(label[np.stack([2 * mine, 2 * mine + 1])])
+        tips = nodes[ends[nodes] == 1]
+        closed = len(tips) == 0
+        among = nodes if closed else tips
+        start = int(among[np.argmin(incident[among])])
+        path = _walk(graph, start, closed)
+        line = incident[path]
+        out.append(Feature(np.append(line, line[0]) if closed else line, float(fold[mine].mean()), closed))
+    return tuple(sorted(out, key=lambda f: (int(f.vertices.min()), len(f.vertices), f.vertices.tolist())))
+
+
+def _walk(graph: csr_array, start: int, closed: bool) -> Ints:
+    """Nodes of a path from one end to the other, or of a cycle once around."""
+    order, before = breadth_first_order(graph, start, directed=False)
+    if not closed or len(order) < 3:
+        return np.asarray(order, dtype=np.int64)
+    # From the start a cycle is found along both sides in turn; one side is followed, then the other back.
+    side = {int(order[1]): 0, int(order[2]): 1}
+    arms: list[list[int]] = [[int(order[1])], [int(order[2])]]
+    for node in order[3:].tolist():
+        side[node] = side[int(before[node])]
+        arms[side[node]].append(node)
+    return np.array([start, *arms[0], *reversed(arms[1])], dtype=np.int64)

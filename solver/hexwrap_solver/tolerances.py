@@ -1,0 +1,19 @@
+"""Tolerances that more than one module goes by."""
+
+from __future__ import annotations
+
+import math
+
+#: Sums of many angles carry rounding up to this, radians: cone angles nearer to 0, to a multiple of 2π or
+#: of a quantum count as that.
+ANGLE = 1e-9
+
+
+def is_zero(angle: float) -> bool:
+    """Whether a cone angle is 0: the domain is a cylinder."""
+    return abs(angle) < ANGLE
+
+
+def is_whole_turn(angle: float) -> bool:
+    """Whether an angle is a multiple of 2π: rotation by it is none."""
+    return abs(math.remainder(angle, 2 * math.pi)) < ANGLE

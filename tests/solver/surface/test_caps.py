@@ -1,0 +1,150 @@
+"""Closed masses lose their flat ends and nothing else."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hexwrap_solver.arrays import Floats, Ragged
+from hexwrap_solver.surface import SentMesh, surface_from_mesh
+from hexwrap_solver.surface.brep import surface_from_brep
+from hexwrap_solver.surface.types import MeshSettings, Surface, SurfaceSettings
+from tests.solver.surface.brep_shapes import box
+
+COARSE = MeshSettings(max_edge=4.0)
+
+
+def prism(
+    sides: int = 24, bottom: bool = True, top: bool = True, rise: float = 0.0, rows: int = 6
+) -> SentMesh:
+    """A round tower of radius 10 and height 30, its ends closed by fans; the upper fan rises to a point."""
+    angle = 2 * np.pi * np.arange(sides) / sides
+    ring = np.stack([10 * np.cos(angle), 10 * np.sin(angle), 0 * angle], axis=1)
+    rings = np.concatenate([ring + np.array([0, 0, 30 * k / rows]) for k in range(rows + 1)])
+    vertices = np.concatenate([rings, [[0, 0, 0], [0, 0, 30 + rise]]])
+    k = np.arange(sides)
+    j = (k + 1) % sides
+    faces = []
+    for row in range(rows):
+        a, b, c, d = (x + sides * (row + y) for x, y in ((k, 0), (j, 0), (j, 1), (k, 1)))
+        faces += [np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)]
+    if bottom:
+        faces.append(np.stack([j, k, np.full(sides, len(rings))], axis=1))
+    if top:
+        faces.append(np.stack([k + sides * rows, j + sides * rows, np.full(sides, len(rings) + 1)], axis=1))
+    return SentMesh(vertices, Ragged.from_table(np.concatenate(faces)))
+
+
+def ball(steps: int = 12, low: float = -1.0) -> SentMesh:
+    """A sphere of radius 5, cut off and closed flat at a height (−1: whole)."""
+    z = np.cos(np.linspace(0, np.arccos(low), steps))[1:]
+    sides = 2 * steps
+    angle = 2 * np.pi * np.arange(sides) / sides
+    r = np.sqrt(np.maximum(1 - z**2, 0))
+    rows = [
+        np.stack([x * np.cos(angle), x * np.sin(angle), h + 0 * angle], axis=1)
+        for x, h in zip(r, z, strict=True)
+    ]
+    if low == -1.0:
+        rows = rows[:-1]
+    vertices = 5 * np.concatenate([*rows, [[0, 0, 1], [0, 0, low]]])
+    k = np.arange(sides)
+    j = (k + 1) % sides
+    last = (len(rows) - 1) * sides
+    top, under = len(vertices) - 2, len(vertices) - 1
+    faces = [np.stack([k, j, np.full(sides, top)], axis=1)]
+    for row in range(len(rows) - 1):
+        a, b, c, d = (x + sides * (row + y) for x, y in ((k, 1), (j, 1), (j, 0), (k, 0)))
+        faces += [np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)]
+    faces.append(np.stack([j + last, k + last, np.full(sides, under)], axis=1))
+    return SentMesh(vertices, Ragged.from_table(np.concatenate(faces)))
+
+
+def moved(sent: SentMesh, matrix: Floats) -> SentMesh:
+    return SentMesh(sent.vertices @ matrix.T + 100.0, sent.faces)
+
+
+def heights(surface: Surface) -> list[float]:
+    return sorted(float(surface.vertices[loop][:, 2].mean()) for loop in surface.loops)
+
+
+@pytest.mark.parametrize("bottom", [True, False])
+@pytest.mark.parametrize("rise", [0.0, 1.5])
+def test_a_tower_is_open_at_both_ends_after_its_caps(bottom: bool, rise: float) -> None:
+    sent = prism(bottom=bottom, rise=rise)
+    surface = surface_from_mesh(sent)
+    assert heights(surface) == pytest.approx([0.0, 30.0])
+    assert len(surface.repairs) >= 1
+    assert "top" in surface.repairs[-1]
+    assert ("bottom" in surface.repairs[-1]) == bottom
+    kept = surface_from_mesh(sent, SurfaceSettings(caps="keep"))
+    assert len(kept.loops) == (0 if bottom else 1)
+    assert not any("cap" in sentence for sentence in kept.repairs)
+
+
+def test_nothing_is_taken_off_open_tubes_domes_and_balls() -> None:
+    for sent, loops in (
+        (prism(bottom=False, top=False), 2),
+        (prism(bottom=False, rise=12.0), 1),
+        (ball(), 0),
+    ):
+        surface = surface_from_mesh(sent)
+        assert len(surface.loops) == loops
+        assert surface.repairs == () or "cap" not in " ".join(surface.repairs)
+
+
+def test_a_closed_dome_loses_its_floor_and_stays_a_dome() -> None:
+    surface = surface_from_mesh(ball(low=0.0))
+    assert heights(surface) == pytest.approx([0.0], abs=1e-12)
+    assert surface.vertices[:, 2].max() == pytest.approx(5.0)
+
+
+@pytest.mark.parametrize(
+    ("size", "axis"),
+    [((12.0, 9.0, 30.0), 2), ((12.0, 9.0, 8.0), 2), ((60.0, 9.0, 8.0), 0), ((9.0, 9.0, 9.0), 2)],
+)
+def test_the_ends_of_a_box_are_below_and_above_unless_it_lies(
+    size: tuple[float, float, float], axis: int
+) -> None:
+    surface = surface_from_brep(box(size), SurfaceSettings(COARSE))
+    ends = sorted(float(np.ptp(surface.vertices[loop][:, axis])) for loop in surface.loops)
+    assert ends == pytest.approx([0.0, 0.0], abs=1e-9)
+    assert "one of 3 pairs" in surface.repairs[-1]
+
+
+def test_normals_at_the_ends_are_those_of_the_walls() -> None:
+    surface = surface_from_brep(box(), SurfaceSettings(COARSE))
+    assert np.abs(surface.normals[:, 2]).max() < 1e-9
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_caps_are_found_at_any_place_and_turn(seed: int) -> None:
+    matrix, _ = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
+    matrix *= 7.0 * np.sign(np.linalg.det(matrix))
+    assert len(surface_from_mesh(moved(prism(), matrix)).loops) == 2
+    assert len(surface_from_mesh(moved(ball(), matrix)).loops) == 0
+
+
+def test_creases_are_chains_between_the_ends() -> None:
+    surface = surface_from_brep(box(), SurfaceSettings(COARSE))
+    assert len(surface.features) == 4
+    rim = set(np.concatenate(surface.loops).tolist())
+    for feature in surface.features:
+        assert not feature.closed
+        assert feature.fold == pytest.approx(np.pi / 2)
+        line = surface.vertices[feature.vertices]
+        assert np.ptp(line[:, :2], axis=0).max() < 1e-9
+        assert set(feature.vertices[[0, -1]].tolist()) <= rim
+        assert len(np.unique(np.sign(np.diff(line[:, 2])))) == 1
+
+
+def test_creases_of_meshes_are_their_sharp_folds_split_at_junctions() -> None:
+    surface = surface_from_brep(box(), SurfaceSettings(COARSE, caps="keep"))
+    assert sorted(len(f.vertices) > 2 for f in surface.features) == [True] * 12
+    mesh = SentMesh(surface.vertices, Ragged.from_table(surface.faces))
+    again = surface_from_mesh(mesh, SurfaceSettings(caps="keep"))
+    assert [f.vertices.tolist() for f in again.features] == [f.vertices.tolist() for f in surface.features]
+    ring = surface_from_mesh(prism(sides=64, rise=9.0, bottom=False))
+    assert [f.closed for f in ring.features] == [True]
+    assert ring.features[0].vertices[0] == ring.features[0].vertices[-1]
+    assert len(np.unique(ring.features[0].vertices)) == 64
