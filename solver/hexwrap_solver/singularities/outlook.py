@@ -10,7 +10,7 @@ from hexwrap_solver.singularities.place import chosen_of
 from hexwrap_solver.singularities.search import Search, curve
 from hexwrap_solver.singularities.sizes import uncovered
 from hexwrap_solver.singularities.solve import told
-from hexwrap_solver.singularities.types import Rules
+from hexwrap_solver.singularities.types import End, Rules
 
 #: A coarse look: so many patches and singularities; larger meshes are not looked at.
 PATCHES, MOST, LARGEST = 200, 4, 30_000
@@ -31,11 +31,12 @@ def outlook(cmap: ConformalMap, laid: Pattern, sizes: int, left: float) -> tuple
         return ()
     lattice = LATTICES[laid.kind]
     width = laid.edge_length * abs(complex(lattice.position(lattice.basis[0]))) / lattice.edge
-    rules = Rules(lattice.quantum, width, sizes, ("free",) * len(surface.loops), most=MOST)
+    ends: tuple[End, ...] = ("free",) * len(surface.loops)
+    rules = Rules(lattice.quantum, width, sizes, ends, most=MOST)
     model = linear_model(surface, rules, patches=PATCHES, steps=False)
     if not len(model.seat):
         return ()
-    proposals = curve(Search(model, rules), starts=0)
+    proposals = curve(Search(model, rules), starts=0, refine=False)
     best = proposals[chosen_of(proposals)]
     then = left - (now - best.uncovered)
     if not best.count or left - then < least or then <= 0:

@@ -128,3 +128,24 @@ def test_none_where_none_pays():
 def test_too_few_are_refused():
     with pytest.raises(SingularitiesError, match="takes at least 12"):
         solved(shapes.ellipsoid(), count=3, around=20)
+
+
+def lobed():
+    """A tube with a waist and no symmetry that would save sizes."""
+    plain = shapes.waist()
+    x, y, z = plain.vertices.T
+    wide = 1 + 0.25 * np.cos(2 * np.arctan2(y, x) + 0.4 * z)
+    return shapes.surface_of(np.stack([x * wide, y * wide, z + 0.1 * x], axis=1), plain.faces)
+
+
+def test_says_what_singularities_would_bring():
+    surface = lobed()
+    plain = solved(surface, mode="straight", around=24)
+    said = [note for note in plain.quality.notes if "would leave about" in note]
+    assert len(said) == 1
+    assert "heptagons" in said[0]
+    better = solved(surface, count="auto", around=24)
+    assert better.quality.coverage > plain.quality.coverage
+    assert not any("would leave about" in note for note in better.quality.notes)
+    even = solved(shapes.straight(), mode="straight", around=16)
+    assert not any("would leave about" in note for note in even.quality.notes)
