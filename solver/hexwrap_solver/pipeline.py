@@ -14,6 +14,7 @@ from typing import Annotated, Any, Protocol, TypeVar
 from hexwrap_solver.arrays import Progress, no_progress
 from hexwrap_solver.conformal import conformal_map
 from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap
+from hexwrap_solver.explore import best_boundary_map
 from hexwrap_solver.panels import fit_panels, make_components, measure, quantize, support
 from hexwrap_solver.panels.fit import FitKey
 from hexwrap_solver.panels.quantize import SizeKey
@@ -149,7 +150,10 @@ def _map(
     if asked is None and needs_singularities(surface, boundary):
         asked = SingularitySettings("auto")
     if asked is None or (asked.count in (None, 0) and not asked.at):
-        return run("map", boundary, lambda progress: conformal_map(surface, boundary, progress))
+        make = best_boundary_map if boundary.mode == "auto" else conformal_map
+        return run("map", boundary, lambda progress: make(surface, boundary, progress))
+    if boundary.mode == "auto":  # ends that are free take up what singularities need
+        boundary = replace(boundary, mode="isometric")
     wanted = asked
     sizes = settings.panels.sizes if settings.panels is not None else None
     classes = sizes if isinstance(sizes, int) else None

@@ -8,7 +8,7 @@ from math import cos, pi, sin
 import pytest
 
 from hexwrap_server import samples
-from tests.server.bodies import request, tube
+from tests.server.bodies import request
 from tests.server.live import Live, finished, running
 
 
@@ -94,12 +94,14 @@ def test_settings_beside_an_id_replace_those_sent_with_the_surface(live: Live) -
 
 
 def test_a_preview_shows_a_file_as_it_stands_even_one_that_would_be_refused(live: Live) -> None:
-    mesh = tube(6, 5)
-    a, b, _ = mesh["faces"][8]
-    mesh["faces"].append([a, b, 0])  # the third face at an edge
+    n, m = 8, 6  # a torus
+    turns = [(2 * pi * i / n, 2 * pi * j / m) for i in range(n) for j in range(m)]
+    vertices = [[(3 + cos(b)) * cos(a), (3 + cos(b)) * sin(a), sin(b)] for a, b in turns]
+    quads = [[[i, j], [i + 1, j], [i + 1, j + 1], [i, j + 1]] for i in range(n) for j in range(m)]
+    mesh = {"vertices": vertices, "faces": [[i % n * m + j % m for i, j in quad] for quad in quads]}
     text = "".join(f"v {x} {y} {z}\n" for x, y, z in mesh["vertices"])
-    text += "".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in mesh["faces"])
-    files = {"file": ("fin.obj", text)}
+    text += "".join("f " + " ".join(str(v + 1) for v in face) + "\n" for face in mesh["faces"])
+    files = {"file": ("torus.obj", text)}
     assert live.post("/v1/surfaces", files=files).status_code == 422
     shown = live.post("/v1/surfaces/preview", files=files).json()
     assert shown["vertices"] == mesh["vertices"]

@@ -25,7 +25,8 @@ def take_in():
 def run(pattern=None, panels=None, **options):
     runner = PlainRunner()
     pattern = PatternSettings(around=24) if pattern is None else pattern
-    return solve(take_in, SolveSettings(pattern=pattern, panels=panels, **options), runner), runner
+    boundary = options.pop("boundary", BoundaryCondition("straight"))
+    return solve(take_in, SolveSettings(boundary, pattern, panels, **options), runner), runner
 
 
 def test_hexagons_close_up_and_panels_keep_the_contract():

@@ -100,9 +100,11 @@ def _listed(surface: Surface, condition: BoundaryCondition) -> _Listed:
 
 def _modes(surface: Surface, condition: BoundaryCondition, given: Bools) -> list[BoundaryMode]:
     """What each loop is asked for; openings without a listed angle are isometric."""
+    common = condition.mode
+    if common == "auto":
+        common = "isometric" if len(surface.loops) == 1 else "straight"
     modes: list[BoundaryMode] = [
-        "isometric" if i >= 2 and not given[loop].any() else condition.mode
-        for i, loop in enumerate(surface.loops)
+        "isometric" if i >= 2 and not given[loop].any() else common for i, loop in enumerate(surface.loops)
     ]
     for i, one in enumerate(condition.loops):
         modes[_loop_meant(surface, one, i)] = one.mode

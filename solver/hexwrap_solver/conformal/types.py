@@ -70,7 +70,9 @@ class LoopCondition:
 class BoundaryCondition:
     """Paper, section 3.1.
 
-    mode ``straight``: every boundary angle is π. ``angles``: the listed ones, π elsewhere.
+    mode ``auto``: straight or isometric, whichever suits the sizes of the cells better, or the listed angles
+    where there are any (``explore.best_boundary_map``; alone, ``conformal_map`` takes straight, and isometric
+    for a disk). ``straight``: every boundary angle is π. ``angles``: the listed ones, π elsewhere.
     ``isometric``: boundary lengths kept up to scale, each loop's curvature rounded to a multiple of quantum.
     Openings (loops from the third on) on which no angle is listed are isometric in every mode: they cannot
     be straight, for they turn by −2π.
@@ -79,7 +81,10 @@ class BoundaryCondition:
     each loop). angle_unit: in which problems give angles; the same condition whatever it is.
     """
 
-    mode: Annotated[BoundaryMode, Setting("what the boundary becomes in the domain")] = "straight"
+    mode: Annotated[
+        Literal["auto"] | BoundaryMode,
+        Setting("what the boundary becomes in the domain; auto: straight or isometric"),
+    ] = "auto"
     angles: Annotated[
         tuple[BoundaryAngle, ...], Setting("target angles at boundary vertices, for mode angles", most=10_000)
     ] = ()
@@ -98,10 +103,12 @@ class BoundaryCondition:
         """The condition for a pattern of this kind (None: no pattern), without what has no effect on the map:
         equal for equal maps."""
         name = self.quantum if self.quantum != "auto" else (kind or "none")
+        mode = "angles" if self.mode == "auto" and self.angles else self.mode
         return replace(
             self,
+            mode=mode,
             quantum=QUANTUM_OF.get(name, "none"),
-            angles=self.angles if self.mode == "angles" else (),
+            angles=self.angles if mode == "angles" else (),
         )
 
 

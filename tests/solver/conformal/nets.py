@@ -89,7 +89,9 @@ def check(found: ConformalMap) -> None:
     assert ((np.conj(a) * b).imag > 0).all()
     u = found.log_scale[surface.faces]
     length = surface.lengths * np.exp((u + np.roll(u, -1, axis=1)) / 2)
-    assert found.flips or np.abs(np.abs(np.roll(z, -1, axis=1) - z) / length - 1).max() < 1e-9
+    drawn = np.abs(np.roll(z, -1, axis=1) - z)
+    rounding = 32 * np.finfo(float).eps * np.abs(z).max() / drawn  # corners far away have fewer digits
+    assert found.flips or (np.abs(drawn / length - 1) < 1e-9 + rounding).all()
     face, c = np.nonzero(net.across >= 0)
     other, k = twin.reshape(-1, 3)[face, c] // 3, twin.reshape(-1, 3)[face, c] % 3
     motion = net.crossing[face, c]
@@ -111,7 +113,9 @@ def check(found: ConformalMap) -> None:
     told[found.cones.vertex] -= found.cones.curvature
     for loop, angles in zip(surface.loops, found.boundary_angles, strict=True):
         told[loop] = angles
-    assert np.abs(sums - told).max() < 1e-9
+    allowed = np.zeros(len(sums))
+    np.maximum.at(allowed, surface.faces.ravel(), np.repeat(rounding.max(axis=1), 3))
+    assert (np.abs(sums - told) < 1e-9 + allowed).all()
     total = (
         sum(float((np.pi - angles).sum()) for angles in found.boundary_angles) + found.cones.curvature.sum()
     )

@@ -10,7 +10,7 @@ import pytest
 from hexwrap_solver.arrays import Floats, Ints
 from hexwrap_solver.conformal import conformal_map
 from hexwrap_solver.conformal.types import BoundaryCondition, Cones
-from hexwrap_solver.errors import GaussBonnetError, SingularitiesError
+from hexwrap_solver.errors import ConvergenceError, GaussBonnetError, SingularitiesError
 from hexwrap_solver.surface.types import Surface
 from tests.solver.conformal.nets import HEX, check, sent
 from tests.solver.conformal.shared import NETS, load
@@ -84,13 +84,21 @@ def annulus_with_cones(surface: Surface, random: Random) -> tuple[Surface, Cones
 KINDS: dict[str, Callable[[Surface, Random], tuple[Surface, Cones]]] = {
     kind.__name__: kind for kind in (disk, disk_with_cones, closed, many_loops, annulus_with_cones)
 }
+#: So long or steep that a plane domain has not enough digits for some kinds of them: those may be refused,
+#: with this reason and no other.
+STEEP = ("steep_cone", "long_tube", "long_tube_coarse")
 FEW = ("slivers", "retriangulated", "noisy", "boundary_caps")
 
 
 def judge(name: str, kind: str, spread: str, seed: int) -> None:
     random = np.random.default_rng(seed)
     surface, at = KINDS[kind](TORTURE[name](random), random)
-    found = conformal_map(surface, BoundaryCondition("isometric", quantum="hex", spread=spread), cones=at)  # type: ignore[arg-type]
+    try:
+        found = conformal_map(surface, BoundaryCondition("isometric", quantum="hex", spread=spread), cones=at)  # type: ignore[arg-type]
+    except ConvergenceError as error:
+        if name not in STEEP or "times as much as others" not in error.detail:
+            raise
+        return
     check(found)
     assert found.inserted == len(found.surface.vertices) - len(surface.vertices)
 
