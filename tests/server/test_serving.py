@@ -32,7 +32,7 @@ def test_signals_end_it_cleanly_while_it_works(tmp_path: Path, number: signal.Si
             time.sleep(0.05)
         ids = [client.post(f"{base}/v1/jobs", json=heavy(i)).json()["id"] for i in range(2)]
         workers = children(process)
-        assert len(workers) == 2  # one for jobs, one for errands
+        assert len(workers) >= 2  # one for jobs, one for errands, and who reads large bodies
         process.send_signal(number)
         assert process.wait(PATIENCE) == 0
         assert all(is_gone(worker) for worker in workers)
