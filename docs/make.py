@@ -1,10 +1,11 @@
-"""Makes the pictures of the README: python docs/make.py"""
+"""Makes the pictures of the README and of the documentation: python docs/make.py"""
 
 from __future__ import annotations
 
 import io
 from pathlib import Path
 
+import ezdxf
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
@@ -82,11 +83,42 @@ def cases() -> None:
     figure.savefig(HERE / "cases.png")
 
 
+def sheet() -> Figure:
+    """The first sheet of ``flat.dxf``, drawn from the file itself."""
+    document = ezdxf.read(
+        io.StringIO(write("flat.dxf", solved("entrance"), Meta("entrance", unit="m")).decode())
+    )
+    space = document.modelspace()
+    width, height = 3.0, 1.5
+    figure = Figure(figsize=(10.0, 10.0 * (height + 0.22) / (width + 0.1)), dpi=110)
+    axes = figure.add_axes((0, 0, 1, 1))
+    axes.set(xlim=(-0.05, width + 0.05), ylim=(-0.05, height + 0.17))
+    axes.set_axis_off()
+    points = 10.0 * 72 / (width + 0.1)  # in a unit of the drawing
+    for line in space.query("LWPOLYLINE"):
+        corners = np.array([*line.get_points("xy"), *(line.get_points("xy")[:1] if line.closed else [])])
+        if corners[:, 0].max() <= width * (1 + 1e-9):
+            colour = [c / 255 for c in document.layers.get(line.dxf.layer).rgb or (0, 0, 0)]
+            axes.plot(*corners.T, color=colour, lw=1.4)
+    for word in space.query("TEXT"):
+        middle = bool(word.dxf.halign)
+        x, y, _ = (word.dxf.align_point if middle else word.dxf.insert).xyz
+        if x < width:
+            place = {"ha": "center", "va": "center"} if middle else {"ha": "left", "va": "bottom"}
+            axes.text(
+                x, y, word.dxf.text, fontsize=1.35 * points * word.dxf.height, rotation=word.dxf.rotation,
+                rotation_mode="anchor", color="#4a4f58", **place,
+            )  # fmt: skip
+    return figure
+
+
 def main() -> None:
     picture = Image.open(io.BytesIO(write("panels.png", solved("tower"), Meta("tower"))))
     size = (WIDTH, round(picture.height * WIDTH / picture.width))
     picture.convert("RGB").resize(size, Image.Resampling.LANCZOS).save(HERE / "tower.png", optimize=True)
     cases()
+    (HERE / "domain.svg").write_bytes(write("domain.svg", solved("entrance"), Meta("entrance")))
+    sheet().savefig(HERE / "sheet.png")
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ Run ``python grasshopper/build.py``. The same sources give the same files, whene
 from __future__ import annotations
 
 import io
+import re
 import sys
 import zipfile
 from pathlib import Path
@@ -39,11 +40,10 @@ keywords:
 
 
 def version() -> str:
-    """The project's version, from pyproject.toml."""
-    import tomllib
-
-    with (DIST.parents[1] / "pyproject.toml").open("rb") as file:
-        return str(tomllib.load(file)["project"]["version"])
+    """The project's version, from the solver's source, which is not imported: it needs more than this."""
+    source = (DIST.parents[1] / "solver" / "hexwrap_solver" / "__init__.py").read_text(encoding="utf-8")
+    (found,) = re.findall(r'^__version__ = "(.+)"$', source, re.MULTILINE)
+    return str(found)
 
 
 def draw_icons() -> dict[Path, bytes]:

@@ -22,6 +22,7 @@ from hexwrap_solver.panels.types import Components, ComponentSettings, Panels, P
 from hexwrap_solver.pattern import lay_pattern
 from hexwrap_solver.pattern.types import Pattern, PatternSettings
 from hexwrap_solver.setting import Setting
+from hexwrap_solver.singularities.outlook import outlook
 from hexwrap_solver.singularities.solve import closed_map, needs_singularities, seated
 from hexwrap_solver.singularities.types import SingularitySettings
 from hexwrap_solver.surface.types import Surface
@@ -116,7 +117,7 @@ def _solve(
         fitted = run("fit", FitKey.of(panels), lambda progress: fit_panels(cmap, laid, panels, progress))
         made = run("panels", SizeKey.of(panels), lambda progress: quantize(fitted, panels))
         wanted = panels.components or (ComponentSettings() if settings.support else None)
-    quality = run("quality", None, lambda progress: measure(cmap, laid, made, progress))
+    quality = run("quality", None, lambda progress: _measured(cmap, laid, made, panels, progress))
     parts, frame = None, None
     if made is not None and wanted is not None:
         parts = run("components", wanted, lambda progress: make_components(made, wanted))
@@ -124,6 +125,21 @@ def _solve(
         depth = wanted.depth if wanted is not None else 0.0
         frame = run("support", depth, lambda progress: support(laid, depth, progress))
     return Solution(cmap, quality, laid, made, parts, frame)
+
+
+def _measured(
+    cmap: ConformalMap,
+    laid: Pattern,
+    made: Panels | None,
+    settings: PanelSettings | None,
+    progress: Progress,
+) -> Quality:
+    """With a note where singularities would bring much."""
+    quality = measure(cmap, laid, made, progress)
+    if made is None or settings is None or made.mode == "watertight" or not isinstance(settings.sizes, int):
+        return quality
+    more = outlook(cmap, laid, settings.sizes, 1 - quality.coverage)
+    return replace(quality, notes=(*quality.notes, *more))
 
 
 def _map(

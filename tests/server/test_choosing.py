@@ -307,6 +307,21 @@ def test_a_seam_open_by_less_than_the_tolerance_closes() -> None:
     assert "up to 0.0005 apart" in read.sent.told[0]
 
 
+@pytest.mark.parametrize(("double", "told"), [(False, 1), (True, 0)])
+def test_single_precision_far_from_the_origin_is_told(double: bool, told: int) -> None:
+    far = rhino3dm.Mesh()
+    far.Vertices.UseDoublePrecisionVertices = double
+    points = VERTICES * 100 + np.array([5e6, 5e6, 0])
+    for x, y, z in points.tolist():
+        (far.Vertices.AddPoint3d if double else far.Vertices.Add)(x, y, z)
+    for quad in QUADS.tolist():
+        far.Faces.AddFace(*quad)
+    chosen = Model().add(far, "tower").choose()
+    assert len([x for x in chosen.told if "single precision, exact to 0.5" in x]) == told
+    assert isinstance(chosen.geometry, SentMesh)
+    assert np.array_equal(chosen.geometry.vertices, points) == double
+
+
 # Other formats
 
 

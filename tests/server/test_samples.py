@@ -16,7 +16,7 @@ from hexwrap_solver.surface.nurbs import domain, evaluate, evaluate_points
 from hexwrap_solver.surface.types import SentMesh
 
 #: NURBS surfaces, and meshes.
-FIGURES = ["cone", "diagrid", "entrance", "facade", "isometric", "ring", "tower", "waist"]
+FIGURES = ["cone", "diagrid", "entrance", "facade", "isometric", "ring", "singular", "tower", "waist"]
 MESHES = ["dome", "openings", "roof"]
 
 

@@ -76,7 +76,9 @@ def net(mesh, unrolled, pattern):
     if pattern:
         for ring, cell in zip(pattern["ring"], pattern["corners"]):
             branches.setdefault(ring, []).append(closed_polyline(cell))
-    text = "net with %d loops and %d singularities" % (len(mesh["loops"]), len(unrolled["cones"]))
+    text = "net with %d loop%s" % (len(mesh["loops"]), "" if len(mesh["loops"]) == 1 else "s")
+    if unrolled["cones"]:
+        text += ", singularities: %d" % len(unrolled["cones"])
     return {
         "boundary": boundary,
         "cut": banks,

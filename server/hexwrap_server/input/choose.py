@@ -14,7 +14,16 @@ from fnmatch import fnmatchcase
 import numpy as np
 from scipy.spatial import cKDTree
 
-from hexwrap_server.input.object_words import joint, label, listed, others, point, rows, strays
+from hexwrap_server.input.object_words import (
+    coarse_numbers,
+    joint,
+    label,
+    listed,
+    others,
+    point,
+    rows,
+    strays,
+)
 from hexwrap_server.input.parts import Part, brep_where_needed, parts_of
 from hexwrap_server.input.readers.errors import NoObjectError, SeveralObjectsError, UnreadableFileError
 from hexwrap_server.input.readers.found import FileContent, Found, Geometry
@@ -66,7 +75,8 @@ def choose(
     for seam in found.joints if len(used) > 1 or len(meant) == 1 else ():
         told += joint(seam, content.tolerance or 0.0, len(used))
     told += strays([piece for members, piece in found.strays if members & set(part.members)])
-    told += _nearly(part, [other for other in found.parts if other is not part], meant, content.tolerance)
+    told += _nearly(part, [other for other in found.parts if other is not part], meant, content)
+    told += coarse_numbers(geometry, content.tolerance)
     return Chosen(geometry, tuple(used), (*told, *others(content, used)))
 
 
@@ -122,8 +132,10 @@ def _is_on(found: Found, layer: str | None) -> bool:
     return any(fnmatchcase(path, word) for path in paths)
 
 
-def _nearly(part: Part, others: Sequence[Part], meant: Sequence[Found], tolerance: float | None) -> list[str]:
+def _nearly(part: Part, others: Sequence[Part], meant: Sequence[Found], content: FileContent) -> list[str]:
     """Where edges of another part come near, but not within the tolerance."""
+    tolerance = content.tolerance
+    number = {id(item): i for i, item in enumerate(content.objects)}
     if tolerance is None or not len(part.rim):
         return []
     told = []
@@ -134,8 +146,9 @@ def _nearly(part: Part, others: Sequence[Part], meant: Sequence[Found], toleranc
         distance = np.asarray(tree.query(other.rim)[0])
         k = int(np.argmin(distance))
         if tolerance < distance[k] < NEARLY * tolerance:
+            near = meant[other.members[0]]
             told.append(
-                f"{label(meant[other.members[0]], other.members[0])} comes within {distance[k]:.3g} of the "
+                f"{label(near, number[id(near)])} comes within {distance[k]:.3g} of the "
                 f"surface at {point(other.rim[k])}, more than the file's tolerance of {tolerance:g}, and was "
                 "not joined: close the gap with Rhino's MatchSrf or JoinEdge."
             )

@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from hexwrap_server.input.readers.found import FileContent, Found
+import numpy as np
+
+from hexwrap_server.input.readers.found import FileContent, Found, Geometry
+from hexwrap_solver.surface import SentMesh
 from hexwrap_solver.surface.pieces import Joint, Piece
 
 #: Sentences name at most this many objects, problems list at most this many.
@@ -23,6 +26,20 @@ def joint(joint: Joint, tolerance: float, objects: int) -> list[str]:
     return [
         f"{what}: the greatest gap closed was {joint.gap:.3g}, at {point(joint.place)}, within the file's "
         f"tolerance of {tolerance:g}."
+    ]
+
+
+def coarse_numbers(geometry: Geometry, tolerance: float | None) -> list[str]:
+    """Whether a mesh has coordinates of single precision that are coarser than the file's tolerance."""
+    if not isinstance(geometry, SentMesh) or tolerance is None:
+        return []
+    single = geometry.vertices.astype(np.float32)
+    grain = float(np.spacing(np.abs(single).max(initial=0.0)))
+    if grain <= tolerance or not np.array_equal(single, geometry.vertices):
+        return []
+    return [
+        f"The mesh is far from the origin and has coordinates of single precision, exact to {grain:.2g} "
+        f"only, coarser than the file's tolerance of {tolerance:g}: move it to the origin, then mesh it."
     ]
 
 

@@ -221,7 +221,7 @@ def house() -> Facets:
 def requests() -> list[tuple[NurbsSurface | Facets, dict[str, Any]]]:
     """Every sample: its surface and its request body."""
     tubes = [_tower(), _facade(), _waist(), _cone(), _isometric(), _entrance(), _diagrid(), _ring()]
-    return [*tubes, _roof(), _dome(), _openings()]
+    return [*tubes, _singular(), _roof(), _dome(), _openings()]
 
 
 def _of_mesh(name: str, mesh: Facets, **request: Any) -> tuple[Facets, dict[str, Any]]:
@@ -340,6 +340,18 @@ def _ring() -> tuple[NurbsSurface, dict[str, Any]]:
     surface = canopy()
     return surface, body(
         "ring", surface, boundary={"mode": "isometric"}, pattern={"kind": "hex", "around": 72}
+    )
+
+
+def _singular() -> tuple[NurbsSurface, dict[str, Any]]:
+    """The tower again, with three heptagons that make its hexagons nearly equal."""
+    surface = tower()
+    return surface, body(
+        "singular",
+        surface,
+        boundary={"mode": "isometric"},
+        singularities={"count": "auto"},
+        pattern={"kind": "hex", "around": 48, "boundary": "trim"},
     )
 
 

@@ -48,14 +48,17 @@ export interface Result {
   mesh: { vertices: Vec3[]; faces: number[][]; input_vertex: number[]; vertex_of_input: number[]; loops: number[][]; repairs: string[] };
   map: {
     kind: string;
-    cone_angle: number;
-    log_scale: number[];
-    uv: Vec2[];
-    sheet: number[][];
-    deck: { angle: number; translation: Vec2 };
+    /** The six that follow describe cylinders and cones; they are null on nets, whose corners say it all. */
+    cone_angle: number | null;
+    uv: Vec2[] | null;
+    sheet: number[][] | null;
+    deck: { angle: number; translation: Vec2 } | null;
     apex: Vec2 | null;
-    circumference: number;
-    boundary_angles: [number[], number[]];
+    circumference: number | null;
+    corners?: Vec2[][] | null;
+    cones: { vertex: number; index: number; moved: number }[];
+    log_scale: number[];
+    boundary_angles: number[][];
     iterations: number;
     residual: number;
     flips: number;
@@ -66,7 +69,9 @@ export interface Result {
     normals: Vec3[];
     uv: Vec2[];
     faces: number[][];
-    sheet?: number[][];
+    sheet?: number[][] | null;
+    corners?: Vec2[][] | null;
+    index?: number[];
     whole: boolean[];
     neighbours: number[][];
     rings: number;

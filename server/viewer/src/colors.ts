@@ -1,5 +1,5 @@
 // Colour per panel for each way of looking, and the legend that explains it.
-import type { Result } from "./api";
+import type { Result, Vec2 } from "./api";
 
 export type Mode = "size" | "planarity" | "gap" | "distance" | "scale";
 
@@ -59,13 +59,13 @@ export function measure(result: Result, mode: Mode): Float64Array {
 
 /** e^{-u} at each panel: edge length on the surface over edge length in the domain, mean over the cell. */
 function scaleFactors(result: Result): Float64Array {
-  const { pattern, panels, map } = result;
+  const { pattern, panels } = result;
   const out = new Float64Array(panels!.face.length).fill(NaN);
   if (!pattern) return out;
-  const place = placer(map);
+  const corners = cellCorners(result);
   panels!.face.forEach((face, i) => {
     const cell = pattern.faces[face];
-    const sheets = pattern.sheet?.[face];
+    const flat = corners(face);
     let onSurface = 0;
     let inDomain = 0;
     cell.forEach((v, k) => {
@@ -73,8 +73,8 @@ function scaleFactors(result: Result): Float64Array {
       const p = pattern.vertices[v];
       const q = pattern.vertices[w];
       onSurface += Math.hypot(p[0] - q[0], p[1] - q[1], p[2] - q[2]);
-      const a = place(pattern.uv[v], sheets?.[k] ?? 0);
-      const b = place(pattern.uv[w], sheets?.[(k + 1) % cell.length] ?? 0);
+      const a = flat[k];
+      const b = flat[(k + 1) % cell.length];
       inDomain += Math.hypot(a[0] - b[0], a[1] - b[1]);
     });
     out[i] = onSurface / inDomain;
@@ -82,9 +82,28 @@ function scaleFactors(result: Result): Float64Array {
   return out;
 }
 
+/** Where the corners of a cell stand in the domain, in one piece. */
+export function cellCorners(result: Result): (cell: number) => Vec2[] {
+  const { pattern, map } = result;
+  if (!pattern) return () => [];
+  const { corners } = pattern;
+  if (corners) return (cell) => corners[cell];
+  const place = placer(map);
+  return (cell) => pattern.faces[cell].map((v, k) => place(pattern.uv[v], pattern.sheet?.[cell]?.[k] ?? 0));
+}
+
+/** Where the corners of a mesh face stand in the domain. */
+export function faceCorners(result: Result): (face: number) => Vec2[] {
+  const { mesh, map } = result;
+  const { corners, uv, sheet } = map;
+  if (!uv || !sheet) return (face) => corners![face];
+  const place = placer(map);
+  return (face) => mesh.faces[face].map((v, k) => place(uv[v], sheet[face][k]));
+}
+
 /** g^s(z) for the deck transformation g(z) = e^{iK} z + t. */
-export function placer(map: Result["map"]): (z: [number, number], s: number) => [number, number] {
-  const { angle, translation } = map.deck;
+function placer(map: Result["map"]): (z: [number, number], s: number) => [number, number] {
+  const { angle, translation } = map.deck!;
   const apex = map.apex;
   return ([x, y], s) => {
     if (!s) return [x, y];

@@ -2,7 +2,7 @@
 import * as THREE from "three";
 import { MapControls } from "three/examples/jsm/controls/MapControls.js";
 import type { Result, Vec2 } from "./api";
-import { placer } from "./colors";
+import { cellCorners, faceCorners } from "./colors";
 import { pack, PolygonLayer } from "./polygons";
 
 const CORNER_TOLERANCE = 1e-3;
@@ -60,13 +60,14 @@ export class DomainView {
 
   show(result: Result, keepView: boolean): void {
     this.clear();
-    const place = placer(result.map);
-    const middle = this.middleOf(result.map.uv);
+    const corners = faceCorners(result);
+    const middle = this.middleOf(result.mesh.faces.map((_, i) => corners(i)[0]));
     const local = ([x, y]: Vec2): Vec2 => [x - middle[0], y - middle[1]];
     const { pattern, panels } = result;
     this.box.makeEmpty();
     if (pattern) {
-      const cells = pattern.faces.map((face, f) => face.map((v, k) => local(place(pattern.uv[v], pattern.sheet?.[f]?.[k] ?? 0))));
+      const flat = cellCorners(result);
+      const cells = pattern.faces.map((_, f) => flat(f).map(local));
       this.layer = new PolygonLayer(pack(cells), false);
       for (const cell of cells) for (const p of cell) this.box.expandByPoint(new THREE.Vector2(...p));
       this.scene.add(this.layer.group);
@@ -76,7 +77,7 @@ export class DomainView {
         this.polygonOfPanel.set(i, face);
       });
     }
-    this.drawBoundary(result, (z, s) => local(place(z, s)));
+    this.drawBoundary(result, (face) => corners(face).map(local), local);
     if (!keepView) this.fit();
     this.invalidate();
   }
@@ -91,7 +92,7 @@ export class DomainView {
   }
 
   /** Mesh boundary as drawn by the faces that hold it, corners as dots, the cut's two images left open. */
-  private drawBoundary(result: Result, place: (z: Vec2, s: number) => Vec2): void {
+  private drawBoundary(result: Result, corners: (face: number) => Vec2[], local: (z: Vec2) => Vec2): void {
     const { mesh, map } = result;
     const count = new Map<string, number>();
     const key = (a: number, b: number) => (a < b ? `${a},${b}` : `${b},${a}`);
@@ -101,12 +102,16 @@ export class DomainView {
     const curved = corner.size > 24; // an isometric boundary bends at every vertex: no corners to mark
     const lines: number[] = [];
     const dots: number[] = [];
+    const singular = new Set(map.cones.map((cone) => cone.vertex));
+    const centres: number[] = [];
     mesh.faces.forEach((f, i) => {
+      const at = corners(i);
+      f.forEach((v, k) => singular.has(v) && centres.push(...at[k], 0.02));
       for (let k = 0; k < 3; k++) {
         const [a, b] = [f[k], f[(k + 1) % 3]];
         if (count.get(key(a, b)) !== 1) continue;
-        const p = place(map.uv[a], map.sheet[i][k]);
-        const q = place(map.uv[b], map.sheet[i][(k + 1) % 3]);
+        const p = at[k];
+        const q = at[(k + 1) % 3];
         lines.push(...p, 0.01, ...q, 0.01);
         this.box.expandByPoint(new THREE.Vector2(...p));
         if (!curved && corner.has(a)) dots.push(...p, 0.02);
@@ -114,8 +119,9 @@ export class DomainView {
     });
     this.marks.add(new THREE.LineSegments(positions(lines), new THREE.LineBasicMaterial({ color: 0xc2410c })));
     if (dots.length) this.marks.add(new THREE.Points(positions(dots), new THREE.PointsMaterial({ color: 0xc2410c, size: 8, sizeAttenuation: false })));
-    if (map.apex && this.box.clone().expandByScalar(0.3 * this.box.getSize(new THREE.Vector2()).length()).containsPoint(new THREE.Vector2(...place(map.apex, 0))))
-      this.marks.add(new THREE.Points(positions([...place(map.apex, 0), 0.02]), new THREE.PointsMaterial({ color: 0x1f6f78, size: 7, sizeAttenuation: false })));
+    if (centres.length) this.marks.add(new THREE.Points(positions(centres), new THREE.PointsMaterial({ color: 0x6a3fa0, size: 8, sizeAttenuation: false })));
+    if (map.apex && this.box.clone().expandByScalar(0.3 * this.box.getSize(new THREE.Vector2()).length()).containsPoint(new THREE.Vector2(...local(map.apex))))
+      this.marks.add(new THREE.Points(positions([...local(map.apex), 0.02]), new THREE.PointsMaterial({ color: 0x1f6f78, size: 7, sizeAttenuation: false })));
   }
 
   fit(): void {

@@ -399,7 +399,10 @@ function drawQuality(): void {
   const rows: [string, string][] = [];
   if (result) {
     const { map, pattern, panels, quality: q } = result;
-    rows.push(["Domain", map.kind === "cone" ? `cone, ${number((180 * map.cone_angle) / Math.PI)}°` : "cylinder"]);
+    const loops = `${map.boundary_angles.length} loop${map.boundary_angles.length === 1 ? "" : "s"}`;
+    const cone = map.cone_angle === null ? "" : `, ${number((180 * map.cone_angle) / Math.PI)}°`;
+    rows.push(["Domain", map.kind === "net" ? `net with ${loops}` : map.kind === "cone" ? `cone${cone}` : "cylinder"]);
+    if (map.cones.length) rows.push(["Singularities", String(map.cones.length)]);
     if (pattern) rows.push(["Pattern", `${pattern.around} around × ${pattern.rings} rings`], ["Distortion", number(pattern.distortion, 2)]);
     rows.push(["Scale ratio", number(q.scale_ratio)]);
     if (panels) rows.push(

@@ -66,7 +66,7 @@ def lay_pattern(cmap: ConformalMap, settings: PatternSettings, progress: Progres
     settings, notes = with_rotation(cmap, lattice, settings)
     placing = Placing.of(cmap, lattice, settings)
     pattern = _lay(cmap, placing, settings, progress)
-    if settings.around is not None and pattern.around != settings.around:
+    if settings.around is not None and pattern.around != settings.around and cmap.fitted is None:
         notes.append(
             f"{pattern.around} cells around instead of {settings.around}: the nearest that closes up."
         )

@@ -286,16 +286,16 @@ class Closing:
         kind = np.array(loops, dtype=np.int64)
         # Of the motions around all leaves and the root one follows from the others.
         spare = np.flatnonzero(kind == -2)
-        if not len(spare):
+        if not len(spare) and self.order == 6:
             spare = np.flatnonzero((kind == -1) & (np.abs(np.append(chart.index[1:], 0 * kind[s:])) == 1))
         keep = np.ones(len(kind), dtype=bool)
         if len(spare):
             keep[spare[-1]] = False
         self.kept = np.flatnonzero(keep)
         self.aligned = kind[self.kept] == -3
-        # The motion of a cone with |k| ≥ 2 turns about a cell's centre only for some translations.
-        k = np.concatenate([chart.index[1:], np.zeros(len(kind) - s, dtype=np.int64)])
-        self.divisor = np.where(np.abs(k) >= 2, 1 - self.zeta**self.base.turn, 1.0)[self.kept]
+        # A cone's motion turns about a cell's centre for multiples of 1 − ζ^k, all where that is a unit.
+        cone = np.arange(len(kind)) < s
+        self.divisor = np.where(cone, 1 - self.zeta**self.base.turn, 1.0)[self.kept]
 
     def _depth(self, seen: Seen, factor: complex) -> Floats:
         """Of straight loops that are to be aligned, inwards."""

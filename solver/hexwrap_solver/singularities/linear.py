@@ -104,10 +104,18 @@ def reference_loops(surface: Surface, rules: Rules) -> tuple[int, ...]:
 
 
 def linear_model(
-    surface: Surface, rules: Rules, turn: Floats | None = None, seats: Ints | None = None
+    surface: Surface,
+    rules: Rules,
+    turn: Floats | None = None,
+    seats: Ints | None = None,
+    patches: int = PATCHES,
+    steps: bool = True,
 ) -> Model:
-    """turn: (n,) see Model. seats: vertices that singularities may stand on; None: as the rules allow. One
-    nonlinear solution without singularities, one factorisation, and a solve for every seat."""
+    """One nonlinear solution without singularities, one factorisation, and a solve for every seat.
+
+    turn: (n,) see Model. seats: vertices that singularities may stand on; None: as the rules allow. patches:
+    about so many. steps: with the nonlinear solution; else the metric of the surface itself stands in.
+    """
     turns = round(2 * np.pi / rules.quantum)
     free = tuple(i for i, end in enumerate(rules.ends) if end == "free")
     loops = reference_loops(surface, rules)
@@ -117,8 +125,8 @@ def linear_model(
     background = rest * rules.quantum if not free else 0.0
     wanted = targets(surface, rules.ends, loops, rules.quantum, none, none, background, rules.angles)
     energy = Energy(surface, wanted)
-    u, factor = _reference(energy)
-    patch, seat = _patches(surface, area)
+    u, factor = _reference(energy, steps)
+    patch, seat = _patches(surface, area, patches)
     weight = np.bincount(patch, area)
     share = csr_array((area / weight[patch], (patch, np.arange(len(patch)))), shape=(len(seat), len(patch)))
 
@@ -150,18 +158,20 @@ def linear_model(
     )
 
 
-def _reference(energy: Energy) -> tuple[Floats, Factorisation]:
+def _reference(energy: Energy, steps: bool) -> tuple[Floats, Factorisation]:
     """u without singularities and the factorised Hessian there; where triangles would have to be flipped, one
     Newton step on the surface's own metric: with smooth surfaces, u is linear anyway."""
-    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        found = minimise(energy)
-    holds = found.converged and not found.broken
-    corners = found.corners if holds else energy.corners(np.zeros(energy.n))
+    u, corners, holds = np.zeros(energy.n), energy.corners(np.zeros(energy.n)), False
+    if steps:
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            found = minimise(energy)
+        if holds := found.converged and not found.broken:
+            u, corners = found.u, found.corners
     factor = Factorisation(energy.points, energy.rows, energy.columns)
     diagonal, off = energy.hessian(corners)
     factor.factorise(diagonal + (0.0 if holds else 1e-12 * np.abs(diagonal).max()), off)
     if holds:
-        return found.u, factor
+        return u, factor
     return energy.scale_of(factor.solve(-energy.gradient(corners))), factor
 
 
@@ -174,18 +184,18 @@ def _scales(energy: Energy, factor: Factorisation, dof: Ints) -> Floats:
     return np.asarray(np.concatenate([np.zeros((1, len(dof))), solved])[energy.dof + 1])
 
 
-def _patches(surface: Surface, area: Floats) -> tuple[Ints, Ints]:
+def _patches(surface: Surface, area: Floats, wanted: int) -> tuple[Ints, Ints]:
     """(n,) patch of each vertex, and (p,) the vertex in its middle; the same whatever the numbering."""
     vertices = surface.vertices
-    if len(vertices) <= PATCHES:
+    if len(vertices) <= wanted:
         middle = np.lexsort(vertices.T)
         return np.argsort(middle), middle
-    size = float(np.sqrt(area.sum() / PATCHES))
+    size = float(np.sqrt(area.sum() / wanted))
     low = vertices.min(axis=0)
     for _ in range(4):  # a surface meets more cubes than squares of its size
         box = np.floor((vertices - low) / size).astype(np.int64)
         _, cube, count = np.unique(box, axis=0, return_inverse=True, return_counts=True)
-        size *= float(np.sqrt(len(count) / PATCHES))
+        size *= float(np.sqrt(len(count) / wanted))
     cube = cube.ravel()
     off = np.linalg.norm(vertices - _means(vertices, cube, area)[cube], axis=1)
     order = np.lexsort((*vertices.T, off, cube))

@@ -51,6 +51,7 @@ def place(
 
 
 def _choice(proposals: list[Proposal], count: int | Literal["auto"]) -> int:
+    """Index of the one to take."""
     uncovered = np.array([one.uncovered for one in proposals])
     number = np.array([one.count for one in proposals])
     if count != "auto":
@@ -62,7 +63,13 @@ def _choice(proposals: list[Proposal], count: int | Literal["auto"]) -> int:
                 field=("singularities", "count"),
             )
         return int(possible[np.argmin(uncovered[possible])])
-    best = int(np.argmin(uncovered + WORTH * number))
+    return chosen_of(proposals)
+
+
+def chosen_of(proposals: list[Proposal]) -> int:
+    """As many as pay."""
+    uncovered = np.array([one.uncovered for one in proposals])
+    best = int(np.argmin(uncovered + WORTH * np.array([one.count for one in proposals])))
     return best if uncovered[best] <= (1 - CLEARLY) * uncovered[0] else 0
 
 

@@ -317,8 +317,9 @@ def _loop_moves(loops: int) -> list[tuple[int, ...]]:
     return moves
 
 
-def curve(search: Search) -> list[Proposal]:
-    """The best there is with 0, 1, 2, … singularities, as far as the rules allow and numbers are possible."""
+def curve(search: Search, starts: int = STARTS, refine: bool = True) -> list[Proposal]:
+    """The best there is with 0, 1, 2, … singularities, as far as the rules allow and numbers are possible.
+    starts: random ones for each number. refine: for the uncovered area, beyond the variance."""
     rng = np.random.default_rng(17)
     kinds = [k for size in range(1, search.rules.largest + 1) for k in (-size, size)]
     beam = [search.settled(State((), (), (0,) * max(len(search.model.free) - 1, 0)))]
@@ -328,9 +329,11 @@ def curve(search: Search) -> list[Proposal]:
             beam = [
                 one
                 for group in _grouped(search, _additions(search, beam, kinds), number)
-                for one in _best(search, group, rng)
+                for one in _best(search, group, rng, starts)
             ]
-        whole = [search.refined(state) for _, state in beam if search.complete(state)]
+        whole = [one for one in beam if search.complete(one[1])]
+        if refine:
+            whole = [search.refined(state) for _, state in whole]
         if whole:
             found.append(search.proposal(min(whole, key=lambda one: (one[0], one[1].seat))[1]))
     return found
@@ -355,7 +358,7 @@ def _grouped(
 
 
 def _best(
-    search: Search, added: list[tuple[float, State]], rng: np.random.Generator
+    search: Search, added: list[tuple[float, State]], rng: np.random.Generator, starts: int
 ) -> list[tuple[float, State]]:
     """The best states of a number, from these and from random ones with the same indices."""
     tried = {}
@@ -365,7 +368,7 @@ def _best(
     if not tried:
         return []
     leading = min(tried, key=lambda state: (tried[state], state.seat))
-    for _ in range(STARTS):
+    for _ in range(starts):
         state = State((), (), leading.loops)
         for k in leading.index:
             clear = np.flatnonzero(search.open_seats(state, k))

@@ -343,5 +343,11 @@ def _notes(frame: Frame, found: Closed, placing: Placing) -> Iterator[str]:
             f"In {frame.rules.sizes} sizes, the sizes alone leave about {proposal.uncovered:.1%} uncovered, "
             f"without singularities {none.uncovered:.1%} (linear model)."
         )
+    lines = [f"loop {i}" for i, on in enumerate(frame.aligned) if on]
+    if lines:
+        yield (
+            f"Lattice lines lie on {' and '.join(lines)}; with free ends (boundary.mode isometric) and "
+            "trimmed cells less is left open."
+        )
     if found.stretch:
         yield f"A uniform stretch by {abs(found.stretch):.2%} along the height makes both ends lattice lines."

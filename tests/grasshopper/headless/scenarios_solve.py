@@ -358,6 +358,20 @@ def domain_of_a_cylinder():
     assert domain.Cut and all(len(line.points) == 2 for line in domain.Cut)
 
 
+def domain_of_a_net():
+    """A pointed cup has one loop: its domain is a disk."""
+    pattern = json.dumps({"pattern": {"edge_length": 0.5}})
+    send = done(Mesh=world.with_lid(world.tube(), 2.0), Mode="isometric", Pattern=pattern)
+    domain = collected("Domain", Job=send.Job)
+    assert domain.Summary == "net with 1 loop" and domain.Cut == []
+    (loop,) = domain.Boundary
+    points = loop.xyz()
+    assert len(points) == 25 and max(abs(a - b) for a, b in zip(points[0], points[-1])) < 1e-6
+    cells = domain.Pattern.flat()
+    assert len(cells) == len(collected("Collect", Job=send.Job).Panels.flat())
+    assert all(cell.IsClosed and len(cell.points) == 7 for cell in cells)
+
+
 def domain_with_corners():
     rim = [Point3d(2.75, 0.0, 0.0), Point3d(-2.75, 0.0, 0.0)]
     angles = Component("BoundaryAngles").set(Points=rim, Angle=[240.0, 120.0], Mesh=world.tube())
@@ -601,6 +615,7 @@ world.run([
     wrong_jobs_are_refused,
     jobs_without_panels_are_told,
     domain_of_a_cylinder,
+    domain_of_a_net,
     domain_with_corners,
     curves_are_lifted_across_the_cut,
     circles_and_lines_are_lifted,

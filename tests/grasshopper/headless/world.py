@@ -52,11 +52,11 @@ def tube(around=24, high=10, waist=0.75, height=6.0, normals=False):
     return Mesh(points, faces, [(p[0], p[1], 0.0) for p in points] if normals else ())
 
 
-def with_lid(mesh):
+def with_lid(mesh, depth=0.0):
     """One end closed: a cup, which has one boundary loop only."""
     around = mesh.Vertices.Count // 11 - 1
     points, faces = list(mesh.Vertices.points), list(mesh.Faces.rows)
-    points.append((0.0, 0.0, 0.0))
+    points.append((0.0, 0.0, -depth))
     faces += [(k + 1, k, len(points) - 1) for k in range(around)]
     return Mesh(points, faces)
 

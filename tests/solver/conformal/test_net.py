@@ -11,7 +11,7 @@ from hexwrap_solver.conformal import boundary, conformal_map
 from hexwrap_solver.conformal.cut import cut_open
 from hexwrap_solver.conformal.robust import solve_with_flips
 from hexwrap_solver.conformal.types import BoundaryAngle, BoundaryCondition, Cones, LoopCondition
-from hexwrap_solver.errors import GaussBonnetError, SingularitiesError
+from hexwrap_solver.errors import BoundaryError, GaussBonnetError, SettingError, SingularitiesError
 from tests.solver.conformal.annuli import bump
 from tests.solver.conformal.nets import CENTRES, HEX, SPHERE, check, disk, flat, holed, sent, spread_points
 
@@ -100,7 +100,7 @@ def test_a_flat_rectangle_maps_to_itself() -> None:
     check(found)
     assert np.ptp(found.log_scale) < 1e-12
     with pytest.raises(GaussBonnetError, match="must turn by 360°"):
-        conformal_map(surface, BoundaryCondition())
+        conformal_map(surface, BoundaryCondition("straight"))
 
 
 def test_single_loops_have_their_own_conditions() -> None:
@@ -181,3 +181,40 @@ def test_cones_side_by_side() -> None:
             surface, BoundaryCondition("isometric", quantum="hex"), cones=Cones.at(ring, np.array(index), HEX)
         )
         check(found)
+
+
+def test_singularities_that_cannot_be() -> None:
+    surface = holed(SPHERE, CENTRES[:3], 0.35)
+    asked = BoundaryCondition("isometric", quantum="hex")
+    rim, inner = int(surface.loops[1][0]), int(spread_points(surface, 1)[0])
+    for vertices, index, words in (
+        ([rim], [1], "of the boundary"),
+        ([inner, inner], [1, -1], "at one vertex"),
+        ([inner], [6], "must be less than 6"),
+    ):
+        with pytest.raises(SingularitiesError, match=words):
+            conformal_map(surface, asked, cones=Cones.at(np.array(vertices), np.array(index), HEX))
+
+
+def test_loops_that_are_not_there() -> None:
+    surface = bump(12, 4)
+    with pytest.raises(BoundaryError, match="Loop 2 is asked for, but the surface has 2 boundary loops"):
+        conformal_map(surface, BoundaryCondition("straight", loops=(LoopCondition("isometric", loop=2),)))
+    with pytest.raises(SettingError, match="either 'loop' or 'point'"):
+        LoopCondition("isometric")
+    by_point = LoopCondition("isometric", point=(0.0, 0.0, 9.0))
+    found = conformal_map(surface, BoundaryCondition("straight", quantum="hex", loops=(by_point,)))
+    assert found.boundary_angles[0] == pytest.approx(np.pi)
+    assert np.ptp(found.log_scale[surface.loops[1]]) == 0
+
+
+def test_rims_that_flips_have_touched_are_told() -> None:
+    """u = 0 holds on the intrinsic triangulation; the sent edges keep their lengths only nearly."""
+    random = np.random.default_rng(0)
+    tower = bump(24, 8)
+    noisy = sent(tower.vertices + 0.08 * random.standard_normal(tower.vertices.shape), tower.faces)
+    found = conformal_map(noisy, BoundaryCondition("isometric", quantum="none"))
+    assert found.flips > 0
+    assert any("keep their lengths only to within" in note for note in found.notes)
+    smooth = conformal_map(tower, BoundaryCondition("isometric", quantum="none"))
+    assert not smooth.notes

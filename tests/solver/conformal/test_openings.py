@@ -65,14 +65,14 @@ def test_the_map_beside_a_window_is_what_it_would_be_without(mode: str) -> None:
 def test_a_window_that_does_not_lie_flat() -> None:
     """A ring-like hole around most of the tower: no plane shows it without overlap."""
     surface = with_openings(windows(1, 40, 2), "cut")
-    found = conformal_map(surface, BoundaryCondition())
+    found = conformal_map(surface, BoundaryCondition("straight"))
     check(found)
     assert len(found.surface.loops) == 3
 
 
 def test_with_loops_the_openings_are_boundaries() -> None:
     surface = with_openings(windows(3), "loop")
-    found = conformal_map(surface, BoundaryCondition(quantum="hex"))
+    found = conformal_map(surface, BoundaryCondition("straight", quantum="hex"))
     check(found)
     assert found.kind == "net"
     sums = [boundary.cone_angle(angles) for angles in found.boundary_angles]

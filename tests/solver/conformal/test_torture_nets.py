@@ -124,7 +124,7 @@ def test_public_models(name: str, spread: str) -> None:
     surface = load(NETS[name])
     if spread == "straight" and len(surface.loops) < 2:
         with pytest.raises(GaussBonnetError if surface.loops else SingularitiesError):
-            conformal_map(surface, BoundaryCondition())
+            conformal_map(surface, BoundaryCondition("straight"))
         return
     at = Cones.none() if surface.loops else cones(surface, 12, np.random.default_rng(0))
     mode = "straight" if spread == "straight" else "isometric"

@@ -250,3 +250,16 @@ def test_refusals() -> None:
     )
     with pytest.raises(TrimError, match=r"Face 2|face 2"):
         mesh_brep(replace(brep, faces=(*brep.faces[:2], lifted, *brep.faces[3:])))
+
+
+def test_a_periodic_surface_whose_seam_is_a_hair_off_its_knot() -> None:
+    nurbs = cylinder()
+    u, v = nurbs.knots
+    moved = replace(nurbs, knots=(u * 13.147153588307066 / 4 - 7e-15, v))
+    assert euler(mesh_brep(brep_of_surface(moved, 1e-3))) == 0
+
+
+def test_a_face_one_row_high() -> None:
+    corner = np.array([[[0, 0, 0], [0, 0, 0.05]], [[40, 0, 0], [40, 0, 0.05]]])
+    mesh = mesh_brep(brep_of_surface(bilinear(corner), 1e-3), MeshSettings(max_edge=2.0))
+    assert euler(mesh) == 1

@@ -130,7 +130,7 @@ def loops_to_align(
     if cmap.kind == "net":
         return [], [
             "The pattern is not aligned: sides are aligned on cylinders, cones and disks."
-        ] if wanted else []
+        ] if wanted and cmap.fitted is None else []
     loops = [loop for loop in wanted if is_polygon(cmap, lattice, loop)]
     if len(loops) == len(wanted):
         return loops, []

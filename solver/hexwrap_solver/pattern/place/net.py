@@ -189,7 +189,7 @@ def _choices(
     fitted = cmap.fitted
     if fitted is not None and fitted.order == lattice.order:
         e1 = complex(lattice.position(lattice.basis[0]))
-        A, B = np.array([e1 * fitted.factor]), np.array([e1 * fitted.shift])
+        A, B = np.array([e1 * fitted.factor]), np.array([e1 * fitted.shift + _centre(lattice)])
         rows, misfit = _rounded(lattice, motions, A, B)
         if misfit[0] < NEARLY:
             return [(0.0, complex(A[0]), complex(B[0]), rows[0])]
@@ -273,10 +273,15 @@ def _rounded(lattice: Lattice, motions: Motions, A: Complexes, B: Complexes) -> 
     return rows, np.asarray(misfit)
 
 
+def _centre(lattice: Lattice) -> int:
+    """Where a singularity may stand: the centre of a cell, among triangles a vertex."""
+    return 1 if lattice.kind == "quad" else 0  # the centres of quads are the coset 1
+
+
 def _about_centre(lattice: Lattice, k: int, wanted: Complexes) -> Ints:
     """(…, 4) rotations by −k quanta, as going around a cone amounts to, about the centres of cells nearest to
     the wanted places."""
-    offset = 1 if lattice.kind == "quad" else 0  # the centres of quads are the coset 1
+    offset = _centre(lattice)
     centre = lattice.translations_near(wanted - offset) + np.array([offset, 0])
     rows = np.zeros((*centre.shape[:-1], 4), dtype=np.int64)
     rows[..., 0] = -k % lattice.order
@@ -285,11 +290,11 @@ def _about_centre(lattice: Lattice, k: int, wanted: Complexes) -> Ints:
 
 
 def is_centre(lattice: Lattice, rotation: Ints) -> Bools:
-    """(…,) whether rotations (…, 4) are about centres of cells."""
+    """(…,) whether rotations (…, 4) are about centres of cells, among triangles also about vertices."""
     centre = fixed_point(lattice, rotation)
     point = np.rint(lattice.coordinates(centre)).astype(np.int64)
     on_lattice = abs(lattice.position(point) - centre) < 1e-6
-    return np.asarray(on_lattice & ~lattice.is_node(point))
+    return np.asarray(on_lattice & (~lattice.is_node(point) | (lattice.kind == "triangle")))
 
 
 def fixed_point(lattice: Lattice, rotation: Ints) -> Complexes:

@@ -185,10 +185,10 @@ class Chart:
         k = np.arange(1, self.rows)
         heights = np.stack(
             [np.interp(k * ROW, self.y[:, i], self.t) for i in range(len(self.s))], axis=1
-        ).reshape(len(k), -1)
+        ).reshape(len(k), len(self.s))
         along = np.stack(
             [np.interp(heights[:, i], self.t, self.along[:, i]) for i in range(len(self.s))], axis=1
-        ).reshape(len(k), -1)
+        ).reshape(len(k), len(self.s))
         total = cumulated(along, np.diff(self.s))
         for row in range(len(k)):
             n = max(1, int(np.ceil(total[row, -1] - 1e-6)))

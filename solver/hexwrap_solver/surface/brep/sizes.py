@@ -105,9 +105,9 @@ def field_of(patch: Patch, outline: shapely.Polygon) -> Field:
 
 
 def _lines(patch: Patch, direction: int, low: float, high: float) -> Floats:
-    knots = patch.surface.knots[direction]
-    marks = np.unique(np.concatenate([[low], knots[(knots > low) & (knots < high)], [high]]))
-    marks = np.delete(marks, 1 + np.flatnonzero(np.diff(marks[:-1]) < 1e-9 * (high - low)))
+    knots, margin = patch.surface.knots[direction], 1e-9 * (high - low)
+    inner = np.unique(knots[(knots > low + margin) & (knots < high - margin)])
+    marks = np.concatenate([[low], inner, [high]])
     per_span = max(-(-LINES // (len(marks) - 1)), PER_SPAN)
     steps = marks[:-1, None] + np.diff(marks)[:, None] * np.arange(per_span) / per_span
     lines = steps.ravel()[:: max(1, steps.size // MOST_LINES)]

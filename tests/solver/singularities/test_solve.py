@@ -1,0 +1,151 @@
+"""The whole way with singularities: cells close around them, panels are regular, nothing overlaps."""
+
+import numpy as np
+import pytest
+
+from hexwrap_solver.conformal.types import BoundaryCondition
+from hexwrap_solver.errors import SingularitiesError
+from hexwrap_solver.panels.types import PanelSettings
+from hexwrap_solver.pattern.types import PatternSettings
+from hexwrap_solver.pipeline import SolveSettings, solve
+from hexwrap_solver.singularities.types import SingularityAt, SingularitySettings
+from tests.solver.singularities import shapes
+
+SIDES = {"hex": 6, "quad": 4, "triangle": 3}
+
+
+def solved(surface, mode="isometric", count=None, at=(), panels=None, **pattern):
+    asked = SingularitySettings(count, at) if count is not None or at else None
+    settings = SolveSettings(
+        BoundaryCondition(mode), PatternSettings(**pattern), panels or PanelSettings(), asked
+    )
+    return solve(lambda: surface, settings)
+
+
+#: Two heptagons (or their like) on opposite sides of the waist.
+ASIDE = (SingularityAt(-1, vertex=620), SingularityAt(-1, vertex=600))
+#: Between straight ends Σ k = 0, and Σ k·turn is a whole number.
+PAIRS = (*ASIDE, SingularityAt(1, vertex=220), SingularityAt(1, vertex=200))
+CASES = {
+    "tube": (shapes.waist, "isometric", None, ASIDE, {"around": 16}),
+    "trimmed": (shapes.waist, "isometric", None, ASIDE, {"around": 16, "boundary": "trim"}),
+    "octagon": (shapes.waist, "isometric", None, (SingularityAt(-2, vertex=620),), {"around": 16}),
+    "quads": (shapes.waist, "isometric", None, ASIDE, {"kind": "quad", "around": 16}),
+    "triangles": (shapes.waist, "isometric", None, ASIDE, {"kind": "triangle", "around": 44}),
+    "closed": (shapes.ellipsoid, "straight", None, (), {"edge_length": 0.2}),
+    "both ends aligned": (shapes.waist, "straight", None, PAIRS, {"around": 20, "align": "both"}),
+}
+
+
+@pytest.fixture(scope="module", params=CASES)
+def case(request):
+    make, mode, count, at, pattern = CASES[request.param]
+    return request.param, solved(make(), mode, count, at, **pattern)
+
+
+def test_the_pattern_has_the_singularities_of_the_map(case):
+    _, solution = case
+    cones, laid = solution.map.cones, solution.pattern
+    assert len(cones) > 0
+    if laid.kind == "triangle":  # there they are vertices
+        whole = laid.faces.values[np.repeat(laid.whole, laid.faces.lengths)]
+        inner = np.ones(len(laid.vertices), dtype=bool)
+        inner[laid.faces.values[laid.neighbours.values < 0]] = False
+        inner[laid.faces.values[laid.faces.next()[laid.neighbours.values < 0]]] = False
+        valence = np.bincount(whole, minlength=len(laid.vertices))[inner]
+        assert sorted(6 - valence[valence != 6]) == sorted(cones.index)
+        return
+    assert sorted(laid.index[laid.index != 0]) == sorted(cones.index)
+    lengths = laid.faces.lengths[laid.whole]
+    assert (lengths == SIDES[laid.kind] - laid.index[laid.whole]).all()
+
+
+def test_interior_nodes_are_regular(case):
+    _, solution = case
+    laid = solution.pattern
+    if (
+        laid.kind == "triangle" or not laid.whole.all()
+    ):  # cut cells share nodes with others along the boundary
+        return
+    inner = np.ones(len(laid.vertices), dtype=bool)
+    edge = laid.neighbours.values < 0
+    inner[laid.faces.values[edge]] = False
+    inner[laid.faces.values[laid.faces.next()[edge]]] = False
+    valence = np.bincount(laid.faces.values, minlength=len(laid.vertices))[inner]
+    assert set(valence) == {3 if laid.kind == "hex" else 4}
+
+
+def test_nothing_is_deformed(case):
+    name, solution = case
+    assert solution.pattern.distortion == 0
+    moved = solution.map.cones.moved
+    width = (
+        solution.pattern.edge_length * {"hex": np.sqrt(3), "quad": 1, "triangle": 1}[solution.pattern.kind]
+    )
+    assert moved.max() < 1.3 * width, name
+
+
+def test_panels_are_regular_and_do_not_overlap(case):
+    _, solution = case
+    panels, quality = solution.panels, solution.quality
+    assert quality.overlaps == 0
+    if solution.pattern.kind == "hex":
+        regular = panels.whole
+        assert quality.planarity[regular].max() < 1e-9
+        assert quality.edge_deviation[regular].max() < 1e-9
+        assert quality.angle_deviation[regular].max() < 1e-9
+
+
+def test_special_panels_are_types_of_their_own(case):
+    _, solution = case
+    panels, laid = solution.panels, solution.pattern
+    special = np.flatnonzero(laid.index[panels.face] != 0)
+    n = panels.n_sizes
+    assert n <= 11
+    assert (panels.size[special] >= n).all()
+    assert len(np.unique(panels.size[special])) == len(special)
+    assert (panels.class_sides[panels.size[special]] == panels.polygons.lengths[special]).all()
+    assert (panels.class_sides[:n] == SIDES[laid.kind]).all()
+    assert panels.class_count.sum() == (panels.size >= 0).sum()
+
+
+def test_listed_ones_stand_where_they_were_listed():
+    surface = shapes.waist()
+    found = solved(surface, at=ASIDE, around=16)
+    assert sorted(found.map.cones.index) == [-1, -1]
+    place = found.map.surface.vertices[found.map.cones.vertex]
+    away = np.linalg.norm(place[:, None] - surface.vertices[[620, 600]], axis=2).min(axis=1)
+    assert away == pytest.approx(found.map.cones.moved, abs=1e-9)
+    assert (found.map.surface.input_vertex[found.map.cones.vertex] == -1).all()
+
+
+def test_none_where_none_pays():
+    found = solved(shapes.straight(), count="auto", around=16)
+    assert found.map.kind == "cylinder"
+    assert len(found.map.cones) == 0
+
+
+def test_too_few_are_refused():
+    with pytest.raises(SingularitiesError, match="takes at least 12"):
+        solved(shapes.ellipsoid(), count=3, around=20)
+
+
+def lobed():
+    """A tube with a waist and no symmetry that would save sizes."""
+    plain = shapes.waist()
+    x, y, z = plain.vertices.T
+    wide = 1 + 0.25 * np.cos(2 * np.arctan2(y, x) + 0.4 * z)
+    return shapes.surface_of(np.stack([x * wide, y * wide, z + 0.1 * x], axis=1), plain.faces)
+
+
+def test_says_what_singularities_would_bring():
+    surface = lobed()
+    plain = solved(surface, mode="straight", around=24)
+    said = [note for note in plain.quality.notes if "would leave about" in note]
+    assert len(said) == 1
+    assert "heptagons" in said[0]
+    better = solved(surface, count="auto", around=24)
+    assert better.quality.coverage > plain.quality.coverage
+    assert not any("would leave about" in note for note in better.quality.notes)
+    even = solved(shapes.straight(), mode="straight", around=16)
+    assert not any("would leave about" in note for note in even.quality.notes)
