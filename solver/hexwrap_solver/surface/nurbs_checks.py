@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from hexwrap_solver.arrays import Floats
 from hexwrap_solver.surface.checks import LARGEST, SMALLEST, check_extent, check_finite
@@ -18,6 +19,8 @@ HIGHEST_DEGREE = 32
 TOLERANCE = 1e-6
 #: Points per knot span at which ends are compared.
 PER_SPAN = 5
+#: Only where a ring is narrower than this part of the size it may be a point a little further on.
+NARROW = 0.2
 
 
 def checked(nurbs: NurbsSurface) -> tuple[NurbsSurface, list[str]]:
@@ -152,6 +155,45 @@ def closed_within(nurbs: NurbsSurface, tolerance: float) -> tuple[bool, bool]:
 def collapsed(nurbs: NurbsSurface, direction: int, end: int, tolerance: float) -> bool:
     """Whether the parameter line at the lower (0) or upper end (1) of direction is a point."""
     return float(np.ptp(_line(nurbs, direction, domain(nurbs, direction)[end]), axis=0).max()) <= tolerance
+
+
+def check_pinches(nurbs: NurbsSurface) -> None:
+    """Raises PoleError where a parameter line between the ends of the surface shrinks to a point."""
+    size = float(np.linalg.norm([np.ptp(x) for x in nurbs.control_points[..., :3].reshape(-1, 3).T]))
+    for direction in (0, 1):
+        at = spans(nurbs, direction, PER_SPAN)
+        extents = np.array([_extent(nurbs, direction, x) for x in at])
+        inner = np.arange(1, len(at) - 1)
+        narrow = inner[(extents[inner] <= extents[inner - 1]) & (extents[inner] <= extents[inner + 1])]
+        for k in narrow[extents[narrow] < NARROW * size]:
+            x = (
+                at[k]
+                if extents[k] <= TOLERANCE * size
+                else _narrowest(nurbs, direction, at[k - 1], at[k + 1])
+            )
+            line = _line(nurbs, direction, x)
+            if float(np.ptp(line, axis=0).max()) <= TOLERANCE * size:
+                place = ", ".join(f"{c:.4g}" for c in line.mean(axis=0))
+                raise PoleError(
+                    f"The surface is pinched to a point at ({place}), where {NAMES[direction]} = {x:.4g}: no "
+                    "panels can pass through a point. Split it there and clad the parts one by one, or give "
+                    "it a width there."
+                )
+
+
+def _extent(nurbs: NurbsSurface, direction: int, at: float) -> float:
+    return float(np.ptp(_line(nurbs, direction, at), axis=0).max())
+
+
+def _narrowest(nurbs: NurbsSurface, direction: int, low: float, high: float) -> float:
+    """Where the parameter line between two of them is shortest."""
+    found = minimize_scalar(
+        lambda x: _extent(nurbs, direction, x),
+        bounds=(low, high),
+        method="bounded",
+        options={"xatol": 1e-9 * (high - low), "maxiter": 100},
+    )
+    return float(found.x)
 
 
 def _collapsed(nurbs: NurbsSurface, direction: int, tolerance: float) -> bool:

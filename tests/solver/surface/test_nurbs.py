@@ -10,10 +10,20 @@ from scipy.interpolate import BSpline
 
 from hexwrap_solver.arrays import Floats
 from hexwrap_solver.surface import NurbsSurface, surface_from_nurbs
+from hexwrap_solver.surface.brep.surface import surface_from_patch
+from hexwrap_solver.surface.errors import PoleError
 from hexwrap_solver.surface.normals import with_tangents
 from hexwrap_solver.surface.nurbs import basis, domain, evaluate, evaluate_points, wrap
+from hexwrap_solver.surface.nurbs_checks import check_pinches
 from hexwrap_solver.surface.projection import project, start_parameters
-from tests.solver.surface.nurbs_shapes import cylinder, random_parameters, sample, swapped, torus_part
+from tests.solver.surface.nurbs_shapes import (
+    cylinder,
+    random_parameters,
+    revolution,
+    sample,
+    swapped,
+    torus_part,
+)
 
 
 @pytest.mark.parametrize("degree", [1, 2, 3, 5])
@@ -148,3 +158,20 @@ def test_where_tangents_vanish_the_mesh_normal_stands_in():
     mesh = np.array([[0.0, 0.6, 0.8], [0, 0.6, 0.8], [0, 0, 2], [0, 0, 2]])
     expected = [[0, 0, 1], [0, 0, 1], [0, 0, 1], [0, 0, 1]]
     np.testing.assert_array_equal(with_tangents(exact, mesh), expected)
+
+
+@pytest.mark.parametrize(
+    ("middle", "knots", "degree"),
+    [(0.0, [0, 0, 1, 2, 2], 1), (-2.0, [0, 0, 0, 1, 1, 1], 2)],
+    ids=["a kink at a knot", "the vertex of r = 2(1 − 2t)² between knots"],
+)
+def test_a_pinch_is_refused_with_its_place(middle: float, knots: list[float], degree: int) -> None:
+    profile = np.array([[2.0, 0.0], [middle, 3.0], [2.0, 6.0]])
+    pinched = revolution(profile, np.ones(3), np.array(knots, dtype=float), degree)
+    with pytest.raises(PoleError, match=r"pinched to a point at \(.*, 3\)"):
+        surface_from_patch(pinched)
+
+
+def test_a_narrow_waist_is_no_pinch() -> None:
+    profile = np.array([[2.0, 0.0], [0.02, 3.0], [2.0, 6.0]])
+    check_pinches(revolution(profile, np.ones(3), np.array([0.0, 0, 1, 2, 2]), 1))

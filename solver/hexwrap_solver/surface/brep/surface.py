@@ -16,7 +16,7 @@ from hexwrap_solver.surface.brep.whole import brep_of_surface
 from hexwrap_solver.surface.errors import NotClosedError, PoleError
 from hexwrap_solver.surface.intake import surface_from_mesh
 from hexwrap_solver.surface.meshing import surface_from_nurbs
-from hexwrap_solver.surface.nurbs_checks import TOLERANCE, check_data, checked
+from hexwrap_solver.surface.nurbs_checks import TOLERANCE, check_data, check_pinches, checked
 from hexwrap_solver.surface.types import NurbsSurface, SentMesh, Surface, SurfaceSettings
 
 
@@ -35,6 +35,7 @@ def surface_from_patch(
     """
     settings = settings or SurfaceSettings()
     check_data(nurbs)
+    check_pinches(nurbs)
     try:
         checked(nurbs)
         if is_smooth(nurbs):
