@@ -15,7 +15,7 @@ from PIL import Image
 from hexwrap_server import samples
 from hexwrap_server.input.schemas import parse_request
 from hexwrap_server.jobs.work import run_stages
-from hexwrap_server.output.colours import panel_colours
+from hexwrap_server.output.colours import class_colours, panel_colours
 from hexwrap_server.output.picture import panels_scene
 from hexwrap_server.output.scene import render
 from hexwrap_server.output.writers import Meta, write
@@ -32,6 +32,10 @@ CASES = {
     "entrance": "entrances (Figure 7, left)",
     "diagrid": "concentration (Figure 7, right)",
     "ring": "a flat ring, cone angle 2π",
+    "singular": "three heptagons: fewer sizes",
+    "openings": "a door and windows",
+    "dome": "a dome",
+    "roof": "a roof along its four sides",
 }
 
 
@@ -47,11 +51,11 @@ def draw_domain(axes: Axes, solution: Solution) -> None:
     cmap, pattern, panels = solution.map, solution.pattern, solution.panels
     assert pattern is not None
     assert panels is not None
-    z = cmap.deck.apply(pattern.uv[np.asarray(pattern.faces.values)], pattern.sheet)
+    z = pattern.corners
     cells = np.split(np.stack([z.real, z.imag], axis=1), pattern.faces.offsets[1:-1])
     size = np.full(pattern.n_cells, -1)
     size[panels.face] = panels.size
-    colours = panel_colours(size, len(panels.class_length))
+    colours = panel_colours(size, class_colours(panels))
     axes.add_collection(PolyCollection(cells, facecolors=colours, edgecolors="#2a2e35", linewidths=0.25))
     at, faces = cmap.corners(), cmap.surface.faces
     tail, head = faces.ravel(), faces[:, [1, 2, 0]].ravel()
@@ -113,7 +117,9 @@ def sheet() -> Figure:
 
 
 def main() -> None:
-    picture = Image.open(io.BytesIO(write("panels.png", solved("tower"), Meta("tower"))))
+    picture = Image.open(
+        io.BytesIO(write("panels.png", solved("singular"), Meta("tower with three heptagons")))
+    )
     size = (WIDTH, round(picture.height * WIDTH / picture.width))
     picture.convert("RGB").resize(size, Image.Resampling.LANCZOS).save(HERE / "tower.png", optimize=True)
     cases()
