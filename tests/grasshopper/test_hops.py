@@ -182,9 +182,9 @@ def test_drawings_are_lifted(client: Live) -> None:
         ("/hops/unheard", [], "/hops/panels"),
         (PANELS, [], "Mesh is empty"),
         (PANELS, [value("Mesh", {"{0}": []})], "Mesh is empty"),
-        (PANELS, [value("Mesh", {"{0}": [item("tower", "String")]})], "no mesh"),
+        (PANELS, [value("Mesh", {"{0}": [item("tower", "String")]})], "cannot be read as a mesh"),
         (PANELS, [value("Mesh", {"{0}": [geometry(tube(), "Mesh")] * 2})], "graft"),
-        (PANELS, [mesh_at("{north}")], "no path"),
+        (PANELS, [mesh_at("{north}")], "is not a path"),
         (PANELS, [mesh_at(), value("Colour", {"{0}": [item("red", "String")]})], "Colour"),
         (PANELS, [mesh_at(), value("Kind", {"{0}": [item("pentagon", "String")]})], "kind"),
         (PANELS, [mesh_at(), value("Around", {"{0}": [item("many", "String")]})], "integer"),
@@ -222,11 +222,14 @@ def test_unknown_jobs_are_refused(client: Live) -> None:
 
 
 def test_surfaces_that_cannot_be_mapped_are_refused(client: Live) -> None:
-    cup = tube()
-    cup.Vertices.AddPoint3d(0.0, 0.0, 0.0)
-    for k in range(24):
-        cup.Faces.AddFace(k + 1, k, len(cup.Vertices) - 1)
-    assert "loop" in refused(solve(client, PANELS, value("Mesh", {"{0}": [geometry(cup, "Mesh")]})))
+    torus = rhino3dm.Mesh()
+    for k, j in np.ndindex(12, 8):
+        a, b = 2 * np.pi * k / 12, 2 * np.pi * j / 8
+        radius = 3 + np.cos(b)
+        torus.Vertices.AddPoint3d(radius * np.cos(a), radius * np.sin(a), np.sin(b))
+        i, after, above = 8 * k + j, 8 * ((k + 1) % 12) + j, (j + 1) % 8 - j
+        torus.Faces.AddFace(i, after, after + above, i + above)
+    assert "handle" in refused(solve(client, PANELS, value("Mesh", {"{0}": [geometry(torus, "Mesh")]})))
 
 
 def test_inputs_that_were_left_out_have_their_defaults() -> None:

@@ -272,7 +272,8 @@ def test_3dm_keeps_unit_surface_and_what_the_input_said(solution: Solution) -> N
     assert surface.Geometry.Faces.Count == len(mesh.faces)
     assert surface.Attributes.Name == "Süd"
     assert surface.Attributes.GetUserString("Brandschutz") == "F30"
-    assert surface.Attributes.GetUserString("layer") == "Bau A::Hülle"
+    paths = {layer.Index: layer.FullPath for layer in model.Layers}
+    assert paths[surface.Attributes.LayerIndex] == "Bau A::Hülle::surface"
 
 
 # --- the workshop ----------------------------------------------------------------------------------------

@@ -126,7 +126,7 @@ def test_defaults_are_those_of_the_contract() -> None:
     wanted = parse_request({"surface": tube()}, 1000, 500).wanted
     assert wanted.pattern is not None
     assert wanted.panels is not None
-    assert (wanted.boundary.mode, wanted.boundary.quantum) == ("straight", "auto")
+    assert (wanted.boundary.mode, wanted.boundary.quantum) == ("auto", "auto")
     assert (wanted.pattern.kind, wanted.pattern.around, wanted.pattern.align) == ("hex", None, "both")
     assert (wanted.panels.mode, wanted.panels.sizes, wanted.panels.target) == ("split", 11, "inscribed")
     assert wanted.pattern.max_cells == 500

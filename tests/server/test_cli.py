@@ -18,6 +18,8 @@ from hexwrap_server.input.schemas import parse_request
 from hexwrap_server.output.writers import WRITERS
 
 TUBE_ROWS, TUBE_COLUMNS = 9, 24
+#: Files that share their ending with another one.
+NAMED = {"flat.dxf", "domain.dxf", "cutting-list.csv"}
 #: Corners of three triangles on one edge.
 FINS = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, -1, 0]]
 
@@ -52,7 +54,7 @@ def test_every_field_of_a_request_has_an_option() -> None:
 
 def test_every_file_of_the_service_has_an_ending() -> None:
     assert {file_kind(f"x/{name}") for name in WRITERS} == set(WRITERS)
-    assert {file_kind(f"x{ending.upper()}") for ending in ENDINGS} == {*WRITERS} - {"flat.dxf", "domain.dxf"}
+    assert {file_kind(f"x{ending.upper()}") for ending in ENDINGS} == {*WRITERS} - NAMED
 
 
 def test_solve_writes_every_file(tube: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

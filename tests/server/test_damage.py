@@ -113,10 +113,11 @@ def test_lost_solution_is_made_again(tmp_path: Path) -> None:
 
 
 def test_failed_work_starts_from_the_first_attempt_again(tmp_path: Path) -> None:
-    open_disk = {"vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "faces": [[0, 1, 2]]}
+    corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1]]
+    fan = {"vertices": corners, "faces": [[0, 1, 2], [1, 0, 3], [0, 1, 4]]}  # three faces at an edge
     with running(tmp_path, workers=1) as client:
         for _ in range(3):
-            id = client.post("/v1/jobs", json={"surface": open_disk}).json()["id"]
+            id = client.post("/v1/jobs", json={"surface": fan}).json()["id"]
             assert finished(client, id)["status"] == "failed"
         store = client.service.store
         job = store.job(id)

@@ -75,10 +75,13 @@ def test_a_running_server_is_used_and_kept(tmp_path: Path, capsys: pytest.Captur
         port = client.base_url.port
         assert port is not None
         refused = {
-            "name": "open",
-            "surface": {"vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "faces": [[0, 1, 2]]},
+            "name": "three faces at an edge",
+            "surface": {
+                "vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1]],
+                "faces": [[0, 1, 2], [1, 0, 3], [0, 1, 4]],
+            },
         }
-        with pytest.raises(demo.DemoError, match="loop"):
+        with pytest.raises(demo.DemoError, match="more than two faces"):
             demo.finished(client, refused, lambda *said: None)
         with pytest.raises(demo.DemoError, match="'surface' is missing"):
             demo.finished(client, {}, lambda *said: None)

@@ -174,6 +174,19 @@ def fetched(server: Server, path: str) -> dict:
     return httpx.get(server.url + path, trust_env=False).json()
 
 
+def torus(around: int = 12, across: int = 8) -> str:
+    """A surface with a handle, as OBJ."""
+    k, j = (index.ravel() for index in np.meshgrid(np.arange(around), np.arange(across), indexing="ij"))
+    a, b = 2 * np.pi * k / around, 2 * np.pi * j / across
+    points = np.stack([(3 + np.cos(b)) * np.cos(a), (3 + np.cos(b)) * np.sin(a), np.sin(b)], axis=1)
+    after, above = (k + 1) % around, (j + 1) % across
+    faces = np.stack(
+        [across * row + place for row, place in ((k, j), (after, j), (after, above), (k, above))], axis=1
+    )
+    lines = [f"v {x} {y} {z}" for x, y, z in points] + [f"f {a} {b} {c} {d}" for a, b, c, d in faces + 1]
+    return "\n".join(lines)
+
+
 def tube(n: int = 24, rows: int = 9) -> str:
     """A bulged tube as OBJ text, quads, two open ends."""
     t = np.arange(n) * 2 * np.pi / n
@@ -259,12 +272,12 @@ def test_a_dropped_file_is_solved(browser, server: Server, tmp_path: Path) -> No
 
 
 def test_faults_are_shown_in_red_where_they_are(browser, server: Server, tmp_path: Path) -> None:
-    path = tmp_path / "pinched.obj"
-    path.write_text(tube() + "v 9 9 9\nf 25 26 217\n")  # a third face on an edge
+    path = tmp_path / "torus.obj"
+    path.write_text(torus())
     with opened(browser, server) as page:
         page.set_input_files("#file", str(path))
         page.wait_for_function("() => document.documentElement.dataset.shown === 'faults'", timeout=60_000)
-        assert "more than two faces" in page.locator("#banner").inner_text()
+        assert "handle" in page.locator("#banner").inner_text()
         red = page.evaluate(
             """() => {
             let n = 0;
@@ -436,9 +449,10 @@ def test_copied_curl_request_is_the_request(browser, server: Server) -> None:
 
 
 def test_a_failed_job_is_never_shown_on_another_surface(browser, server: Server) -> None:
-    disk = {"vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "faces": [[0, 1, 2]]}
+    corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1]]
+    fan = {"vertices": corners, "faces": [[0, 1, 2], [1, 0, 3], [0, 1, 4]]}  # three faces at an edge
     with httpx.Client(base_url=server.url, trust_env=False, timeout=60) as client:
-        failed = client.post("/v1/jobs", json={"surface": disk, "name": "disk"}).json()["id"]
+        failed = client.post("/v1/jobs", json={"surface": fan, "name": "fan"}).json()["id"]
         assert client.get(f"/v1/jobs/{failed}?wait=30").json()["status"] == "failed"
     with opened(browser, server) as page:
         page.select_option("#sample", "tower")

@@ -61,6 +61,20 @@ def with_lid(mesh, depth=0.0):
     return Mesh(points, faces)
 
 
+def torus(around=12, across=8):
+    """A surface with a handle."""
+    points, faces = [], []
+    for k in range(around):
+        for j in range(across):
+            a, b = 2.0 * math.pi * k / around, 2.0 * math.pi * j / across
+            radius = 3.0 + math.cos(b)
+            points.append((radius * math.cos(a), radius * math.sin(a), math.sin(b)))
+            after, above = (k + 1) % around, (j + 1) % across
+            corners = ((k, j), (after, j), (after, above), (k, above))
+            faces.append(tuple(across * row + place for row, place in corners))
+    return Mesh(points, faces)
+
+
 def with_fin(mesh):
     """A third face on an edge inside."""
     points, faces = list(mesh.Vertices.points), list(mesh.Faces.rows)

@@ -66,7 +66,7 @@ def read_call(report: Report, body: Body, settings: Settings, folder: str) -> Ca
 
 def _wanted(values: dict[str, Any], max_vertices: int, max_panels: int) -> Wanted:
     points, angles = values["Points"], values["Angles"]
-    boundary: dict[str, Any] = {"mode": values["Mode"] or ("angles" if points else "straight")}
+    boundary: dict[str, Any] = {"mode": values["Mode"] or ("angles" if points else "auto")}
     if boundary["mode"] == "angles":
         angles = angles * len(points) if len(angles) == 1 else angles
         if len(angles) != len(points):
