@@ -69,7 +69,7 @@ def rows(name: str) -> Iterator[str]:
     """One row per way to treat the ends."""
     asked = parse_request(samples.load(name), 10**7, 10**6)
     assert isinstance(asked.surface, SentSurface)
-    surface = take_in(asked.surface)
+    surface = take_in(asked.surface, asked.wanted.surface)
     shape = replace(asked.wanted.pattern or PatternSettings(), kind="hex", rotation="edge")
     for label, mode, cells, count in WAYS:
         condition = BoundaryCondition("straight" if mode == "straight" else "isometric", quantum="hex")

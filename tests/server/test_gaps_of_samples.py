@@ -23,7 +23,7 @@ NAMES = ("tower", "facade", "waist", "entrance")
 def test_inscribed_panels_leave_half_the_gap_of_the_shortest_edge_rule(name):
     """Mean gap at most half, worst at most 60 % of the paper's rule, each panel at its own length."""
     request = parse_request(samples.load(name), 10**7, 10**6)
-    surface, wanted = take_in(request.surface), request.wanted
+    surface, wanted = take_in(request.surface, request.wanted.surface), request.wanted
     conditions = [BoundaryCondition("straight"), BoundaryCondition("isometric", quantum="hex")]
     if wanted.boundary.mode == "angles":
         conditions.append(wanted.boundary)
