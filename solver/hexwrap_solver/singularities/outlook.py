@@ -31,7 +31,8 @@ def outlook(cmap: ConformalMap, laid: Pattern, sizes: int, left: float) -> tuple
         return ()
     lattice = LATTICES[laid.kind]
     width = laid.edge_length * abs(complex(lattice.position(lattice.basis[0]))) / lattice.edge
-    ends: tuple[End, ...] = ("free",) * len(surface.loops)
+    free: End = "free"
+    ends = (free,) * len(surface.loops)
     rules = Rules(lattice.quantum, width, sizes, ends, most=MOST)
     model = linear_model(surface, rules, patches=PATCHES, steps=False)
     if not len(model.seat):
