@@ -22,7 +22,12 @@ def outlook(cmap: ConformalMap, laid: Pattern, sizes: int, left: float) -> tuple
     """A sentence where singularities would leave clearly less uncovered than ``left``, what is left now; by
     the linear model alone."""
     surface = cmap.surface
-    if len(cmap.cones) or not 1 <= len(surface.loops) <= 2 or len(surface.vertices) > LARGEST:
+    if (
+        laid.kind == "triangle"
+        or len(cmap.cones)
+        or not 1 <= len(surface.loops) <= 2
+        or len(surface.vertices) > LARGEST
+    ):
         return ()
     weight = vertex_areas(surface)
     now = uncovered(cmap.log_scale, weight / weight.sum(), sizes)

@@ -14,7 +14,7 @@ from hexwrap_solver.conformal.corners import asked_angles
 from hexwrap_solver.conformal.layout import lay_out
 from hexwrap_solver.conformal.net import Net
 from hexwrap_solver.conformal.types import QUANTA, BoundaryCondition, Cones, ConformalMap, Fitted
-from hexwrap_solver.errors import ConvergenceError, NotAdaptedError
+from hexwrap_solver.errors import ConvergenceError, NotAdaptedError, SingularitiesError
 from hexwrap_solver.pattern.lattice import LATTICES, Lattice
 from hexwrap_solver.pattern.place.placement import edge_angle, is_straight
 from hexwrap_solver.pattern.place.rows import rows_along
@@ -83,11 +83,16 @@ def frame_of(
     pattern: PatternSettings | None,
     sizes: int | None,
 ) -> Frame:
-    """Raises RequestError."""
+    """Raises RequestError; SingularitiesError for triangles."""
     pattern = pattern or PatternSettings()
     if pattern.rotation in ("u", "v"):
         pattern = replace(pattern, rotation="edge")
     lattice = LATTICES[pattern.kind]
+    if pattern.kind == "triangle":  # their singularities are nodes, which have as many edges as the lattice
+        raise SingularitiesError(
+            "Triangles around a singularity do not close yet, so that two of seven would be missing there: "
+            "ask for hexagons or quads, or leave singularities out."
+        )
     ends, angles = _ends(surface, boundary, lattice)
     angle = edge_angle(lattice, pattern)
     straight = [end == "straight" for end in ends]
