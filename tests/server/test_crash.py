@@ -44,6 +44,13 @@ class Load:
         for thread in self._threads:
             thread.join()
 
+    def wait_for_one_more(self) -> None:
+        """Until the server has accepted another job: nothing is learnt from killing one that has none."""
+        before, over = len(self.accepted), time.monotonic() + PATIENCE
+        while len(self.accepted) == before:
+            assert time.monotonic() < over, "no job was accepted"
+            time.sleep(0.05)
+
     def _send(self) -> None:
         i = 0
         while not self._over.wait(self._chance.uniform(0.02, 0.3)):
@@ -100,7 +107,7 @@ def torment(data: Path, kills: int, seed: int) -> None:
     base = f"http://127.0.0.1:{port}"
     with Load(base, seed) as load:
         for _ in lives(data, port, kills, chance):
-            pass
+            load.wait_for_one_more()
     assert load.accepted
     with served(data, port):
         told = {id: settled(base, id) for id in load.accepted}

@@ -162,7 +162,7 @@ def test_another_number_around_than_asked_for_is_told() -> None:
 @pytest.mark.parametrize("size", [{"around": 10**9}, {"edge_length": 1e-30}])
 def test_far_too_many_cells_around_are_refused_at_once(size):
     """Nothing is made first that has as many entries as cells stand around."""
-    with pytest.raises(PatternError, match="around the surface alone"):
+    with pytest.raises(PatternError, match="over the limit of 1,000,000"):
         lay_pattern(MAPS["entrance"], PatternSettings(**size))
 
 
