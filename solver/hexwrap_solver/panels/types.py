@@ -9,6 +9,7 @@ from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged
 from hexwrap_solver.errors import SettingError
 from hexwrap_solver.panels.facing import Facing
 from hexwrap_solver.setting import Setting
+from hexwrap_solver.singularities.types import Choices
 
 
 @dataclass(frozen=True)
@@ -188,6 +189,7 @@ class Quality:
     convex: (q,). congruence: (q,) class of congruent shapes (mirror images told apart).
     gaps_over: panels with a joint wider than was wanted, None where nothing was said of that.
     movement: greatest distance a shared vertex was moved (watertight), 0 otherwise.
+    singularities: what other numbers of them would leave open; None where none was looked at.
     """
 
     scale_ratio: float
@@ -206,6 +208,7 @@ class Quality:
     overlaps: int = 0
     coverage: float = 0.0
     movement: float = 0.0
+    singularities: Choices | None = None
     notes: tuple[str, ...] = ()
 
 
