@@ -276,10 +276,7 @@ def _finish(plain: _Plain, cones: Cones) -> ConformalMap:
 def _mean_on_area(surface: Surface, u: Floats) -> float:
     """Area-weighted mean of u: the domain is as large as the surface on (geometric) average."""
     a, b, c = surface.faces.T
-    x, y, z = ((column[b] - column[a], column[c] - column[a]) for column in surface.vertices.T)
-    normal = [p[0] * q[1] - p[1] * q[0] for p, q in ((y, z), (z, x), (x, y))]
-    area = np.sqrt(normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2)
-    return float(area @ (u[a] + u[b] + u[c]) / (3 * area.sum()))
+    return float(surface.areas @ (u[a] + u[b] + u[c]) / (3 * surface.areas.sum()))
 
 
 def _mean_on(found: ConformalMap, loops: list[int]) -> float:
