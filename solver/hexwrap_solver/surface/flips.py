@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hexwrap_solver.arrays import Bools, Floats, Ints
+from hexwrap_solver.geometry import dot
 from hexwrap_solver.surface.topology import half_edges, next_half_edge, twins
 
 #: Flips to Delaunay end long before on meshes that are not torture.
@@ -137,4 +138,4 @@ def _stays_unfolded(vertices: Floats, faces: Ints, h: Ints, twin: Ints) -> Bools
     pa, pb, pc, pd = (vertices[x] for x in (corner[h], corner[next_half_edge(h)], c, d))
     before = _cross(pb - pa, pc - pa) + _cross(pa - pb, pd - pb)
     one, two = _cross(pd - pa, pc - pa), _cross(pb - pd, pc - pd)
-    return np.asarray((np.einsum("ij,ij->i", one, before) > 0) & (np.einsum("ij,ij->i", two, before) > 0))
+    return np.asarray((dot(one, before) > 0) & (dot(two, before) > 0))

@@ -10,6 +10,7 @@ import shapely
 from scipy.spatial import cKDTree
 
 from hexwrap_solver.arrays import Bools, Floats, Ints
+from hexwrap_solver.geometry import dot, face_normals
 from hexwrap_solver.surface.brep.plane import triangulated
 from hexwrap_solver.surface.brep.pull import Patch, free
 from hexwrap_solver.surface.brep.sizes import Field, Sizes, bilinear
@@ -18,7 +19,7 @@ from hexwrap_solver.surface.flips import flip_to_delaunay, independent
 from hexwrap_solver.surface.mesh_sizes import ROW, cumulated
 from hexwrap_solver.surface.nurbs import evaluate_points, tangents
 from hexwrap_solver.surface.projection import project
-from hexwrap_solver.surface.topology import edge_lengths, face_normals, half_edges, sum_rows, twins
+from hexwrap_solver.surface.topology import edge_lengths, half_edges, sum_rows, twins
 
 #: Points inside keep away from the boundary by this part of its edges' lengths, which are looked at in so
 #: many places each.
@@ -242,7 +243,8 @@ def _smoothed(patch: Patch, piece: Piece, fresh: Bools | None = None) -> Piece:
     """Vertices around triangles of small angles move to the middle of their neighbours, on the surface, where
     that turns no triangle over; then edges are flipped to Delaunay.
 
-    fresh: (n,) vertices beside which triangles have changed; None: all are looked at."""
+    fresh: (n,) vertices beside which triangles have changed; None: all are looked at.
+    """
     n = len(piece.points)
     faces = piece.faces
     if fresh is not None:
@@ -265,9 +267,7 @@ def _smoothed(patch: Patch, piece: Piece, fresh: Bools | None = None) -> Piece:
     middle = sum_rows(piece.points[end], start, n) / count[:, None]
     at, du, dv = tangents(patch.opened, piece.uv[move])
     away = middle[move] - at
-    e, f, g, p, q = (
-        np.einsum("ij,ij->i", a, b) for a, b in ((du, du), (du, dv), (dv, dv), (away, du), (away, dv))
-    )
+    e, f, g, p, q = (dot(a, b) for a, b in ((du, du), (du, dv), (dv, dv), (away, du), (away, dv)))
     determinant = np.maximum(e * g - f * f, 1e-12 * np.maximum(e * g, 1e-300))
     step = np.stack([g * p - f * q, e * q - f * p], axis=1) / determinant[:, None]
     uv, points = piece.uv.copy(), piece.points.copy()
@@ -276,7 +276,7 @@ def _smoothed(patch: Patch, piece: Piece, fresh: Bools | None = None) -> Piece:
     allowed = np.minimum(_least_angles(piece.points, star), SMALL) * 0.7
     normal = face_normals(piece.points, star)
     for _ in range(UNDOINGS):
-        worse = np.einsum("ij,ij->i", face_normals(points, star), normal) <= 0
+        worse = dot(face_normals(points, star), normal) <= 0
         worse |= _least_angles(points, star) < allowed
         if not worse.any():
             break
