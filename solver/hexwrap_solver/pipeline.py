@@ -94,7 +94,7 @@ def solve(
 ) -> Solution:
     """Surface → conformal map → pattern → panels → quality, and components and support where asked for.
 
-    take_in: makes the annulus from whatever was sent (``surface_from_mesh`` or ``surface_from_nurbs``).
+    take_in: makes the surface from what was sent (``surface_from_mesh`` or ``surface_from_nurbs``).
     source: what the surface depends on, for runners that remember. Raises HexwrapError.
     """
     with one_blas_thread():

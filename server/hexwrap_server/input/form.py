@@ -213,7 +213,7 @@ def _accepted(annotation: Any, setting: Setting) -> Any:
 
 
 def _moderate(value: float) -> float:
-    """Neither so large nor so small that its square or its inverse is no number."""
+    """Neither so large nor so small that its square or inverse overflows."""
     if value and not SMALLEST <= abs(value) <= LARGEST:
         raise ValueError(f"must be 0, or between {SMALLEST:g} and {LARGEST:g} in size")
     return value

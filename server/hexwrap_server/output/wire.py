@@ -22,7 +22,7 @@ from hexwrap_solver.surface.types import Surface
 
 #: The parts of a Result, in its order.
 PARTS = ("unit", "mesh", "map", "pattern", "panels", "sizes", "quality", "components", "support", "timings")
-#: Asked for beside parts: ``map`` then has ``corners``, whatever its kind.
+#: Asked for beside parts: ``map`` then has ``corners`` on every kind of domain.
 CORNERS = "corners"
 
 

@@ -70,7 +70,7 @@ class SingularitySettings:
     """
 
     count: Annotated[
-        int | Literal["auto"] | None, Setting("so many at most, or auto: as many as pay", ge=0, le=30)
+        int | Literal["auto"] | None, Setting("at most this many, or auto: as many as pay", ge=0, le=30)
     ] = None
     at: Annotated[tuple[SingularityAt, ...], Setting("where they are to stand, each", most=100)] = ()
     from_boundary: Annotated[
