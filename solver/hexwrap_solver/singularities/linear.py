@@ -26,6 +26,9 @@ from hexwrap_solver.surface.types import Surface
 
 #: The surface is seen in about so many patches: u is smooth, and a patch is as large as a cell or so.
 PATCHES = 1200
+#: Seats times vertices, which the time of the solves is proportional to: large meshes get fewer seats,
+#: but this number at least.
+SOLVED, FEWEST = 1.5e7, 400
 #: Right-hand sides solved at a time.
 BLOCK = 128
 
@@ -189,13 +192,21 @@ class Responses:
 
     def seats(self) -> Ints:
         """Vertices on which the rules allow a singularity, one in every patch."""
-        return _seats(self.surface, self.middle, self.rules)
+        few = int(np.clip(SOLVED / len(self.surface.vertices), FEWEST, len(self.middle)))
+        middle = self.middle
+        if few < len(middle):
+            _, middle = _patches(self.surface, vertex_areas(self.surface), few)
+        return _seats(self.surface, middle, self.rules)
 
-    def near(self, vertices: Ints, radius: float) -> Ints:
-        """The vertices themselves and all around them that the rules allow."""
+    def near(self, vertices: Ints, radius: float, spacing: float) -> Ints:
+        """The vertices themselves and others around them that the rules allow, about one per cube of a
+        spacing."""
         places = self.surface.vertices
         found = cKDTree(places).query_ball_point(places[vertices], radius)
         around = np.unique(np.concatenate([np.array(one, dtype=np.int64) for one in found]))
+        around = around[np.lexsort(places[around].T)]
+        box = np.floor((places[around] - places.min(axis=0)) / spacing).astype(np.int64)
+        around = around[np.unique(box, axis=0, return_index=True)[1]]
         return np.union1d(around[_allowed(self.surface, around, self.rules)], vertices)
 
     def model(self, seats: Ints, orbits: Callable[[Ints], list[Ints]] | None = None) -> Model:

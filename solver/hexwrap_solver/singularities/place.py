@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from hexwrap_solver.arrays import Floats, Ints
 from hexwrap_solver.errors import SingularitiesError
 from hexwrap_solver.singularities.linear import Responses, linear_model
-from hexwrap_solver.singularities.search import SMALL, STARTS, STARTS_ALIGNED, Search, State, curve
+from hexwrap_solver.singularities.search import STARTS, STARTS_ALIGNED, Search, State, curve
 from hexwrap_solver.singularities.symmetry import OFF, Group, orbits, symmetries
 from hexwrap_solver.singularities.types import Proposal, Rules, SingularityAt
 from hexwrap_solver.surface.types import Surface
@@ -24,8 +24,9 @@ WORTH, CLEARLY = 0.001, 0.25
 GROUPS = 5
 #: The search ends where so many numbers more have brought nothing.
 PATIENCE = 3
-#: The final places: within so many cells, from at most so many vertices, in so many steps, again so often.
-REACH, MANY, ROUNDS, POLISHED = 1.2, 400, 20, 3
+#: The final places are found within so many cells, again and again nearer, among vertices at such a part of
+#: that apart, in so many steps.
+REACHES, SPACING, ROUNDS = (1.5, 0.8, 0.4), 0.4, 20
 
 
 @dataclass(frozen=True)
@@ -83,21 +84,19 @@ def _curve(known: Responses, patience: int | None, group: Group | None = None) -
 
 def _polished(known: Responses, proposal: Proposal) -> Proposal:
     """From seat to seat singularities move by about a cell; here from vertex to vertex."""
-    for _ in range(POLISHED):
-        seats = known.near(proposal.vertex, REACH * known.rules.cell)
-        search = Search(known.model(seats[:MANY] if len(seats) > MANY else seats), known.rules)
+    for reach in REACHES:
+        radius = reach * known.rules.cell
+        seats = known.near(proposal.vertex, radius, SPACING * radius)
+        search = Search(known.model(seats), known.rules)
         at = np.searchsorted(search.model.seat, proposal.vertex)
-        if (at == len(search.model.seat)).any() or (search.model.seat[at] != proposal.vertex).any():
-            return proposal
         pairs = [(int(i), int(k)) for i, k in zip(at, proposal.index, strict=True)]
         loops = tuple(proposal.loops[i] - search.model.loops[i] for i in search.model.free[1:])
         _, state = search.refined(
             State.of(pairs, loops), near=len(seats) // max(len(pairs), 1), rounds=ROUNDS
         )
         better = search.proposal(state)
-        if better.uncovered > proposal.uncovered - SMALL:
-            return proposal
-        proposal = better
+        if better.uncovered < proposal.uncovered:
+            proposal = better
     return proposal
 
 

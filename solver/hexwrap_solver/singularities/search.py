@@ -437,6 +437,8 @@ def _best(
         tried[settled] = value
     if not tried:
         return []
+    if not search.complete(next(iter(tried))):  # on the way to a number only
+        starts //= 4
     leading = min(tried, key=lambda state: (tried[state], state.seat))
     for _ in range(starts):
         state = State((), (), leading.loops)
