@@ -59,6 +59,9 @@ COST_OF_SIZE, COST_OF_CORNERS = 0.002, 0.004
 #: tip goes before the two corners beside it.
 COST_OF_LOPSIDED = 3.0
 
+#: Parallel lines of a lattice are of this many kinds at most, up to translations.
+MOST_LINES = 3
+
 #: So many placements with the least mean strain are compared by their sharp one, and so many of these, in
 #: order, are deformed, until one of them distorts by less than ENOUGH.
 COMPARED, DEFORMED, ENOUGH = 12, 3, 0.03
@@ -177,7 +180,7 @@ def _frame(
 ) -> _Frame:
     angle = edge_angle(lattice, settings)
     sides = sides_of(cmap, lattice, loops)
-    zero = complex(lattice.position(lattice.steps[0])) / lattice.edge * np.exp(-1j * angle)
+    zero = complex(lattice.forward * np.exp(-1j * angle))
     turn = _turns(cmap, lattice, sides, zero)
     # Directions are exact up to rounding of the boundary angles; from here on they are exact.
     steps = np.rint(np.angle(sides.direction * turn / zero) / lattice.quantum)
@@ -235,8 +238,8 @@ def _turns(cmap: ConformalMap, lattice: Lattice, sides: Sides, zero: complex) ->
     before: complex | None = None
     for loop in np.unique(loops):
         on = loops == loop
-        mean = complex((sides.length[on] * sides.direction[on] ** lattice.order).sum())
-        unit = zero / complex(np.exp(1j * np.angle(mean) / lattice.order))
+        mean = complex((sides.length[on] * sides.direction[on] ** lattice.fold).sum())
+        unit = zero / complex(np.exp(1j * np.angle(mean) / lattice.fold))
         if before is not None:
             steps = round(float(np.angle(before / unit)) / lattice.quantum)
             unit *= complex(np.exp(1j * lattice.quantum * steps))
@@ -272,7 +275,7 @@ def _origins(frame: _Frame, scale: complex) -> list[tuple[Isometry, complex]]:
         return [(motion, complex(normal[0] * (rows.first - depth[0])))]
     p, q = normal[0], normal[across[0]]
     d = rows.first - depth[0]
-    lines = rows.first + rows.period * np.arange(lattice.cosets) - depth[across[0]]
+    lines = rows.first + rows.period * np.arange(MOST_LINES) - depth[across[0]]
     return [(motion, complex(origin)) for origin in meeting(p, d, q, lines)]
 
 
@@ -295,7 +298,7 @@ def _translation(frame: _Frame, wanted: complex) -> Ints:
 def symmetry_centres(lattice: Lattice, turns: int) -> list[tuple[Isometry, complex]]:
     """Motions p ↦ ζ^turns·p + τ that differ by more than a translation of the lattice, with their fixed
     points: centres of 6-, 4-, 3- or 2-fold symmetry, the highest first."""
-    zeta = np.exp(1j * lattice.quantum * turns)
+    zeta = np.exp(1j * lattice.step_angle * turns)
     e1 = complex(lattice.position(lattice.basis[0]))
     found: list[tuple[Isometry, complex]] = []
     reach = range(-2, 3)
@@ -319,7 +322,7 @@ def _misplaced_corners(frame: _Frame, motion: Isometry, line: Floats) -> float:
     following, sheet = frame.following
     shift = lattice.position(motion.apply(np.zeros((len(sheet), 2), dtype=np.int64), sheet))
     p, d = frame.normal, line
-    q = p[following] * np.exp(1j * lattice.quantum * motion.rotation(sheet))
+    q = p[following] * np.exp(1j * lattice.step_angle * motion.rotation(sheet))
     e = line[following] + (q.conj() * shift).real
     area = (p.conj() * q).imag
     inner = abs(area) > 1e-6
