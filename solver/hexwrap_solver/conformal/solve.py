@@ -10,9 +10,9 @@ from hexwrap_solver.arrays import Floats, Progress, no_progress
 from hexwrap_solver.conformal import boundary
 from hexwrap_solver.conformal.corners import boundary_angles
 from hexwrap_solver.conformal.energy import Energy
+from hexwrap_solver.conformal.fixed import Minimum, minimise
 from hexwrap_solver.conformal.layout import lay_out
 from hexwrap_solver.conformal.net import Net
-from hexwrap_solver.conformal.newton import Minimum, minimise
 from hexwrap_solver.conformal.openings import cut_openings
 from hexwrap_solver.conformal.orientation import faithful, positive
 from hexwrap_solver.conformal.robust import FlatMetric, metric_with_flips, solve_with_flips, with_inserted
@@ -276,10 +276,7 @@ def _finish(plain: _Plain, cones: Cones) -> ConformalMap:
 def _mean_on_area(surface: Surface, u: Floats) -> float:
     """Area-weighted mean of u: the domain is as large as the surface on (geometric) average."""
     a, b, c = surface.faces.T
-    x, y, z = ((column[b] - column[a], column[c] - column[a]) for column in surface.vertices.T)
-    normal = [p[0] * q[1] - p[1] * q[0] for p, q in ((y, z), (z, x), (x, y))]
-    area = np.sqrt(normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2)
-    return float(area @ (u[a] + u[b] + u[c]) / (3 * area.sum()))
+    return float(surface.areas @ (u[a] + u[b] + u[c]) / (3 * surface.areas.sum()))
 
 
 def _mean_on(found: ConformalMap, loops: list[int]) -> float:

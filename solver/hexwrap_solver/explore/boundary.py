@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from hexwrap_solver.arrays import Progress, no_progress
 from hexwrap_solver.conformal import conformal_map
 from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap
@@ -50,8 +48,7 @@ def best_boundary_map(
 
 def foreseen(cmap: ConformalMap, sizes: int = SIZES) -> float:
     """Share of the area that so many sizes leave uncovered because cells differ in size, from e^−u alone."""
-    a, b, c = (cmap.surface.vertices[corner] for corner in cmap.surface.faces.T)
-    area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+    area = cmap.surface.areas
     return uncovered(cmap.log_scale[cmap.surface.faces].mean(axis=1), area / area.sum(), sizes)
 
 

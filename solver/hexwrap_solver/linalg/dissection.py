@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexwrap_solver.arrays import Bools, Floats, Ints
+from hexwrap_solver.geometry import stable_order
 
 #: Parts of about this many vertices are not cut any further: dense algebra is faster there.
 LEAF = 160
@@ -67,13 +68,8 @@ def dissect(points: Floats, rows: Ints, columns: Ints) -> Dissection:
         node[separator] = 2**k - 1 + (part[separator] >> (depth - k))
     nodes = 2 ** (depth + 1) - 1
     start = np.concatenate([[0], np.cumsum(np.bincount(node, minlength=nodes)[::-1])])
-    by_part = _stable_order(part, 2**depth)
-    return Dissection(by_part[_stable_order(nodes - 1 - node[by_part], nodes)], start, depth)
-
-
-def _stable_order(key: Ints, n: int) -> Ints:
-    """Stable argsort of integers 0 … n − 1; NumPy sorts short integers by counting."""
-    return np.argsort(key.astype(np.uint16) if n <= 2**16 else key, kind="stable")
+    by_part = stable_order(part, 2**depth)
+    return Dissection(by_part[stable_order(nodes - 1 - node[by_part], nodes)], start, depth)
 
 
 def _parts(points: Floats, placed: Bools, depth: int) -> Ints:

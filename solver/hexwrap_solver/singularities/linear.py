@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from hexwrap_solver.arrays import Bools, Floats, Ints
 from hexwrap_solver.conformal.energy import Energy
-from hexwrap_solver.conformal.newton import minimise
+from hexwrap_solver.conformal.fixed import minimise
 from hexwrap_solver.conformal.types import Targets
 from hexwrap_solver.linalg.factor import Factorisation
 from hexwrap_solver.singularities.types import Rules
@@ -53,9 +53,8 @@ class Model:
 
 def vertex_areas(surface: Surface) -> Floats:
     """(n,) a third of the triangles around each."""
-    a, b, c = (surface.vertices[corner] for corner in surface.faces.T)
-    area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6
-    return np.asarray(np.bincount(surface.faces.ravel(), np.repeat(area, 3), len(surface.vertices)))
+    third = np.repeat(surface.areas / 3, 3)
+    return np.asarray(np.bincount(surface.faces.ravel(), third, len(surface.vertices)))
 
 
 def targets(

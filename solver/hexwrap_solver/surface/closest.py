@@ -8,6 +8,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from hexwrap_solver.arrays import Floats, Ints
+from hexwrap_solver.geometry import dot
 
 #: Points searched together, pairs of points and triangles looked at together, and compared together; they
 #: bound the memory of the search, not its result. A point on the axis of a tube is as near to whole rings.
@@ -191,8 +192,8 @@ def nearest_in_triangles(points: Floats, corners: Floats) -> tuple[Floats, Float
     """Barycentric coordinates (k, 3) of the point of triangle k nearest to point k, and the distance (k,)."""
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     ab, ac, ap = b - a, c - a, points - a
-    g11, g12, g22 = _dot(ab, ab), _dot(ab, ac), _dot(ac, ac)
-    r1, r2 = _dot(ab, ap), _dot(ac, ap)
+    g11, g12, g22 = dot(ab, ab), dot(ab, ac), dot(ac, ac)
+    r1, r2 = dot(ab, ap), dot(ac, ap)
     det = g11 * g22 - g12**2
     flat = det <= 0
     det = np.where(flat, 1.0, det)
@@ -210,8 +211,8 @@ def _nearest_on_sides(points: Floats, corners: Floats) -> Floats:
     barycentric = np.zeros((len(points), 3))
     for k in range(3):
         start, along = corners[:, k], corners[:, (k + 1) % 3] - corners[:, k]
-        squared = _dot(along, along)
-        t = np.clip(_dot(points - start, along) / np.where(squared > 0, squared, 1.0), 0.0, 1.0)
+        squared = dot(along, along)
+        t = np.clip(dot(points - start, along) / np.where(squared > 0, squared, 1.0), 0.0, 1.0)
         distance = np.linalg.norm(start + t[:, None] * along - points, axis=1)
         nearer = distance < best
         best = np.where(nearer, distance, best)
@@ -241,7 +242,3 @@ def _length(gap: Floats) -> Floats:
     with np.errstate(over="ignore"):
         length = largest * np.linalg.norm(gap / largest[:, None], axis=1)
     return np.asarray(np.minimum(length, np.finfo(float).max))
-
-
-def _dot(a: Floats, b: Floats) -> Floats:
-    return np.asarray(np.einsum("kd,kd->k", a, b))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hexwrap_solver.arrays import Bools, Floats, Ints
+from hexwrap_solver.geometry import angles_between, dot
 from hexwrap_solver.surface.topology import half_edges, next_half_edge, twins
 
 #: Flips to Delaunay end long before on meshes that are not torture.
@@ -86,7 +87,7 @@ def _seen_under(points: Floats, faces: Ints, h: Ints) -> Floats:
     tail, head = half_edges(faces)
     apex = points[faces.ravel()[next_half_edge(next_half_edge(h))]]
     a, b = points[tail[h]] - apex, points[head[h]] - apex
-    return np.asarray(np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.einsum("kd,kd->k", a, b)))
+    return angles_between(a, b)
 
 
 def _stays_unfolded(vertices: Floats, faces: Ints, h: Ints, twin: Ints) -> Bools:
@@ -96,4 +97,4 @@ def _stays_unfolded(vertices: Floats, faces: Ints, h: Ints, twin: Ints) -> Bools
     pa, pb, pc, pd = (vertices[x] for x in (start[h], end[h], c, d))
     before = np.cross(pb - pa, pc - pa) + np.cross(pa - pb, pd - pb)
     one, two = np.cross(pd - pa, pc - pa), np.cross(pb - pd, pc - pd)
-    return np.asarray((np.einsum("ij,ij->i", one, before) > 0) & (np.einsum("ij,ij->i", two, before) > 0))
+    return np.asarray((dot(one, before) > 0) & (dot(two, before) > 0))

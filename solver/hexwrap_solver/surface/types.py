@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 import numpy as np
 
 from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged
+from hexwrap_solver.geometry import face_areas
 from hexwrap_solver.setting import Setting
 from hexwrap_solver.surface.closest import TriangleTree
 from hexwrap_solver.surface.topology import edge_groups, edge_lengths, half_edges, twins_of
@@ -151,6 +152,13 @@ class Triangles:
         return twin
 
     @cached_property
+    def areas(self) -> Floats:
+        """(m,) areas of the faces."""
+        areas = face_areas(self.vertices, self.faces)
+        areas.flags.writeable = False
+        return areas
+
+    @cached_property
     def lengths(self) -> Floats:
         """(m, 3) lengths of the half-edges."""
         lengths = edge_lengths(self.vertices, self.faces)
@@ -206,7 +214,7 @@ class Surface(Triangles):
 
     def knowing(self, mesh: Triangles) -> Surface:
         """The surface itself, told what is known of the same triangles by other names of their vertices."""
-        known = ("edge_groups", "twin", "lengths")
+        known = ("edge_groups", "twin", "lengths", "areas")
         self.__dict__.update({name: mesh.__dict__[name] for name in known if name in mesh.__dict__})
         return self
 

@@ -41,6 +41,8 @@ class Cells:
 
     def part(self, keep: Bools) -> Cells:
         """Some of the cells."""
+        if keep.all():
+            return self
         side = np.repeat(keep, self.corner.lengths)
         renumber = np.where(side, np.cumsum(side) - 1, -1)
         twin = self.twin[side]
@@ -69,6 +71,8 @@ class WholeCells:
         return self.corner.n_rows
 
     def part(self, keep: Bools) -> WholeCells:
+        if keep.all():
+            return self
         side = np.repeat(keep, self.corner.lengths)
         offsets = np.concatenate([[0], np.cumsum(self.corner.lengths[keep])])
         corner = Ragged(self.corner.values[side], offsets)
@@ -84,42 +88,51 @@ def whole_cells(lattice: Lattice, edges: PatternEdges) -> WholeCells:
     """
     start = np.flatnonzero(edges.head.ravel() >= 0)
     node, slot = start // edges.width, start % edges.width
-    isometry = np.zeros((len(start), 4), dtype=np.int64)
+    products = np.zeros((1, 4), dtype=np.int64)  # of the gluings met: few walks meet any
+    product = np.zeros(len(start), dtype=np.int64)  # which of them each walk has met, 0: none
     walk, turned = np.arange(len(start)), np.zeros(len(start), dtype=np.int64)
     first, visits = start, []
     closed, total = np.zeros(len(start), dtype=bool), np.zeros(len(start), dtype=np.int64)
+
+    def meet(which: Ints, isometry: Ints) -> None:
+        nonlocal products, product
+        if len(which):
+            met = lattice.compose(products[product[which]], isometry)
+            product = product.copy()
+            product[which] = len(products) + np.arange(len(which))
+            products = np.concatenate([products, met])
+
     for _ in range(lattice.sides + lattice.sides // lattice.order * MOST_EXTRA):
-        visits.append((walk, node, slot, isometry))
-        isometry = lattice.compose(isometry, edges.isometry(node, slot))
-        back = edges.back[node, slot]
+        visits.append((walk, node, slot, product))
+        gluing, back = edges.gluing[node, slot], edges.back[node, slot]
         node = edges.head[node, slot]
+        glued = np.flatnonzero(gluing)
+        meet(glued, edges.isometries[gluing[glued]])
         slot, inner, passed = edges.clockwise(node, back % edges.width)
         seam = np.flatnonzero(passed & (edges.around[node] != lattice.directions))
-        isometry[seam] = lattice.compose(isometry[seam], edges.seam[node[seam]])
+        meet(seam, edges.seam[node[seam]])
         turned = turned + lattice.directions // 2 - inner
         number = edges.number(node, slot)
-        leads = edges.head[node, slot] >= 0
         at_first = number == first
-        closed[walk[at_first]] = isometry[at_first, 3] == 0
+        closed[walk[at_first]] = products[product[at_first], 3] == 0
         total[walk[at_first]] = turned[at_first]
         # Each cell once, from its lowest side on; a walk that comes to a lower one is another's, or none.
-        going = leads & (number > first)
-        walk, first, node, slot, isometry, turned = (
-            x[going] for x in (walk, first, node, slot, isometry, turned)
+        going = (edges.head[node, slot] >= 0) & (number > first)
+        walk, first, node, slot, product, turned = (
+            x[going] for x in (walk, first, node, slot, product, turned)
         )
         if not len(walk):
             break
     kept = [closed[walk] for walk, *_ in visits]
-    walk, node, slot, isometry = (
+    walk, node, slot, product = (
         np.concatenate([visit[i][keep] for visit, keep in zip(visits, kept, strict=True)]) for i in range(4)
     )
     sorted_by_walk = np.argsort(walk, kind="stable")
     lengths = np.bincount(walk, minlength=len(start))[closed]
     offsets = np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
     index = (lattice.directions - total[closed]) // lattice.steps_per_turn
-    return WholeCells(
-        Ragged(node[sorted_by_walk], offsets), slot[sorted_by_walk], isometry[sorted_by_walk], index
-    )
+    isometry = products[product[sorted_by_walk]]
+    return WholeCells(Ragged(node[sorted_by_walk], offsets), slot[sorted_by_walk], isometry, index)
 
 
 def sides_by_edge(edges: PatternEdges, cells: WholeCells) -> Ints:

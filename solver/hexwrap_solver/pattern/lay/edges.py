@@ -169,7 +169,8 @@ class _Found:
 
     def glue(self, edge: Ints, isometry: Ints) -> None:
         """edge: numbers."""
-        moved = isometry.any(axis=1)
+        a, b, c, d = isometry.T
+        moved = (a | b | c | d) != 0
         self._row[edge] = 0
         self._row[edge[moved]] = self._many + np.arange(np.count_nonzero(moved))
         self._rows.append(isometry[moved])

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from hexwrap_solver.arrays import Floats
+from hexwrap_solver.geometry import angles_between
 from hexwrap_solver.surface.brep.types import Edge, NurbsCurve
 from hexwrap_solver.surface.nurbs import basis
-from hexwrap_solver.surface.topology import angles_between
 
 #: An edge is looked at in so many places, at least, and so often between two knots.
 PLACES, PER_SPAN = 16, 2

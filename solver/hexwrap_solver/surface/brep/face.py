@@ -10,6 +10,7 @@ import shapely
 from scipy.spatial import cKDTree
 
 from hexwrap_solver.arrays import Bools, Floats, Ints
+from hexwrap_solver.geometry import dot, face_normals
 from hexwrap_solver.surface.brep.plane import triangulated
 from hexwrap_solver.surface.brep.pull import Patch, free
 from hexwrap_solver.surface.brep.sizes import Field, Sizes, bilinear
@@ -18,7 +19,7 @@ from hexwrap_solver.surface.flips import flip_to_delaunay, independent
 from hexwrap_solver.surface.mesh_sizes import ROW, cumulated
 from hexwrap_solver.surface.nurbs import evaluate, evaluate_points
 from hexwrap_solver.surface.projection import project
-from hexwrap_solver.surface.topology import edge_lengths, face_normals, half_edges, sum_rows, twins
+from hexwrap_solver.surface.topology import edge_lengths, half_edges, sum_rows, twins
 
 #: Points inside keep away from the boundary by this part of its edges' lengths, which are looked at in so
 #: many places each.
@@ -255,8 +256,8 @@ def _smoothed(patch: Patch, piece: Piece) -> Piece:
     jet = evaluate(patch.opened, piece.uv[move])
     away = middle[move] - jet.point
     pairs = (jet.du, jet.du), (jet.du, jet.dv), (jet.dv, jet.dv)
-    e, f, g = (np.einsum("ij,ij->i", a, b) for a, b in pairs)
-    p, q = np.einsum("ij,ij->i", away, jet.du), np.einsum("ij,ij->i", away, jet.dv)
+    e, f, g = (dot(a, b) for a, b in pairs)
+    p, q = dot(away, jet.du), dot(away, jet.dv)
     determinant = np.maximum(e * g - f * f, 1e-12 * np.maximum(e * g, 1e-300))
     step = np.stack([g * p - f * q, e * q - f * p], axis=1) / determinant[:, None]
     uv, points = piece.uv.copy(), piece.points.copy()
@@ -265,7 +266,7 @@ def _smoothed(patch: Patch, piece: Piece) -> Piece:
     before = _least_angles(piece.points, piece.faces)
     normal = face_normals(piece.points, piece.faces)
     for _ in range(UNDOINGS):
-        worse = np.einsum("ij,ij->i", face_normals(points, piece.faces), normal) <= 0
+        worse = dot(face_normals(points, piece.faces), normal) <= 0
         worse |= _least_angles(points, piece.faces) < np.minimum(before, SMALL) * 0.7
         if not worse.any():
             break

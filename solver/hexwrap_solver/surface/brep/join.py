@@ -11,6 +11,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from hexwrap_solver.arrays import Floats, Ints
+from hexwrap_solver.geometry import dot
 from hexwrap_solver.surface.brep.curves import evaluate_curve, places
 from hexwrap_solver.surface.brep.types import Brep, Edge, Face, Trim
 
@@ -59,9 +60,9 @@ def nearest_on(edge: Edge, points: Floats) -> tuple[Floats, Floats]:
     for _ in range(STEPS):
         at, tangent, bend = evaluate_curve(edge.curve, best)
         off = at - points
-        slope = np.einsum("ij,ij->i", off, tangent)
-        speed = np.einsum("ij,ij->i", tangent, tangent)
-        second = speed + np.einsum("ij,ij->i", off, bend)
+        slope = dot(off, tangent)
+        speed = dot(tangent, tangent)
+        second = speed + dot(off, bend)
         second = np.where(second > 0.1 * speed, second, speed)
         best = np.clip(best - slope / np.maximum(second, 1e-300), low, high)
     return best, np.linalg.norm(evaluate_curve(edge.curve, best)[0] - points, axis=1)
@@ -190,7 +191,7 @@ def _apart(one: Edge, two: Edge) -> tuple[float, Floats, bool]:
     turned = one.start != two.start
     if one.start == one.end:  # closed: the direction tells
         tangent = evaluate_curve(one.curve, places(one))[1]
-        turned = bool(np.einsum("ij,ij->i", tangent, evaluate_curve(two.curve, t)[1]).sum() < 0)
+        turned = bool(dot(tangent, evaluate_curve(two.curve, t)[1]).sum() < 0)
     return float(max(distance.max(), other.max())), points[int(distance.argmax())], turned
 
 
