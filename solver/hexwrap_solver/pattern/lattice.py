@@ -17,10 +17,10 @@ directions its edges leave, and so which cells lie between them.
     brick (fold 2)                  2 + 2i      i → 2 + i → 4 + i, 2 + i → 2 − i  rectangle
     truncated-square                4           2 + i → 2 − i, 2 + i → 1 + 2i  octagon
 
-Cells follow: each is a walk along edges that takes the first edge clockwise at every node. Where a regular
-cell cannot have its corners in points of the ring (dodecagons, octagons), one node is given its true ``place``
-and all others follow by symmetry: integers say which node is meant, places where it stands, and a motion
-carries the place of a node to the place of its image.
+Each cell is a walk along edges that takes the first edge clockwise at every node. Where regular cells cannot
+have their corners in points of the ring (dodecagons, octagons), one node is given its true ``place`` and all
+others follow by symmetry: integers say which node is meant, places where it stands, and a motion carries the
+place of a node to the place of its image.
 
 The origin is the place where singularities may stand, unless ``centre`` says another: the highest symmetry.
 A singularity of index k leaves order − k of the sectors around it: a cell there has that many parts of its
@@ -28,7 +28,7 @@ sides, a node that many parts of its edges.
 
 An isometry is a row (k, a, b, w): k modulo the order of ζ, τ = a + bζ, and w, an integer that adds up under
 composition and acts on nothing. On annuli it counts turns around the surface, which k and τ cannot tell where
-a power of the deck transformation is the identity; elsewhere it is 0. All of it is exact (paper, definition 2).
+a power of the deck transformation is the identity; elsewhere it is 0. All of it is exact (definition 2).
 """
 
 from __future__ import annotations
@@ -119,7 +119,7 @@ class Lattice:
 
     @cached_property
     def _every_edge(self) -> Ints:
-        """(e, 2, 2) tail and step of the edges that the symmetries make of those given, one per translation."""
+        """(e, 2, 2) tail and step of all edges up to translations."""
         given = np.array(self.edges)
         tail, step = given[:, 0], given[:, 1] - given[:, 0]
         tail, step = np.concatenate([tail, tail + step]), np.concatenate([step, -step])
@@ -231,6 +231,15 @@ class Lattice:
             outline = self.cell(start, step)
             found.setdefault(len(outline), self.stand(np.array(outline)) / self.edge)
         return found
+
+    def uneven_outline(self, sides: int) -> Floats | None:
+        """(sides, 2) corners, about their mean, of a cell that is no regular polygon; else None."""
+        outline = self.outlines[sides]
+        edge = np.roll(outline, -1) - outline
+        if np.ptp((np.roll(edge, -1) / edge).real) < 1e-9:
+            return None
+        about = outline - outline.mean()
+        return np.stack([about.real, about.imag], axis=1)
 
     def cell(self, start: Ints, step: Ints) -> list[Ints]:
         """The nodes around the cell to the left of an edge."""
@@ -394,8 +403,8 @@ class Lattice:
 
 
 ROOT = 3**0.5
-#: Edges of regular dodecagons with triangles on sides of length 3 of hexagons; half an edge of octagons 4 wide;
-#: the radius of hexagons 5 apart with squares between them.
+#: Edges of regular dodecagons that cut corners off hexagons of edge 3; half an edge of octagons 4 wide; the
+#: radius of hexagons 5 apart with squares between them.
 _DODECAGON, _OCTAGON, _HEXAGON = 3 / (1 + 2 / ROOT), 2 * np.tan(np.pi / 8), 5 / (1 + ROOT)
 _SQUARES: tuple[Point, ...] = ((1, 0), (0, 1))
 

@@ -23,7 +23,7 @@ def outlook(cmap: ConformalMap, laid: Pattern, sizes: int, left: float) -> tuple
     the linear model alone."""
     surface = cmap.surface
     if (
-        laid.kind == "triangle"
+        LATTICES[laid.kind].fold < LATTICES[laid.kind].order
         or len(cmap.cones)
         or not 1 <= len(surface.loops) <= 2
         or len(surface.vertices) > LARGEST

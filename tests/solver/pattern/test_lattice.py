@@ -64,7 +64,8 @@ def test_motions_carry_nodes_to_nodes_and_links_to_links(kind, turns, x, y):
         assert (lattice.has_edge(images, np.full(len(nodes), turned)) == has).all()
 
 
-#: Corners of the cells around every node, and which cells there are per translation (Grünbaum and Shephard 1987).
+#: Corners of the cells around every node, and which cells there are per translation (Grünbaum and
+#: Shephard 1987).
 TILINGS = {
     "hex": ({(6, 6, 6)}, {6: 1}),
     "triangle": ({(3,) * 6}, {3: 2}),

@@ -1,8 +1,8 @@
 """Edges of the pattern, from node to node, found by tracing them through the domain.
 
-The edges of a node are numbered counter-clockwise around it: its slots. On the plane the residue of the node's
-point says in which direction each leaves. At a node that is a singularity itself the sectors of the faces
-around it are walked once: angles add up from face to face, and a slot stands for every direction of the
+The edges of a node are numbered counter-clockwise around it: its slots. On the plane the residue of the
+node's point says in which direction each leaves. At a node that is a singularity itself the sectors of the
+faces around it are walked once: angles add up from face to face, and a slot stands for every direction of the
 lattice that is met on the way, five or seven of them where the plane has six. Nobody else needs to know: an
 edge is a node and a slot, it has a reverse, and a cell goes on with the slot clockwise from that.
 """
@@ -28,10 +28,10 @@ class PatternEdges:
     node's own coordinates, increasing, −1 beyond the degree; at singularities counted on from sector to
     sector. around: (n,) directions once around the node. head: (n, width) the node at the other end, −1 where
     there is none. back: (n, width) number of the same edge from its other end. exits: (n, width) 3·face +
-    half-edge of the boundary edge at which the edge leaves the domain, −1 elsewhere. gluing: (n, width) row in
-    the table isometries (g, 4) of what carries the head's own coordinates, or those of the face at the exit,
-    to the tail's own; row 0 is the identity. seam: (n, 4) what a walk around the node meets clockwise between
-    slot 0 and the last slot, the identity but at singularities.
+    half-edge of the boundary edge at which the edge leaves the domain, −1 elsewhere. gluing: (n, width) row
+    in the table isometries (g, 4) of what carries the head's own coordinates, or those of the face at the
+    exit, to the tail's own; row 0 is the identity. seam: (n, 4) what a walk around the node meets clockwise
+    between slot 0 and the last slot, the identity but at singularities.
     """
 
     degree: Ints

@@ -35,7 +35,7 @@ class Traces:
 
 
 def trace(layout: Layout, face: Ints, origin: Complexes, target: Ints) -> Traces:
-    """Straight lines from places, (k,), to nodes of the lattice, (k, 2), in the coordinates of the first triangle.
+    """Straight lines from places, (k,), to nodes, (k, 2), in the coordinates of the first triangle.
 
     A boundary vertex on the way can be passed on two sides; what fails on one side is tried on the other.
     """
