@@ -112,9 +112,7 @@ def _lay(cmap: ConformalMap, placing: Placing, settings: PatternSettings, progre
     if len(boundary.face) and (settings.boundary == "trim" or len(features)):
         folded = Folded(surface.faces, placement.glued, features) if len(features) else None
         try:
-            cut = trim(
-                layout, boundary, met, nodes, edges, whole, folded, rim=settings.boundary == "trim"
-            )
+            cut = trim(layout, boundary, met, nodes, edges, whole, folded, rim=settings.boundary == "trim")
         except TooCoarse:
             raise _too_coarse(cmap, settings, placement) from None
     else:

@@ -27,7 +27,9 @@ def grid(rings: Floats) -> SentMesh:
     rows, around, _ = rings.shape
     i, j = np.meshgrid(np.arange(rows - 1), np.arange(around), indexing="ij")
     a, b = (i * around + j).ravel(), (i * around + (j + 1) % around).ravel()
-    faces: Ints = np.concatenate([np.stack([a, b, b + around]), np.stack([a, b + around, a + around])], axis=1)
+    faces: Ints = np.concatenate(
+        [np.stack([a, b, b + around]), np.stack([a, b + around, a + around])], axis=1
+    )
     return SentMesh(rings.reshape(-1, 3), Ragged.from_table(faces.T))
 
 

@@ -107,20 +107,12 @@ def _on_features(
     which = by_half_edge[half_edge]
     inside = np.flatnonzero((which >= 0) & (on.t > 0))
     # Points at vertices, whichever edge they are listed at, for all features that come there.
-    vertex = faces.ravel()[half_edge]
+    at_vertex = np.full(int(faces.max()) + 1, -1, dtype=np.int64)
     ends = np.flatnonzero(on.t == 0)
-    order = ends[np.argsort(vertex[ends], kind="stable")]
-    known, start = np.unique(vertex[order], return_index=True)
-    at = np.searchsorted(known, features.tail)
-    at = np.minimum(at, max(len(known) - 1, 0))
-    met = np.flatnonzero(known[at] == features.tail) if len(known) else np.zeros(0, dtype=np.int64)
-    last = np.minimum(np.searchsorted(known, features.head), max(len(known) - 1, 0))
-    end = (
-        np.flatnonzero(features.last & (known[last] == features.head))
-        if len(known)
-        else np.zeros(0, dtype=np.int64)
-    )
-    point = np.concatenate([on.point[inside], on.point[order[start[at[met]]]], on.point[order[start[last[end]]]]])
+    at_vertex[faces.ravel()[half_edge[ends]]] = on.point[ends]
+    first, last = at_vertex[features.tail], np.where(features.last, at_vertex[features.head], -1)
+    met, end = np.flatnonzero(first >= 0), np.flatnonzero(last >= 0)
+    point = np.concatenate([on.point[inside], first[met], last[end]])
     edge = np.concatenate([which[inside], met, end])
     along = np.concatenate([on.t[inside], np.zeros(len(met)), np.ones(len(end))])
     sort = np.lexsort((along, edge))
