@@ -10,9 +10,9 @@ from hexwrap_solver.arrays import Floats, Progress, no_progress
 from hexwrap_solver.conformal import boundary
 from hexwrap_solver.conformal.corners import boundary_angles
 from hexwrap_solver.conformal.energy import Energy
+from hexwrap_solver.conformal.fixed import Minimum, minimise
 from hexwrap_solver.conformal.layout import lay_out
 from hexwrap_solver.conformal.net import Net
-from hexwrap_solver.conformal.newton import Minimum, minimise
 from hexwrap_solver.conformal.openings import cut_openings
 from hexwrap_solver.conformal.orientation import faithful, positive
 from hexwrap_solver.conformal.robust import FlatMetric, metric_with_flips, solve_with_flips, with_inserted

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from hexwrap_solver.arrays import Bools, Floats, Ints
 from hexwrap_solver.conformal.energy import Energy
-from hexwrap_solver.conformal.newton import minimise
+from hexwrap_solver.conformal.fixed import minimise
 from hexwrap_solver.conformal.types import Targets
 from hexwrap_solver.linalg.factor import Factorisation
 from hexwrap_solver.singularities.types import Rules

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hexwrap_solver.conformal.energy import Energy
-from hexwrap_solver.conformal.newton import minimise
+from hexwrap_solver.conformal.fixed import minimise
 from hexwrap_solver.errors import SettingError, SingularitiesError
 from hexwrap_solver.singularities.linear import linear_model, targets, vertex_areas
 from hexwrap_solver.singularities.place import given, place

@@ -274,7 +274,7 @@ def _flatten(
     flips = make_delaunay(mesh, np.zeros(mesh.n), euclidean=True)
     known = curvatures(targets, targets.angle, surface, cones)
     span = MAX_SPAN if free else largest_span(cone_angle_of(surface, known))
-    descent = descend(FlipEnergy(Energy(surface, targets), mesh), problem.u, span, progress)
+    descent = descend(FlipEnergy(Energy(surface, targets), mesh, span), problem.u, progress)
     sums = angle_sums(mesh, descent.metric)
     curvature = curvatures(targets, sums, surface, cones)
     angle = cone_angle_of(surface, curvature)
