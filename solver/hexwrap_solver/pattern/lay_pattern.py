@@ -94,7 +94,8 @@ def _lay(cmap: ConformalMap, placing: Placing, settings: PatternSettings, progre
     layout = layout_of(placing.cmap, lattice, placement)
     _check_count(cmap, layout, settings)
     surface = placing.cmap.surface
-    features = FeatureEdges.of(surface, surface.features)
+    numbers = sorted(placing.features)
+    features = FeatureEdges.of(surface, [surface.features[i] for i in numbers])
     if len(features):
         layout = cut_open(layout, features)
     nodes = find_nodes(layout)
@@ -175,7 +176,7 @@ def _check_count(cmap: ConformalMap, layout: Layout, settings: PatternSettings) 
 def _finish(
     cmap: ConformalMap, settings: PatternSettings, placement: Placement, layout: Layout, cut: Trimmed
 ) -> Pattern:
-    keep, narrow = _usable(cut.cells, placement.narrows)
+    keep, narrow = _usable(cut.cells, placement.narrows or cut.seams is not None)
     if not keep.any():
         raise _too_coarse(cmap, settings, placement)
     cells, whole = cut.cells.part(keep), cut.whole[keep]
@@ -289,6 +290,8 @@ def _told(cut: Trimmed, narrow: int, apart: int) -> list[str]:
         notes.append(
             f"{narrow} cells at the narrow end were left out: so few go around it there that they touch "
             "themselves."
+            if cut.seams is None
+            else f"{narrow} cells that touch themselves were left out."
         )
     if cut.holed:
         notes.append(

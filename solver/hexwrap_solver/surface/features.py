@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,7 +29,7 @@ class FeatureEdges:
     last: Bools
 
     @classmethod
-    def of(cls, mesh: Triangles, features: tuple[Feature, ...]) -> FeatureEdges:
+    def of(cls, mesh: Triangles, features: Sequence[Feature]) -> FeatureEdges:
         """Edges that the mesh does not have are left out."""
         none = [np.zeros(0, dtype=np.int64)]
         tail = np.concatenate(none + [f.vertices[:-1] for f in features])

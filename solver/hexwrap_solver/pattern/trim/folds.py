@@ -31,9 +31,11 @@ SAME = 32.0
 
 @dataclass(frozen=True)
 class Seams:
-    """Which points of the arrangement are one. point: (p,) the one that stands for each; isometry: (p, 4) from
-    that one's own coordinates to each one's. feature, edge, along: (f,) of the points on features, in order:
-    the edge's place in the feature, and the point's on the edge, from 0 to 1; on: (f,) those points."""
+    """Which points of the arrangement are one.
+
+    point: (p,) the one that stands for each; isometry: (p, 4) from that one's own coordinates to each one's.
+    on, feature: (f,) points on features, feature after feature, in order; edge: the edge of the feature that
+    each lies on, along: where, from 0 to 1."""
 
     point: Ints
     isometry: Ints
@@ -66,7 +68,7 @@ def seams(
     on: BoundaryPoints,
     count: int,
 ) -> Seams:
-    """layout: cut open. faces: (m, 3) of the surface. on: all points on the boundary; count: of all points."""
+    """layout: cut open. faces: (m, 3) of the surface. on: the points on the boundary, of ``count``."""
     lattice = layout.lattice
     face, edge = boundary.face[on.edge], boundary.edge[on.edge]
     half_edge = 3 * face + edge
