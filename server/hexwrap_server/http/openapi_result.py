@@ -41,6 +41,7 @@ _MAP = _all(
     iterations=_COUNT,
     residual=NUMBER,
     flips=_COUNT,
+    apart=nullable(_all(face=listed(_INDEX), cell=nullable(listed(_INDEX)), shift=listed(PLANE))),
 )
 _PATTERN = _all(
     kind=_KIND,

@@ -11,9 +11,11 @@ import orjson
 from numpy.typing import NDArray
 
 from hexwrap_server.output.colours import class_colours
+from hexwrap_server.output.unrolled import piece_of_cells
 from hexwrap_solver.arrays import Complexes, Floats, Ragged
 from hexwrap_solver.conformal.net import Net
 from hexwrap_solver.conformal.types import ConformalMap
+from hexwrap_solver.domain.apart import apart
 from hexwrap_solver.panels.types import Components, Panels, Support, TradeOff
 from hexwrap_solver.pattern.types import Pattern
 from hexwrap_solver.pipeline import Solution
@@ -44,7 +46,7 @@ def part(solution: Solution, name: str, timings: dict[str, float]) -> Any:
         case "unit":
             return solution.map.surface.unit
         case "map":
-            return conformal(solution.map)
+            return conformal(solution.map) | {"apart": drawn_apart(solution)}
         case "pattern":
             return solution.pattern and pattern(solution.pattern)
         case "panels":
@@ -108,6 +110,18 @@ def conformal(cmap: ConformalMap) -> dict[str, Any]:
         "flips": int(cmap.flips),
         "inserted": int(cmap.inserted),
         "closing_error": float(cmap.closing_error),
+    }
+
+
+def drawn_apart(solution: Solution) -> dict[str, Any] | None:
+    """Of a domain that overlaps itself, the pieces in which to draw faces and cells, and the shift of each."""
+    pieces, laid = apart(solution.map), solution.pattern
+    if pieces is None:
+        return None
+    return {
+        "face": flat(pieces.piece),
+        "cell": None if laid is None else flat(piece_of_cells(laid, pieces)),
+        "shift": plane(pieces.shift),
     }
 
 
