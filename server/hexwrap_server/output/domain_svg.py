@@ -25,7 +25,7 @@ SIDE, MARGIN = 1400.0, 90.0
 MAX_FACES = 30_000
 #: More corners than this are marked, but not named.
 MAX_NAMES = 40
-#: The apex is shown where it is no further from the domain than this many times the domain's size.
+#: The apex is shown where it is not further from the domain than this many times the domain's size.
 APEX_REACH = 0.6
 
 STYLE = """

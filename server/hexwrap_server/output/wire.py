@@ -19,11 +19,12 @@ from hexwrap_solver.domain.apart import apart
 from hexwrap_solver.panels.types import Components, Panels, Support, TradeOff
 from hexwrap_solver.pattern.types import Pattern
 from hexwrap_solver.pipeline import Solution
+from hexwrap_solver.singularities.types import Choices
 from hexwrap_solver.surface.types import Surface
 
 #: The parts of a Result, in its order.
 PARTS = ("unit", "mesh", "map", "pattern", "panels", "sizes", "quality", "components", "support", "timings")
-#: Asked for beside parts: ``map`` then has ``corners``, whatever its kind.
+#: Asked for beside parts: ``map`` then has ``corners`` on every kind of domain.
 CORNERS = "corners"
 
 
@@ -215,7 +216,23 @@ def quality(solution: Solution) -> dict[str, Any]:
         "not_convex": 0 if measured.convex is None else int(np.sum(~measured.convex)),
         "movement": float(measured.movement),
         "trade_off": trade_off(made.trade_off) if made and made.trade_off else None,
+        "singularity_curve": choices(measured.singularities) if measured.singularities else None,
         "notes": notes(solution),
+    }
+
+
+def choices(found: Choices) -> dict[str, Any]:
+    return {
+        "sizes": found.sizes,
+        "taken": found.taken,
+        "coarse": found.coarse,
+        "number": flat(found.number),
+        "uncovered": flat(found.uncovered),
+        "scale_ratio": flat(found.ratio),
+        "at": [
+            [{"point": flat(point), "index": int(k)} for point, k in zip(points, index, strict=True)]
+            for points, index in zip(found.places, found.index, strict=True)
+        ],
     }
 
 
