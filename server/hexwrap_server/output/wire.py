@@ -115,7 +115,7 @@ def conformal(cmap: ConformalMap) -> dict[str, Any]:
 
 
 def drawn_apart(solution: Solution) -> dict[str, Any] | None:
-    """Of a domain that overlaps itself, the pieces in which to draw faces and cells, and the shift of each."""
+    """Of a domain that overlaps itself, the pieces to draw faces and cells in, and the shift of each."""
     pieces, laid = apart(solution.map), solution.pattern
     if pieces is None:
         return None
