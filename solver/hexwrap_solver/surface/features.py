@@ -10,7 +10,8 @@ from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import breadth_first_order, connected_components
 
 from hexwrap_solver.arrays import Bools, Floats, Ints
-from hexwrap_solver.surface.topology import angles_between, face_normals, half_edges, unit
+from hexwrap_solver.geometry import angles_between, face_normals, normalize
+from hexwrap_solver.surface.topology import half_edges
 from hexwrap_solver.surface.types import Feature, Triangles
 
 #: A chain that turns by more than this at a vertex is two, radians.
@@ -52,7 +53,7 @@ class FeatureEdges:
 
 def folds(mesh: Triangles, angle: float) -> tuple[Ints, Floats]:
     """(k, 2) inner edges at which the mesh folds by more than an angle, radians, and (k,) by how much."""
-    normal = unit(face_normals(mesh.vertices, mesh.faces))
+    normal = normalize(face_normals(mesh.vertices, mesh.faces))
     h = np.flatnonzero(mesh.twin > np.arange(len(mesh.twin)))
     fold = angles_between(normal[h // 3], normal[mesh.twin[h] // 3])
     start, end = half_edges(mesh.faces)
