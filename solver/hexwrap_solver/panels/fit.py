@@ -66,7 +66,7 @@ WATERTIGHT_NOTES = (
     " always energy.",
 )
 
-#: An energy above this that no step lowers is told.
+#: An energy above this that no step lowers is worth a note.
 MINIMAL = 1e-12
 STUCK_NOTE = ("No step lowered the energy: the corners stand where the pattern has them.",)
 
@@ -113,7 +113,7 @@ class _Group:
         return limits.inscribed(self.poses, planes.direction[self.at], planes.offset[self.at])
 
     def finished(self, planes: Separation, cells: int) -> tuple[Ragged, Floats, Bools]:
-        """As ``_trimmed``: the largest that fit, whatever the target, since they belong to no size class."""
+        """As ``_trimmed``: the largest that fit, for any target, since they belong to no size class."""
         length, center = self.inscribed(planes)
         kept = np.zeros(cells, dtype=bool)
         kept[self.face[length > 0]] = True

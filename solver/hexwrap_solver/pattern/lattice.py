@@ -368,6 +368,10 @@ class Lattice:
         )
         return np.asarray(every[np.argmin(abs(np.angle(self.position(every) / direction)))])
 
+    def period_along(self, direction: complex) -> float:
+        """Length of the shortest translation along an edge or across a corner."""
+        return float(abs(complex(self.position(self.shortest_towards(direction)))))
+
     @cached_property
     def _measures(self) -> Ints:
         """(2b, 2) rows (m, n) such that mx + ny is 1 for both translations of each sector of ``beside``."""

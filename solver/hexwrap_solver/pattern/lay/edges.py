@@ -124,6 +124,8 @@ def _cone(layout: Layout, nodes: Nodes, corner: int) -> _Cone | None:
         begins.append(angle)
         angle += float(np.angle((before - here) / (following - here)))
         entry = 3 * f + (c + 2) % 3  # the half-edge that comes to the node
+        if layout.across.ravel()[entry] < 0:  # a fold ends here: the node stands on a boundary
+            return None
         crossing = layout.crossing.ravel()[entry]
         point = lattice.rotate(nodes.point[own] - isometry[-1][1:3], -isometry[-1][0])
         incidence.append(int(nodes.find(np.array([f]), point[None])[0]))
