@@ -30,7 +30,7 @@ from scipy import sparse
 from hexwrap_solver.arrays import Ragged
 from hexwrap_solver.conformal import boundary, conformal_map
 from hexwrap_solver.conformal.energy import Energy
-from hexwrap_solver.conformal.newton import minimise
+from hexwrap_solver.conformal.fixed import minimise
 from hexwrap_solver.conformal.robust import solve_with_flips
 from hexwrap_solver.conformal.types import BoundaryCondition
 from hexwrap_solver.linalg.factor import Factorisation

@@ -10,9 +10,9 @@ from hexwrap_solver.arrays import Floats, Progress, no_progress
 from hexwrap_solver.conformal import boundary
 from hexwrap_solver.conformal.corners import boundary_angles
 from hexwrap_solver.conformal.energy import Energy
+from hexwrap_solver.conformal.fixed import Minimum, minimise
 from hexwrap_solver.conformal.layout import lay_out
 from hexwrap_solver.conformal.net import Net
-from hexwrap_solver.conformal.newton import Minimum, minimise
 from hexwrap_solver.conformal.openings import cut_openings
 from hexwrap_solver.conformal.orientation import faithful, positive
 from hexwrap_solver.conformal.robust import FlatMetric, metric_with_flips, solve_with_flips, with_inserted
@@ -34,7 +34,7 @@ from hexwrap_solver.tolerances import ANGLE
 #: A cone angle this near to a multiple of π/6 is made one, radians, where the map does not come out with the
 #: angle as it is: its apex would lie so far away that coordinates lose the digits in which they differ.
 NEARLY = 1e-7
-#: Relative errors of boundary lengths that are told.
+#: Smaller relative errors of boundary lengths are not worth a note.
 TELLING = 1e-6
 NO_ANGLES = (
     "The boundary's mode is angles, but its list of angles is empty: every boundary angle is 180°, as with"
@@ -182,11 +182,11 @@ def _rounding_notes(surface: Surface, free: list[int], found: Floats, rounded: F
             f"The isometric boundary has a cone angle of {np.degrees(found[0]):.4g}°; the domain was given "
             f"{shape}.",
         )
-    told = [
+    changes = [
         f"{np.degrees(found[i]):.4g}° to {np.degrees(rounded[i]):.6g}° on loop {free[i]}" for i in changed[:4]
     ]
     more = f" and {len(changed) - 4} more" if len(changed) > 4 else ""
-    return (f"Curvatures of the isometric loops were rounded from {', '.join(told)}{more}.",)
+    return (f"Curvatures of the isometric loops were rounded from {', '.join(changes)}{more}.",)
 
 
 @dataclass(frozen=True)
@@ -276,10 +276,7 @@ def _finish(plain: _Plain, cones: Cones) -> ConformalMap:
 def _mean_on_area(surface: Surface, u: Floats) -> float:
     """Area-weighted mean of u: the domain is as large as the surface on (geometric) average."""
     a, b, c = surface.faces.T
-    x, y, z = ((column[b] - column[a], column[c] - column[a]) for column in surface.vertices.T)
-    normal = [p[0] * q[1] - p[1] * q[0] for p, q in ((y, z), (z, x), (x, y))]
-    area = np.sqrt(normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2)
-    return float(area @ (u[a] + u[b] + u[c]) / (3 * area.sum()))
+    return float(surface.areas @ (u[a] + u[b] + u[c]) / (3 * surface.areas.sum()))
 
 
 def _mean_on(found: ConformalMap, loops: list[int]) -> float:

@@ -10,6 +10,7 @@ from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.domain.interpolate import surface_weights
 from hexwrap_solver.domain.locate import find_places
+from hexwrap_solver.geometry import normalize
 
 #: No domain reaches so far; larger coordinates would overflow on the way.
 BEYOND = 1e300
@@ -32,7 +33,7 @@ def lift(cmap: ConformalMap, places: Complexes) -> Lifted:
 
     z and g(z) go to the same point. Where the unrolled domain overlaps itself, the sheet nearest to 0 is
     meant; a net has one image, and where that overlaps itself the deepest place counts. Never raises: what
-    lies outside is told in ``inside``.
+    lies outside is marked in ``inside``.
     """
     places = np.asarray(places, dtype=complex).ravel()
     known = (np.abs(places.real) <= BEYOND) & (np.abs(places.imag) <= BEYOND)  # NaN is not
@@ -53,4 +54,4 @@ def points_at(cmap: ConformalMap, face: Ints, weights: Floats) -> tuple[Floats, 
     corners = surface.faces[face]
     points = np.einsum("kc,kcd->kd", weights, surface.vertices[corners])
     normals = np.einsum("kc,kcd->kd", weights, surface.normals[corners])
-    return points, normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    return points, normalize(normals)

@@ -44,7 +44,7 @@ def default_edge(
         pattern = replace(pattern, rotation="edge")
     lattice = LATTICES[pattern.kind]
     with one_blas_thread():
-        cmap = mapped(take_in, SolveSettings(pattern=pattern, panels=None), run, source=source)
+        cmap, _ = mapped(take_in, SolveSettings(pattern=pattern, panels=None), run, source=source)
     return wanted_edge(cmap, lattice, pattern, edge_angle(lattice, pattern)) * mean_stretch(cmap)
 
 
@@ -92,7 +92,8 @@ def _foresee(
         progress(i / len(counts), f"{frame.boundary.mode}, {count} singularities")
         try:
             asked = as_settings(listed[0], settings, seats[count])
-            seen[count] = outlook(mapped(take_in, asked, runner(), source=source), frame.pattern)
+            cmap, _ = mapped(take_in, asked, runner(), source=source)
+            seen[count] = outlook(cmap, frame.pattern)
         except HexwrapError as error:
             seen[count] = error.detail
     for variant, count in zip(listed, possible, strict=True):

@@ -13,16 +13,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexwrap_solver.arrays import Bools, Floats, Ints
+from hexwrap_solver.geometry import stable_order
 
 #: Parts of about this many vertices are not cut any further: dense algebra is faster there.
 LEAF = 160
 #: Steps that bring each cutting plane to its part's median.
 MEDIAN_STEPS = 3
-#: Where a plane leaves so much more than half of its part on one side, as happens where vertices were
+#: Where a plane leaves this much more than half of its part on one side, as happens where vertices were
 #: inserted in clusters, the median is found by sorting.
 LOPSIDED = 0.2
-#: Planes are found from about so many unknowns per part, and from one in four of all at most: a plane that is
-#: a little off costs nothing.
+#: Planes are found from about this many unknowns per part, and from one in four of all at most: a plane that
+#: is a little off costs nothing.
 SAMPLE, SHARE = 512, 4
 
 
@@ -67,13 +68,8 @@ def dissect(points: Floats, rows: Ints, columns: Ints) -> Dissection:
         node[separator] = 2**k - 1 + (part[separator] >> (depth - k))
     nodes = 2 ** (depth + 1) - 1
     start = np.concatenate([[0], np.cumsum(np.bincount(node, minlength=nodes)[::-1])])
-    by_part = _stable_order(part, 2**depth)
-    return Dissection(by_part[_stable_order(nodes - 1 - node[by_part], nodes)], start, depth)
-
-
-def _stable_order(key: Ints, n: int) -> Ints:
-    """Stable argsort of integers 0 … n − 1; NumPy sorts short integers by counting."""
-    return np.argsort(key.astype(np.uint16) if n <= 2**16 else key, kind="stable")
+    by_part = stable_order(part, 2**depth)
+    return Dissection(by_part[stable_order(nodes - 1 - node[by_part], nodes)], start, depth)
 
 
 def _parts(points: Floats, placed: Bools, depth: int) -> Ints:
@@ -83,7 +79,7 @@ def _parts(points: Floats, placed: Bools, depth: int) -> Ints:
         return part
     centred = np.ascontiguousarray(points.T)
     everywhere = np.flatnonzero(placed)
-    random = np.random.default_rng(0)  # whatever the numbering, and the same every time
+    random = np.random.default_rng(0)  # independent of the numbering, and the same every time
     sample = everywhere[random.integers(0, len(everywhere), len(everywhere) // SHARE)]
     # Second moments far from the origin lose their digits.
     centred -= centred[:, sample].mean(axis=1)[:, None]

@@ -7,7 +7,8 @@ import shapely
 
 from hexwrap_solver.arrays import Floats, Ints, Ragged
 from hexwrap_solver.errors import PanelsError
-from hexwrap_solver.panels.planar import cross, in_planes, outlines, plane_axes
+from hexwrap_solver.geometry import cross_2d, dot, normalize, plane_axes
+from hexwrap_solver.panels.planar import in_planes, outlines
 from hexwrap_solver.panels.polygons import (
     edge_vectors,
     interior_angles,
@@ -33,8 +34,7 @@ def make_components(panels: Panels, settings: ComponentSettings) -> Components:
     outline = _inset(panels, settings.inset) if settings.inset > 0 else panels.polygons
     z_axis = panels.normal
     first = edge_vectors(panels.polygons)[panels.polygons.offsets[:-1]]
-    x_axis = first - np.einsum("qd,qd->q", first, z_axis)[:, None] * z_axis
-    x_axis /= np.linalg.norm(x_axis, axis=1)[:, None]
+    x_axis = normalize(first - dot(first, z_axis)[:, None] * z_axis)
     solid = _solids(outline, z_axis, settings.thickness) if settings.thickness > 0 else (None, None)
     return Components(outline, panels.center, x_axis, np.cross(z_axis, x_axis), z_axis, *solid)
 
@@ -43,12 +43,10 @@ def _inset(panels: Panels, inset: float) -> Ragged:
     """Outlines moved inwards by the same width on every edge (mitred corners)."""
     polygons = panels.polygons
     row, points = polygons.row, np.asarray(polygons.values, dtype=np.float64)
-    inward = np.cross(panels.normal[row], edge_vectors(polygons))
-    length = np.linalg.norm(inward, axis=1)
-    inward /= np.where(length > 0, length, 1.0)[:, None]
+    inward = normalize(np.cross(panels.normal[row], edge_vectors(polygons)))
     before = np.zeros_like(inward)
     before[polygons.next()] = inward
-    room = row_minima(np.einsum("hd,hd->h", panels.center[row] - points, inward), polygons.offsets)
+    room = row_minima(dot(panels.center[row] - points, inward), polygons.offsets)
     concave = np.flatnonzero(row_maxima(interior_angles(polygons, panels.normal), polygons.offsets) > REFLEX)
     flat = _in_plane(panels, concave)
     room[concave] = _room(flat, inset)  # the centre may lie behind edges
@@ -56,11 +54,9 @@ def _inset(panels: Panels, inset: float) -> Ragged:
     _require_room(panels, thin, inset, room)
     width = np.where(thin, np.maximum(room, 0.0) / 2, inset)
     # The mitred corner lies at distance ``width`` from both edges' lines: the bisector, scaled.
-    bend = 1 + np.einsum("hd,hd->h", before, inward)[:, None]
+    bend = 1 + dot(before, inward)[:, None]
     moved = points + width[row, None] * (before + inward) / np.maximum(bend, 1e-9)
-    folded = row_minima(
-        np.einsum("hd,hd->h", moved[polygons.next()] - moved, edge_vectors(polygons)), polygons.offsets
-    )
+    folded = row_minima(dot(moved[polygons.next()] - moved, edge_vectors(polygons)), polygons.offsets)
     # Where a short edge would turn round, the outline shrinks about the centre instead.
     factor = 1 - (width / np.where(room > 0, room, np.inf))[row, None]
     center = panels.center[row]
@@ -165,7 +161,7 @@ def triangulated(outline: Ragged, normal: Floats) -> Ints:
     triangles = np.stack([apex, local, following], axis=1)[inner]
     corner = in_planes(outline, means(outline), plane_axes(normal))
     a, b, c = np.moveaxis(corner[outline.offsets[:-1][row[inner]][:, None] + triangles], 1, 0)
-    for i in np.unique(row[inner][cross(b - a, c - a) < 0]):
+    for i in np.unique(row[inner][cross_2d(b - a, c - a) < 0]):
         triangles[row[inner] == i] = _ears(corner[outline.offsets[i] : outline.offsets[i + 1]])
     return np.asarray(triangles)
 
@@ -175,13 +171,13 @@ def _ears(corner: Floats) -> Ints:
     left, triangles = np.arange(len(corner)), []
     while len(left) > 2:
         a, b, c = corner[np.roll(left, 1)], corner[left], corner[np.roll(left, -1)]
-        bulge = cross(b - a, c - a)
+        bulge = cross_2d(b - a, c - a)
         covered = np.ones((len(left), len(left)), dtype=bool)
         for p, q in ((a, b), (b, c), (c, a)):
-            covered &= cross((q - p)[:, None], corner[left] - p[:, None]) >= 0
+            covered &= cross_2d((q - p)[:, None], corner[left] - p[:, None]) >= 0
         own = np.eye(len(left), dtype=bool)
         covered &= ~(own | np.roll(own, 1, axis=1) | np.roll(own, -1, axis=1))
-        # Where rounding leaves no ear, whatever bulges most.
+        # Where rounding leaves no ear, the corner that bulges most.
         k = int(np.argmax(np.where(covered.any(axis=1) | (bulge <= 0), -np.inf, bulge)))
         triangles.append([left[k - 1], left[k], left[(k + 1) % len(left)]])
         left = np.delete(left, k)

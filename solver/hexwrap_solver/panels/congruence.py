@@ -1,10 +1,11 @@
-"""Which panels have the same shape: congruent up to rotation, mirror images told apart."""
+"""Which panels have the same shape: congruent up to rotation, mirror images distinguished."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from hexwrap_solver.arrays import Floats, Ints, Ragged
+from hexwrap_solver.geometry import dot
 from hexwrap_solver.panels.polygons import edge_lengths, edge_vectors, interior_angles
 
 #: Figures (relative to the mean edge, or radians) that differ by less are the same.
@@ -38,7 +39,7 @@ def _letters(polygons: Ragged, normal: Floats, unit: float) -> Ints:
     following = polygons.next()
     edge = edge_vectors(polygons) / unit
     ahead = edge[following]
-    twist = np.einsum("hd,hd->h", np.cross(edge, ahead), ahead[following])
+    twist = dot(np.cross(edge, ahead), ahead[following])
     figures = [np.linalg.norm(edge, axis=1), interior_angles(polygons, normal), twist]
     merged = np.stack([_merge(figure) for figure in figures], axis=1)
     return _numbered(merged)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexwrap_solver.arrays import Floats, Ints, Ragged
+from hexwrap_solver.geometry import dot, normalize
 from hexwrap_solver.panels.halfedges import HalfEdges
 
 
@@ -41,9 +42,7 @@ def facing_edges(edges: HalfEdges, first_corner: Ints, face: Ints) -> Facing:
 
 def mean_normals(facing: Facing, normal: Floats) -> Floats:
     """(k, 3) unit mean of the two panels' normals (q, 3)."""
-    mean = normal[facing.left] + normal[facing.right]
-    mean /= np.linalg.norm(mean, axis=1)[:, None]
-    return np.asarray(mean)
+    return normalize(normal[facing.left] + normal[facing.right])
 
 
 def edge_ends(polygons: Ragged, panel: Ints, corner: Ints) -> tuple[Floats, Floats]:
@@ -58,7 +57,7 @@ def widths(polygons: Ragged, facing: Facing, mean: Floats) -> Floats:
     crossed the other."""
     a, b = edge_ends(polygons, facing.left, facing.start_left)
     c, d = edge_ends(polygons, facing.right, facing.start_right)
-    a, b, c, d = (x - np.einsum("hd,hd->h", x, mean)[:, None] * mean for x in (a, b, c, d))
+    a, b, c, d = (x - dot(x, mean)[:, None] * mean for x in (a, b, c, d))
     ends = [(c, a, b), (d, a, b), (a, c, d), (b, c, d)]
     return np.asarray(np.min([_signed_distance(*end, mean) for end in ends], axis=0))
 
@@ -66,8 +65,8 @@ def widths(polygons: Ragged, facing: Facing, mean: Floats) -> Floats:
 def _signed_distance(point: Floats, a: Floats, b: Floats, mean: Floats) -> Floats:
     """Distance to segment ab, negative on its left (inside the polygon that runs along ab)."""
     along, spoke = b - a, point - a
-    squared = np.einsum("hd,hd->h", along, along)
-    t = np.einsum("hd,hd->h", spoke, along) / np.where(squared > 0, squared, 1.0)
+    squared = dot(along, along)
+    t = dot(spoke, along) / np.where(squared > 0, squared, 1.0)
     distance = np.linalg.norm(spoke - np.clip(t, 0.0, 1.0)[:, None] * along, axis=1)
-    inside = np.einsum("hd,hd->h", np.cross(along, spoke), mean) > 0
+    inside = dot(np.cross(along, spoke), mean) > 0
     return np.asarray(np.where(inside & (t >= 0) & (t <= 1), -distance, distance))

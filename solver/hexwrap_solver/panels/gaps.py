@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexwrap_solver.arrays import Floats
+from hexwrap_solver.geometry import angles_between, dot
 from hexwrap_solver.panels.facing import edge_ends, facing_edges, mean_normals, widths
 from hexwrap_solver.panels.halfedges import HalfEdges
 from hexwrap_solver.panels.types import Panels
@@ -36,8 +37,8 @@ def gaps(pattern: Pattern, edges: HalfEdges, panels: Panels) -> Gaps:
     mean = mean_normals(facing, panels.normal)
     figures = (
         widths(panels.polygons, facing, mean),
-        np.abs(np.einsum("hd,hd->h", (c + d - a - b) / 2, mean)),
-        np.arctan2(np.linalg.norm(np.cross(n1, n2), axis=1), np.einsum("hd,hd->h", n1, n2)),
+        np.abs(dot((c + d - a - b) / 2, mean)),
+        angles_between(n1, n2),
     )
     result = np.full((3, len(edges.cell)), np.nan)
     result[:, facing.here] = result[:, facing.there] = figures

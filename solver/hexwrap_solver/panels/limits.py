@@ -12,6 +12,7 @@ from itertools import combinations
 import numpy as np
 
 from hexwrap_solver.arrays import Bools, Floats, Ints
+from hexwrap_solver.geometry import cross_2d
 from hexwrap_solver.panels.regular import Poses
 
 #: Multipliers of a dual vertex count as non-negative down to this (their sum is of order 1).
@@ -63,7 +64,7 @@ def inscribed(poses: Poses, direction: Floats, offset: Floats) -> tuple[Floats, 
 def _is_loose(flat: Floats, triple: Ints) -> Bools:
     """Where two of the three planes are as good as parallel, so that the panel can slide between them."""
     a, b, c = np.moveaxis(flat[np.arange(len(flat))[:, None], triple], 1, 0)
-    weight = np.abs([_cross(b, c), _cross(c, a), _cross(a, b)])
+    weight = np.abs([cross_2d(b, c), cross_2d(c, a), cross_2d(a, b)])
     return np.asarray(weight.min(axis=0) < LOOSE * weight.max(axis=0))
 
 
@@ -85,7 +86,9 @@ def _room_length(shift: Floats, flat: Floats, h: Floats, room: Floats) -> Floats
 
 def _dual_value(s: Floats, h: Floats, room: Floats) -> Floats:
     """Value of the dual vertex of three planes, s (q, 3, 2); infinite where it is not feasible."""
-    weight = np.stack([_cross(s[:, 1], s[:, 2]), _cross(s[:, 2], s[:, 0]), _cross(s[:, 0], s[:, 1])], axis=1)
+    weight = np.stack(
+        [cross_2d(s[:, 1], s[:, 2]), cross_2d(s[:, 2], s[:, 0]), cross_2d(s[:, 0], s[:, 1])], axis=1
+    )
     total = (weight * h).sum(axis=1)
     feasible = (np.abs(total) > DUAL_TOLERANCE) & ~np.any(
         weight * np.sign(total)[:, None] < -DUAL_TOLERANCE, 1
@@ -129,7 +132,3 @@ def shortest_edge(poses: Poses, points: Floats, direction: Floats, offset: Float
     needed = np.divide(-now, gained, out=np.zeros_like(now), where=(now < 0) & (gained > 0))
     center = poses.center + np.clip(needed.max(axis=1), 0.0, 1.0)[:, None] * (goal - poses.center)
     return np.minimum(length, length_at(center, direction, offset, h)), center
-
-
-def _cross(a: Floats, b: Floats) -> Floats:
-    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])

@@ -6,6 +6,7 @@ import numpy as np
 import shapely
 
 from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged
+from hexwrap_solver.geometry import normalize, plane_axes
 
 #: Two panels overlap when they share more area than this, times the squared edge length.
 AREA_TOLERANCE = 1e-9
@@ -21,10 +22,8 @@ def overlap_areas(polygons: Ragged, normal: Floats, edge_length: Floats, first: 
     Pairs that an edge direction of either polygon separates (separating-axis theorem) share nothing; the few
     others are intersected as polygons in the plane.
     """
-    mean = normal[first] + normal[second]
-    mean /= np.linalg.norm(mean, axis=1)[:, None]
-    x_axis = _perpendicular(mean)
-    y_axis = np.cross(mean, x_axis)
+    mean = normalize(normal[first] + normal[second])
+    x_axis, y_axis = plane_axes(mean).transpose(1, 0, 2)
     origin = np.asarray(polygons.values[polygons.offsets[first]], dtype=np.float64)
     a, b = (_project(polygons, which, origin, x_axis, y_axis) for which in (first, second))
     slack = DEPTH_TOLERANCE * np.minimum(edge_length[first], edge_length[second])
@@ -44,13 +43,6 @@ def overlapping_pairs(polygons: Ragged, normal: Floats, edge_length: Floats, pai
     area = overlap_areas(polygons, normal, edge_length, first, second)
     bound = AREA_TOLERANCE * np.minimum(edge_length[first], edge_length[second]) ** 2
     return np.flatnonzero(area > bound)
-
-
-def _perpendicular(n: Floats) -> Floats:
-    axis = np.zeros_like(n)
-    axis[np.arange(len(n)), np.abs(n).argmin(axis=1)] = 1.0
-    across = np.cross(n, axis)
-    return np.asarray(across / np.linalg.norm(across, axis=1)[:, None])
 
 
 def _project(polygons: Ragged, which: Ints, origin: Floats, x: Floats, y: Floats) -> Floats:

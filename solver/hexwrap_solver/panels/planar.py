@@ -6,15 +6,7 @@ import numpy as np
 import shapely
 
 from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged
-
-
-def plane_axes(normal: Floats) -> Floats:
-    """(q, 2, 3) orthonormal, right-handed with the unit normals (q, 3)."""
-    least = np.zeros_like(normal)
-    least[np.arange(len(normal)), np.abs(normal).argmin(axis=1)] = 1.0
-    x = np.cross(normal, least)
-    x /= np.linalg.norm(x, axis=1)[:, None]
-    return np.stack([x, np.cross(normal, x)], axis=1)
+from hexwrap_solver.geometry import plane_axes
 
 
 def in_planes(polygons: Ragged, center: Floats, axes: Floats) -> Floats:
@@ -34,8 +26,3 @@ def crossing_themselves(polygons: Ragged, center: Floats, normal: Floats) -> Boo
         return np.zeros(0, dtype=bool)
     corner = in_planes(polygons, center, plane_axes(normal))
     return np.asarray(~shapely.is_valid(outlines(corner, polygons.row)))
-
-
-def cross(a: Floats, b: Floats) -> Floats:
-    """Of vectors (…, 2): positive where b lies to the left of a."""
-    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hexwrap_solver.arrays import Floats, Ints, Ragged
+from hexwrap_solver.geometry import dot
 
 
 def row_sums(values: Floats, offsets: Ints) -> Floats:
@@ -63,8 +64,8 @@ def interior_angles(polygons: Ragged, normal: Floats) -> Floats:
     back = np.empty_like(ahead)
     back[polygons.next()] = -ahead
     n = normal[polygons.row]
-    sine = np.einsum("hd,hd->h", np.cross(ahead, back), n)
-    cosine = np.einsum("hd,hd->h", ahead, back)
+    sine = dot(np.cross(ahead, back), n)
+    cosine = dot(ahead, back)
     # The full length of the cross product, not its part along n, gives the angle of bent corners.
     length = np.linalg.norm(np.cross(ahead, back), axis=1)
     angle = np.arctan2(length, cosine)
@@ -76,7 +77,7 @@ def best_plane_distances(polygons: Ragged) -> Floats:
     spoke = polygons.values - means(polygons)[polygons.row]
     moment = row_sums(np.einsum("hd,he->hde", spoke, spoke), polygons.offsets)
     _, axes = np.linalg.eigh(moment)
-    return np.asarray(np.einsum("hd,hd->h", spoke, axes[:, :, 0][polygons.row]))
+    return dot(spoke, axes[:, :, 0][polygons.row])
 
 
 def take_rows(table: Ragged, rows: Ints) -> tuple[Ragged, Ints]:

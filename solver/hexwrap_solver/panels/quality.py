@@ -8,6 +8,7 @@ import numpy as np
 
 from hexwrap_solver.arrays import Floats, Progress, no_progress
 from hexwrap_solver.conformal.types import ConformalMap
+from hexwrap_solver.geometry import dot
 from hexwrap_solver.panels.congruence import congruence_classes
 from hexwrap_solver.panels.fewest import SLACK
 from hexwrap_solver.panels.gaps import gaps
@@ -25,7 +26,7 @@ from hexwrap_solver.panels.types import Panels, Quality
 from hexwrap_solver.pattern.types import Pattern
 from hexwrap_solver.surface.types import Surface
 
-#: A share of the surface without cells that is told.
+#: A smaller share of the surface without cells is not worth a note.
 BARE = 0.03
 
 
@@ -123,7 +124,7 @@ def stretch_ratio(cmap: ConformalMap) -> tuple[Floats, Floats]:
     x = np.linalg.norm(e1, axis=1)
     double_area = np.linalg.norm(np.cross(e1, e2), axis=1)
     # In the face's own plane e1 = (x, 0) and e2 = (a, h); the map's derivative is [w1 w2]·[e1 e2]⁻¹.
-    a, h = np.einsum("md,md->m", e1, e2) / x, double_area / x
+    a, h = dot(e1, e2) / x, double_area / x
     places = cmap.corners()
     w1, w2 = places[:, 1] - places[:, 0], places[:, 2] - places[:, 0]
     dx = w1 / x

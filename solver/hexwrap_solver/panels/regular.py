@@ -2,7 +2,7 @@
 
 With the corner angles θ_i = 2πi/p, a = (2/p) Σ cos θ_i p_i and b = (2/p) Σ sin θ_i p_i, the sum of squared
 distances between the cell's corners p_i and those of a regular polygon of given size is least when its
-centre is the centroid and its axes are the polar factor of the 3×2 matrix [a b], whatever the size; the best
+centre is the centroid and its axes are the polar factor of the 3×2 matrix [a b] for every size; the best
 circumradius is then (σ₁ + σ₂)/2. (An orthogonal Procrustes problem with scale; Schönemann and Carroll 1970.)
 """
 
@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexwrap_solver.arrays import Floats
+from hexwrap_solver.geometry import dot, normalize
 
 
 @dataclass(frozen=True)
@@ -47,7 +48,7 @@ def corners(p: int) -> Floats:
 def nearest_regular(points: Floats) -> Poses:
     """points: (q, p, 3) corners of the cells, in order. Their nearest regular polygons."""
     a, b = _moments(points)
-    g11, g12, g22 = _dot(a, a), _dot(a, b), _dot(b, b)
+    g11, g12, g22 = dot(a, a), dot(a, b), dot(b, b)
     # Square root of the 2×2 Gram matrix G by Cayley–Hamilton: √G = (G + √det G) / √(tr G + 2 √det G).
     root_det = np.linalg.norm(np.cross(a, b), axis=1)
     trace_root = np.sqrt(g11 + g22 + 2 * root_det)
@@ -61,8 +62,8 @@ def nearest_regular(points: Floats) -> Poses:
 def nearest_regular_in_plane(points: Floats, normal: Floats) -> Poses:
     """The same with the planes' unit normals (q, 3) given."""
     a, b = _moments(points)
-    a = a - _dot(a, normal)[:, None] * normal
-    b = b - _dot(b, normal)[:, None] * normal
+    a = a - dot(a, normal)[:, None] * normal
+    b = b - dot(b, normal)[:, None] * normal
     # In the plane the best rotation turns every direction θ_i to Σ z_i e^{−iθ_i}, that is to a − n×b.
     x_axis = a - np.cross(normal, b)
     length = np.linalg.norm(x_axis, axis=1)
@@ -72,9 +73,8 @@ def nearest_regular_in_plane(points: Floats, normal: Floats) -> Poses:
 
 def _orthonormal(points: Floats, x_axis: Floats, y_axis: Floats, trace: Floats) -> Poses:
     """Makes the axes orthonormal to the last bit that matters; trace: σ₁ + σ₂."""
-    x_axis = x_axis / np.linalg.norm(x_axis, axis=1)[:, None]
-    y_axis = y_axis - _dot(x_axis, y_axis)[:, None] * x_axis
-    y_axis /= np.linalg.norm(y_axis, axis=1)[:, None]
+    x_axis = normalize(x_axis)
+    y_axis = normalize(y_axis - dot(x_axis, y_axis)[:, None] * x_axis)
     return Poses(points.mean(axis=1), x_axis, y_axis, trace * np.sin(np.pi / points.shape[1]))
 
 
@@ -86,7 +86,3 @@ def _moments(points: Floats) -> tuple[Floats, Floats]:
     a = np.einsum("i,qid->qd", np.cos(angle), centred) * (2 / p)
     b = np.einsum("i,qid->qd", np.sin(angle), centred) * (2 / p)
     return a, b
-
-
-def _dot(a: Floats, b: Floats) -> Floats:
-    return np.asarray(np.einsum("qd,qd->q", a, b))

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexwrap_solver.arrays import Floats
+from hexwrap_solver.geometry import dot, normalize
 from hexwrap_solver.panels.halfedges import HalfEdges
 from hexwrap_solver.pattern.types import Pattern
 
@@ -37,8 +38,6 @@ def separating_planes(pattern: Pattern, edges: HalfEdges, normal: Floats, joint:
     inner = edges.twin >= 0
     mean = normal[edges.cell] + np.where(inner[:, None], normal[edges.across], 0.0)
     a, b = pattern.vertices[edges.start], pattern.vertices[edges.end]
-    outward = np.cross(b - a, mean)
-    length = np.linalg.norm(outward, axis=1)
-    direction = outward / np.where(length > 0, length, 1.0)[:, None]
-    middle = np.einsum("hd,hd->h", direction, (a + b) / 2)
+    direction = normalize(np.cross(b - a, mean))
+    middle = dot(direction, (a + b) / 2)
     return Separation(direction, middle - np.where(inner, joint / 2, 0.0))

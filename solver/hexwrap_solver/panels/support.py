@@ -11,11 +11,11 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from hexwrap_solver.arrays import Floats, Ints, Progress, no_progress
+from hexwrap_solver.geometry import angles_between, dot, normalize, plane_axes
 from hexwrap_solver.linalg.normal_matrix import NormalMatrix
 from hexwrap_solver.panels.halfedges import half_edges
 from hexwrap_solver.panels.types import Support
 from hexwrap_solver.pattern.types import Pattern
-from hexwrap_solver.surface.topology import unit
 
 #: Greatest |det| of unit vectors that counts as no torsion.
 TORSION_TOLERANCE = 1e-13
@@ -38,8 +38,8 @@ def support(pattern: Pattern, depth: float, progress: Progress = no_progress) ->
     many unknowns as edges and triangles fewer: what torsion remains is in the result.
     """
     edges = _edges(pattern)
-    along = unit(pattern.vertices[edges[:, 1]] - pattern.vertices[edges[:, 0]])
-    frame = _tangents(pattern.normals)
+    along = normalize(pattern.vertices[edges[:, 1]] - pattern.vertices[edges[:, 0]])
+    frame = plane_axes(pattern.normals)
     shift = np.zeros((len(pattern.vertices), 2))
     best, least = shift, np.inf
     gram = NormalMatrix(pattern.vertices[edges].mean(axis=1))
@@ -57,7 +57,7 @@ def support(pattern: Pattern, depth: float, progress: Progress = no_progress) ->
         jacobian = _jacobian(along, axes, frame, edges)
         gram.factorise(csr_array(jacobian.T), weight, REGULARIZATION)
         shift = (jacobian.T @ gram.solve(jacobian @ shift.ravel() - twist)).reshape(-1, 2)
-    axes = unit(pattern.normals + np.einsum("pe,ped->pd", best, frame))
+    axes = normalize(pattern.normals + np.einsum("pe,ped->pd", best, frame))
     return _finish(pattern, edges, along, axes, depth)
 
 
@@ -70,7 +70,7 @@ def _edges(pattern: Pattern) -> Ints:
 
 def _twist(along: Floats, axes: Floats, edges: Ints) -> Floats:
     """(e,) det(e_ij, a_i, a_j)."""
-    return np.asarray(np.einsum("ed,ed->e", along, np.cross(axes[edges[:, 0]], axes[edges[:, 1]])))
+    return dot(along, np.cross(axes[edges[:, 0]], axes[edges[:, 1]]))
 
 
 def _jacobian(along: Floats, axes: Floats, frame: Floats, edges: Ints) -> csr_array:
@@ -88,17 +88,7 @@ def _finish(pattern: Pattern, edges: Ints, along: Floats, axes: Floats, depth: f
     i, j = edges.T
     p, q = pattern.vertices[i], pattern.vertices[j]
     a, b = np.cross(along, axes[i]), np.cross(along, axes[j])
-    torsion = np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.einsum("ed,ed->e", a, b))
-    tilt = np.arctan2(
-        np.linalg.norm(np.cross(axes, pattern.normals), axis=1), np.einsum("pd,pd->p", axes, pattern.normals)
-    )
+    torsion = angles_between(a, b)
+    tilt = angles_between(axes, pattern.normals)
     strips = np.stack([p, q, q - depth * axes[j], p - depth * axes[i]], axis=1)
     return Support(pattern.vertices, axes, edges, strips, torsion, tilt)
-
-
-def _tangents(normal: Floats) -> Floats:
-    """(p, 2, 3) two unit vectors across each normal."""
-    axis = np.zeros_like(normal)
-    axis[np.arange(len(normal)), np.abs(normal).argmin(axis=1)] = 1.0
-    t = unit(np.cross(normal, axis))
-    return np.stack([t, np.cross(normal, t)], axis=1)

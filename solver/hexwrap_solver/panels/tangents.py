@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from hexwrap_solver.arrays import Floats
+from hexwrap_solver.geometry import normalize
 from hexwrap_solver.surface.normals import with_tangents
 from hexwrap_solver.surface.projection import project, start_parameters
-from hexwrap_solver.surface.topology import unit
 from hexwrap_solver.surface.types import Surface
 
 
@@ -20,7 +20,7 @@ def surface_normals(surface: Surface, points: Floats) -> Floats:
     corners = surface.normals[surface.faces[nearest.face]]
     interpolated = np.einsum("kc,kcd->kd", nearest.barycentric, corners)
     if surface.nurbs is None:
-        return unit(interpolated)
+        return normalize(interpolated)
     start = start_parameters(surface, nearest.face, nearest.barycentric)
     _, _, exact = project(surface.nurbs, points, start)
     return with_tangents(exact, interpolated)

@@ -13,7 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged
-from hexwrap_solver.panels.planar import cross, in_planes, plane_axes
+from hexwrap_solver.geometry import cross_2d, dot, plane_axes, quarter_turn
+from hexwrap_solver.panels.planar import in_planes
 from hexwrap_solver.panels.polygons import area_vectors, means, row_maxima, row_sums
 
 #: Lines that meet under an angle with a smaller sine do not fix a corner.
@@ -86,7 +87,7 @@ class _Outlines:
         corner = in_planes(polygons, origin, axes)
         side = np.einsum("hed,hd->he", axes[row], direction)
         length = np.maximum(np.linalg.norm(side, axis=1), ROUNDING)
-        reach = (offset - np.einsum("hd,hd->h", direction, origin[row])) / length
+        reach = (offset - dot(direction, origin[row])) / length
         return cls(corner, side / length[:, None], reach, across, row, polygons.offsets, origin, axes)
 
     @property
@@ -99,14 +100,14 @@ class _Outlines:
         return np.asarray(self.after(1))
 
     def after(self, step: int) -> Ints:
-        """(h,) position of the corner so many further on."""
+        """(h,) position of the corner that many further on."""
         start = self.offsets[:-1][self.row]
         return np.asarray(start + (np.arange(len(self.row)) - start + step) % self.count[self.row])
 
     def areas(self) -> Floats:
         """(q,) signed."""
         a, b = self.corner, self.corner[self.next]
-        return row_sums(cross(a, b) / 2, self.offsets)
+        return row_sums(cross_2d(a, b) / 2, self.offsets)
 
     def sizes(self) -> Floats:
         """(q,) greatest distance of a corner from the origin."""
@@ -126,17 +127,16 @@ def _mitred(flat: _Outlines) -> _Outlines:
     before = flat.after(-1)
     u, v = flat.side[before], flat.side
     excess_u, excess_v = (
-        flat.reach[k] - np.einsum("hd,hd->h", flat.side[k], flat.corner)
-        for k in (before, np.arange(len(flat.row)))
+        flat.reach[k] - dot(flat.side[k], flat.corner) for k in (before, np.arange(len(flat.row)))
     )
-    sine = cross(u, v)
+    sine = cross_2d(u, v)
     rim = (flat.across < 0) & (flat.across[before] < 0)
     sharp = (np.abs(sine) > SHALLOW) & ~rim
-    meeting = (excess_v[:, None] * _turned(u) - excess_u[:, None] * _turned(v)) / np.where(sharp, sine, 1.0)[
-        :, None
-    ]
+    meeting = (excess_v[:, None] * quarter_turn(u) - excess_u[:, None] * quarter_turn(v)) / np.where(
+        sharp, sine, 1.0
+    )[:, None]
     middle = u + v
-    squared = np.einsum("hd,hd->h", middle, middle)
+    squared = dot(middle, middle)
     short = np.minimum(np.minimum(excess_u, excess_v), 0.0) / np.maximum(squared, 1.0)
     back = np.where((rim | (squared < 1))[:, None], 0.0, 2 * short[:, None] * middle)
     moved = flat.corner + np.where(sharp[:, None], meeting, back)
@@ -151,8 +151,8 @@ def _turned_round(flat: _Outlines, moved: Floats) -> Bools:
     """(h,) edges that would run the other way with their corners moved."""
     following = flat.next
     ahead = flat.corner[following] - flat.corner
-    along = np.einsum("hd,hd->h", moved[following] - moved, ahead)
-    return np.asarray((along <= 0) & (np.einsum("hd,hd->h", ahead, ahead) > 0))
+    along = dot(moved[following] - moved, ahead)
+    return np.asarray((along <= 0) & (dot(ahead, ahead) > 0))
 
 
 def _wedges(flat: _Outlines) -> tuple[Ints, Bools]:
@@ -160,7 +160,7 @@ def _wedges(flat: _Outlines) -> tuple[Ints, Bools]:
     several: edges to the same neighbour with a reflex corner between each and the next."""
     before = flat.after(-1)
     joins = (flat.across >= 0) & (flat.across == flat.across[before])
-    joins &= cross(flat.side[before], flat.side) < 0
+    joins &= cross_2d(flat.side[before], flat.side) < 0
     begun = np.cumsum(~joins)
     begun = begun - np.concatenate([[0], begun])[flat.offsets[:-1]][flat.row]
     runs = row_maxima(begun, flat.offsets)[flat.row]
@@ -182,7 +182,7 @@ def _clipped(flat: _Outlines, binding: Bools) -> _Outlines:
     slack, start, count = ROUNDING * flat.sizes(), flat.offsets[:-1], flat.count
     for step in range(int(count.max(initial=0))):
         line = (start + np.minimum(step, count - 1))[flat.row]
-        height = np.einsum("hd,hd->h", flat.side[line], corner) - flat.reach[line]
+        height = dot(flat.side[line], corner) - flat.reach[line]
         over = _any(binding[line] & (height > slack[flat.row]), flat.offsets)
         beyond = over[flat.row] & (height > -slack[flat.row])
         gone = ~_any(~beyond, flat.offsets)[flat.row]
@@ -197,8 +197,8 @@ def _clipped(flat: _Outlines, binding: Bools) -> _Outlines:
             for inside, way in ((first[0], 1), (last[0], -1))
         )
         rank, run = first[1], first[1] + last[1] - 1
-        lost_at_a = np.abs(cross(b - a, corner[last[0]] - a))
-        lost_at_b = np.abs(cross(b - a, corner[first[0]] - a))
+        lost_at_a = np.abs(cross_2d(b - a, corner[last[0]] - a))
+        lost_at_b = np.abs(cross_2d(b - a, corner[first[0]] - a))
         even = np.where(run > 1, (rank - 1) / np.maximum(run - 1, 1), lost_at_a > lost_at_b)
         # The edge on the line takes nearly all of it, where both its ends are here.
         place = (line[at] - first[0]) % count[flat.row[at]]
@@ -238,9 +238,7 @@ def _enters(flat: _Outlines, wedge: Ints, multiple: Bools) -> Bools:
         for step in steps:
             line = flat.after(step)
             side, reach = flat.side[line], flat.reach[line]
-            start, end = (
-                np.einsum("hd,hd->h", side, flat.corner[k]) - reach for k in (slice(None), following)
-            )
+            start, end = (dot(side, flat.corner[k]) - reach for k in (slice(None), following))
             crossing = np.divide(slack - start, end - start, out=np.zeros(len(slack)), where=start != end)
             outside, leaves, comes = (
                 (start <= slack) & (end <= slack),
@@ -257,8 +255,3 @@ def _enters(flat: _Outlines, wedge: Ints, multiple: Bools) -> Bools:
 def _any(values: Bools, offsets: Ints) -> Bools:
     """(q,) whether any value of each row is true; no row may be empty."""
     return np.asarray(np.logical_or.reduceat(values, offsets[:-1])) if len(offsets) > 1 else values[:0]
-
-
-def _turned(a: Floats) -> Floats:
-    """By a quarter turn."""
-    return np.stack([-a[:, 1], a[:, 0]], axis=1)

@@ -88,9 +88,10 @@ class Lattice:
     def compose(self, outer: Ints, inner: Ints) -> Ints:
         """(…, 4) the isometries p ↦ outer(inner(p))."""
         result = outer + inner
-        result[..., 0] %= self.order
-        turned = (outer[..., 0] != 0) & (inner[..., 1:3] != 0).any(axis=-1)
+        turned = outer[..., 0] != 0
         if turned.any():
+            result[..., 0] %= self.order
+            turned = turned & ((inner[..., 1] | inner[..., 2]) != 0)
             rows, steps = np.broadcast_to(outer, result.shape), np.broadcast_to(inner, result.shape)
             moved = self.rotate(steps[turned][:, 1:3], rows[turned][:, 0])
             result[turned, 1:3] = rows[turned][:, 1:3] + moved
@@ -99,21 +100,28 @@ class Lattice:
     def invert(self, isometry: Ints) -> Ints:
         """(…, 4) the inverse isometries."""
         result = -isometry
-        result[..., 0] %= self.order
         turned = result[..., 0] != 0
         if turned.any():
+            result[..., 0] %= self.order
             result[turned, 1:3] = self.rotate(result[turned][:, 1:3], result[turned][:, 0])
         return np.asarray(result)
 
     def apply(self, isometry: Ints, points: Ints) -> Ints:
         """(…, 2) images of points (…, 2) under isometries (…, 4)."""
-        return np.asarray(self.rotate(points, isometry[..., 0]) + isometry[..., 1:3])
+        turn = isometry[..., 0]
+        moved = self.rotate(points, turn) if turn.any() else points
+        return np.asarray(moved + isometry[..., 1:3])
 
     def carry(self, isometry: Ints, places: Complexes) -> Complexes:
         """(…) images of places of the plane under isometries (…, 4)."""
-        k, b = isometry[..., 0], isometry[..., 2]
+        shape = np.broadcast_shapes(np.shape(places), isometry.shape[:-1])
+        isometry = np.broadcast_to(isometry, (*shape, 4))
+        result = np.broadcast_to(places, shape).astype(complex)
+        moved = (isometry[..., 0] | isometry[..., 1] | isometry[..., 2]) != 0  # few: the others stay
+        k, a, b, _ = isometry[moved].T
         turn = np.exp(1j * self.quantum * np.arange(self.order))[k]
-        return np.asarray(turn * places + (isometry[..., 1] + b * self.unit))
+        result[moved] = turn * result[moved] + (a + b * self.unit)
+        return result
 
     def partial_products(self, isometry: Ints) -> Ints:
         """(n + 1, 4) the products of the first 0, 1, …, n of (n, 4) isometries, the first one outermost."""
@@ -177,6 +185,10 @@ class Lattice:
         )
         return np.asarray(every[np.argmin(abs(np.angle(self.position(every) / direction)))])
 
+    def period_along(self, direction: complex) -> float:
+        """Length of the shortest translation along an edge or across a corner."""
+        return float(abs(complex(self.position(self.shortest_towards(direction)))))
+
     def ring_near(self, around: int, direction: complex) -> Ints:
         """Of all translations with that number of cells around, the nearest in direction."""
         distance = max(1, round(around / (2 if self.kind == "triangle" else 1)))
@@ -229,12 +241,15 @@ class Isometry:
     def power(self, s: Ints) -> Ints:
         """(…, 4) G^s as isometries, see the module."""
         s = np.asarray(s)
+        result = np.zeros((*s.shape, 4), dtype=np.int64)
+        moved = s != 0  # few: only the triangles at the cut leave their sheet
         period = len(self._first)
-        result = self._first[s % period]
+        rows = self._first[s[moved] % period]
         if period == 1:
-            result[..., 1:3] = s[..., None] * np.array(self.shift)
-        result[..., 3] = s
-        return np.asarray(result)
+            rows[..., 1:3] = s[moved][..., None] * np.array(self.shift)
+        rows[..., 3] = s[moved]
+        result[moved] = rows
+        return result
 
     def rotation(self, s: Ints) -> Ints:
         """By how many units ζ the power G^s turns, modulo the order."""

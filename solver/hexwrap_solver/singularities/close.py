@@ -14,8 +14,8 @@ import numpy as np
 
 from hexwrap_solver.arrays import Complexes, Floats, Ints, Progress, no_progress
 from hexwrap_solver.conformal.energy import Corners, Energy, opposite_lengths
+from hexwrap_solver.conformal.fixed import minimise
 from hexwrap_solver.conformal.layout import _develop
-from hexwrap_solver.conformal.newton import minimise
 from hexwrap_solver.errors import ConvergenceError
 from hexwrap_solver.linalg.factor import Factorisation
 from hexwrap_solver.singularities.cut import Branches, branches

@@ -10,10 +10,10 @@ from scipy.spatial import cKDTree
 from hexwrap_solver.arrays import Bools, Floats, Ints
 from hexwrap_solver.conformal.robust.refine import Problem, split_edges
 from hexwrap_solver.conformal.types import Targets
+from hexwrap_solver.geometry import normalize
 from hexwrap_solver.surface.normals import with_tangents
 from hexwrap_solver.surface.nurbs import evaluate, evaluate_points, wrap
 from hexwrap_solver.surface.projection import project
-from hexwrap_solver.surface.topology import unit
 from hexwrap_solver.surface.types import Surface
 
 #: The mesh follows within so many cells, this part of the way to a loop, and that to the next singularity.
@@ -142,7 +142,7 @@ def dragged(surface: Surface, hold: list[Grip], moves: Floats) -> Surface:
         seen = surface.tree.nearest(vertices[index])
         corner = surface.faces[seen.face]
         vertices[index] = np.einsum("kc,kcd->kd", seen.barycentric, surface.vertices[corner])
-        normals[index] = unit(np.einsum("kc,kcd->kd", seen.barycentric, surface.normals[corner]))
+        normals[index] = normalize(np.einsum("kc,kcd->kd", seen.barycentric, surface.normals[corner]))
     return _known(
         surface,
         replace(

@@ -17,15 +17,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from hexwrap_solver.arrays import Bools, Floats, Ints
-from hexwrap_solver.surface.topology import (
-    angles_between,
-    boundary_loops,
-    face_graph,
-    face_normals,
-    half_edges,
-    sum_rows,
-    unit,
-)
+from hexwrap_solver.geometry import angles_between, face_normals, normalize
+from hexwrap_solver.surface.topology import boundary_loops, face_graph, half_edges, sum_rows
 from hexwrap_solver.surface.types import Triangles
 
 #: Regions are bounded by folds sharper than this, radians …
@@ -38,7 +31,7 @@ ROUNDING = 1e-4
 OPPOSITE = 0.5
 #: A cap is upright whose normal is within 45° of the vertical.
 UPRIGHT = np.sqrt(0.5)
-#: So many times longer than the upright pair another one must be to be taken.
+#: Another pair is taken only if it is this many times longer than the upright one.
 LONGER = 2.5
 #: More flat regions than this make a faceted surface, not a mass with caps.
 MOST = 60
@@ -96,7 +89,7 @@ def _regions(mesh: Triangles) -> list[Cap]:
     """All flat regions that could be caps, the largest first."""
     m = len(mesh.faces)
     area2 = face_normals(mesh.vertices, mesh.faces)
-    normal = unit(area2)
+    normal = normalize(area2)
     h = np.flatnonzero(mesh.twin > np.arange(3 * m))
     one, two = h // 3, mesh.twin[h] // 3
     smooth = angles_between(normal[one], normal[two]) <= SHARP

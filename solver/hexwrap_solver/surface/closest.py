@@ -8,18 +8,19 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from hexwrap_solver.arrays import Floats, Ints
+from hexwrap_solver.geometry import dot
 
 #: Points searched together, pairs of points and triangles looked at together, and compared together; they
 #: bound the memory of the search, not its result. A point on the axis of a tube is as near to whole rings.
 CHUNK, MOST_PAIRS, COMPARED = 65536, 1 << 22, 1 << 18
 
-#: At most so many points descend the tree together: as many as there are for each triangle, since the box of
-#: points that lie further apart than triangles meets too many of these.
+#: At most this many points descend the tree together: as many as there are for each triangle, since the box
+#: of points that lie further apart than triangles meets too many of these.
 LARGEST_GROUP = 8
 
-#: A point further away than so many sizes of the mesh is moved straight towards it, to this distance, for the
-#: search. From there rays to the mesh differ from parallel ones by the inverse part of its size; much further
-#: away the digits that tell triangles apart are lost, and squares overflow in the end.
+#: A point further away than this many sizes of the mesh is moved straight towards it, to this distance, for
+#: the search. From there rays to the mesh differ from parallel ones by the inverse part of its size; much
+#: further away the digits that distinguish triangles are lost, and squares overflow in the end.
 FAR = 1e6
 
 #: Bits per coordinate of the Morton code that sorts the triangles.
@@ -32,7 +33,7 @@ SPREAD = (
     (4, 0x10C30C30C30C30C3),
     (2, 0x1249249249249249),
 )
-#: Distances from boxes are good to so many roundings of the coordinates.
+#: Distances from boxes are good to this many roundings of the coordinates.
 ROUNDINGS = 8
 
 
@@ -191,8 +192,8 @@ def nearest_in_triangles(points: Floats, corners: Floats) -> tuple[Floats, Float
     """Barycentric coordinates (k, 3) of the point of triangle k nearest to point k, and the distance (k,)."""
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     ab, ac, ap = b - a, c - a, points - a
-    g11, g12, g22 = _dot(ab, ab), _dot(ab, ac), _dot(ac, ac)
-    r1, r2 = _dot(ab, ap), _dot(ac, ap)
+    g11, g12, g22 = dot(ab, ab), dot(ab, ac), dot(ac, ac)
+    r1, r2 = dot(ab, ap), dot(ac, ap)
     det = g11 * g22 - g12**2
     flat = det <= 0
     det = np.where(flat, 1.0, det)
@@ -210,8 +211,8 @@ def _nearest_on_sides(points: Floats, corners: Floats) -> Floats:
     barycentric = np.zeros((len(points), 3))
     for k in range(3):
         start, along = corners[:, k], corners[:, (k + 1) % 3] - corners[:, k]
-        squared = _dot(along, along)
-        t = np.clip(_dot(points - start, along) / np.where(squared > 0, squared, 1.0), 0.0, 1.0)
+        squared = dot(along, along)
+        t = np.clip(dot(points - start, along) / np.where(squared > 0, squared, 1.0), 0.0, 1.0)
         distance = np.linalg.norm(start + t[:, None] * along - points, axis=1)
         nearer = distance < best
         best = np.where(nearer, distance, best)
@@ -241,7 +242,3 @@ def _length(gap: Floats) -> Floats:
     with np.errstate(over="ignore"):
         length = largest * np.linalg.norm(gap / largest[:, None], axis=1)
     return np.asarray(np.minimum(length, np.finfo(float).max))
-
-
-def _dot(a: Floats, b: Floats) -> Floats:
-    return np.asarray(np.einsum("kd,kd->k", a, b))

@@ -16,12 +16,13 @@ from scipy.sparse.linalg import splu
 from scipy.spatial import Delaunay
 
 from hexwrap_solver.arrays import Complexes, Floats, Ints
+from hexwrap_solver.geometry import dot, face_areas
 from hexwrap_solver.surface.topology import vertex_normals
 from hexwrap_solver.surface.types import Openings, Surface
 
 #: Vertices inside keep this many edge lengths away from the loop.
 CLEARANCE = 0.6
-#: A hole gets at most so many vertices for each one of its loop: a loop of very short edges around a large
+#: A hole gets at most this many vertices for each one of its loop: a loop of very short edges around a large
 #: hole would ask for millions.
 MOST_PER_VERTEX = 40
 #: Cotangents are cut off here: the fairest fill must not hang on needles.
@@ -136,7 +137,7 @@ def _cotangents(points: Floats, faces: Ints) -> csr_array:
         apex, a, b = (faces[:, (c + i) % 3] for i in range(3))
         one, other = points[a] - points[apex], points[b] - points[apex]
         area = np.linalg.norm(np.cross(one, other), axis=1)
-        cotangent = np.einsum("ij,ij->i", one, other) / np.maximum(area, 1e-300)
+        cotangent = dot(one, other) / np.maximum(area, 1e-300)
         rows.append(a)
         columns.append(b)
         weights.append(0.5 * np.clip(cotangent, -STEEPEST, STEEPEST))
@@ -164,9 +165,7 @@ def _faired(vertices: Floats, faces: Ints, old: int, wall: int) -> Floats:
     near = faces[at_fill[faces].any(axis=1)]
     names, local = np.unique(near, return_inverse=True)
     points, near = vertices[names], local.reshape(-1, 3)
-    one, other = points[near[:, 1]] - points[near[:, 0]], points[near[:, 2]] - points[near[:, 0]]
-    area = np.linalg.norm(np.cross(one, other), axis=1) / 6
-    mass = np.bincount(near.ravel(), np.repeat(area, 3), len(names))
+    mass = np.bincount(near.ravel(), np.repeat(face_areas(points, near) / 3, 3), len(names))
     rows = np.flatnonzero(at_fill[names])  # all triangles around these are at hand
     weight = diags_array(1 / np.sqrt(np.maximum(mass[rows], 1e-300)))
     laplacian = csr_array(weight @ _cotangents(points, near)[rows]).tocsc()

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hexwrap_solver.arrays import Floats
+from hexwrap_solver.geometry import dot
 from hexwrap_solver.surface.errors import NurbsDataError
 from hexwrap_solver.surface.nurbs import Jet, evaluate
 from hexwrap_solver.surface.nurbs_checks import spans
@@ -89,8 +90,8 @@ def _dense(nurbs: NurbsSurface, direction: int) -> Floats:
 
 def greatest_curvature(jet: Jet) -> Floats:
     """(k,) greatest absolute principal curvature, from the first and second fundamental forms."""
-    e, f, g = (np.einsum("ij,ij->i", a, b) for a, b in ((jet.du, jet.du), (jet.du, jet.dv), (jet.dv, jet.dv)))
-    l, m, n = (np.einsum("ij,ij->i", a, jet.normal) for a in (jet.duu, jet.duv, jet.dvv))  # noqa: E741
+    e, f, g = (dot(a, b) for a, b in ((jet.du, jet.du), (jet.du, jet.dv), (jet.dv, jet.dv)))
+    l, m, n = (dot(a, jet.normal) for a in (jet.duu, jet.duv, jet.dvv))  # noqa: E741
     determinant = np.maximum(e * g - f * f, np.finfo(float).tiny)
     mean = (e * n - 2 * f * m + g * l) / (2 * determinant)
     gauss = (l * n - m * m) / determinant

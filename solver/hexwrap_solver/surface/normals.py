@@ -5,14 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from hexwrap_solver.arrays import Floats, Ints
-from hexwrap_solver.surface.topology import sum_rows, unit
+from hexwrap_solver.geometry import dot, normalize
+from hexwrap_solver.surface.topology import sum_rows
 
 
 def with_tangents(exact: Floats, interpolated: Floats) -> Floats:
     """(k, 3) unit normals: those of the NURBS surface's tangents on the mesh normals' side. Where the
     parameterization is singular, the cross product of the tangents vanishes and the mesh's stand in."""
-    side = np.sign(np.einsum("kd,kd->k", exact, interpolated))[:, None]
-    return unit(np.where(side == 0, interpolated, side * exact))
+    side = np.sign(dot(exact, interpolated))[:, None]
+    return normalize(np.where(side == 0, interpolated, side * exact))
 
 
 def sent_normals(own: Floats, sent: Floats, stand: Ints) -> tuple[Floats, list[str]]:
@@ -24,7 +25,7 @@ def sent_normals(own: Floats, sent: Floats, stand: Ints) -> tuple[Floats, list[s
     """
     here = stand >= 0
     finite = np.isfinite(sent).all(axis=1, keepdims=True)
-    directions = unit(np.where(finite, sent, 0.0))[here]
+    directions = normalize(np.where(finite, sent, 0.0))[here]
     total = sum_rows(directions, stand[here], len(own))
     outward = (total * own).sum(axis=1)
     sentences = []
@@ -34,4 +35,4 @@ def sent_normals(own: Floats, sent: Floats, stand: Ints) -> tuple[Floats, list[s
     bad = outward <= 0
     if bad.any():
         sentences.append(f"{bad.sum()} sent normals could not be used; the faces around stand in for them.")
-    return np.where(bad[:, None], own, unit(total)), sentences
+    return np.where(bad[:, None], own, normalize(total)), sentences

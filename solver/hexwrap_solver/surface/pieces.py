@@ -11,7 +11,8 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged
-from hexwrap_solver.surface.topology import face_graph, face_normals, half_edges
+from hexwrap_solver.geometry import dot, face_areas
+from hexwrap_solver.surface.topology import face_graph, half_edges
 from hexwrap_solver.surface.triangulate import triangulate
 from hexwrap_solver.surface.types import SentMesh, Triangles
 from hexwrap_solver.surface.weld import TOLERANCE, relabelled, weldings
@@ -59,7 +60,7 @@ def pieces(mesh: SentMesh) -> list[Piece]:
     # A quad may fall apart where one of its triangles has no area: the first triangle counts.
     first = np.flatnonzero(np.diff(polygon, prepend=-1))
     count = int(piece.max()) + 1
-    area = np.bincount(piece, np.linalg.norm(face_normals(mesh.vertices, triangles), axis=1) / 2, count)
+    area = np.bincount(piece, face_areas(mesh.vertices, triangles), count)
     rim = np.flatnonzero(welded.twin < 0)
     start, end = (side[rim] for side in half_edges(welded.faces))
     kept = start != end
@@ -189,7 +190,7 @@ def _on_edges(vertices: Floats, start: Ints, end: Ints, tolerance: float) -> tup
     if counts.sum() == 0:
         return none
     v = among[np.concatenate([np.array(found, dtype=np.int64) for found in near])]
-    share = np.einsum("ij,ij->i", vertices[v] - a[edge], along[edge]) / np.maximum(length[edge] ** 2, 1e-300)
+    share = dot(vertices[v] - a[edge], along[edge]) / np.maximum(length[edge] ** 2, 1e-300)
     apart = np.linalg.norm(vertices[v] - a[edge] - share[:, None] * along[edge], axis=1)
     margin = np.minimum(share, 1 - share) * length[edge]
     hit = (apart <= tolerance) & (margin > tolerance) & (v != start[edge]) & (v != end[edge])

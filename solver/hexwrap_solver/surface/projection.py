@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hexwrap_solver.arrays import Bools, Floats, Ints
+from hexwrap_solver.geometry import dot
 from hexwrap_solver.surface.nurbs import Jet, domain, evaluate, evaluate_points, wrap
 from hexwrap_solver.surface.topology import edges
 from hexwrap_solver.surface.types import NurbsSurface, Surface
@@ -16,7 +17,7 @@ CHORD_STEPS = 1
 CONVERGED = 1e-13
 #: … and steps below this part end it where the start was good.
 SETTLED = 1e-9
-#: A step that does not bring the point nearer is halved so many times at most.
+#: A step that does not bring the point nearer is halved at most this many times.
 HALVINGS = 12
 
 
@@ -68,7 +69,7 @@ def chord_heights(nurbs: NurbsSurface, parameters: Floats, points: Floats, faces
     a, b = parameters[ends[:, 0]], parameters[ends[:, 1]]
     middle = points[ends].mean(axis=1)
     foot, _, normal = project(nurbs, middle, a + _shortest(nurbs, b - a) / 2, CHORD_STEPS)
-    return np.abs(_dot(middle - foot, normal))
+    return np.abs(dot(middle - foot, normal))
 
 
 def _shortest(nurbs: NurbsSurface, difference: Floats) -> Floats:
@@ -112,9 +113,9 @@ def newton_step(nurbs: NurbsSurface, jet: Jet, points: Floats, uv: Floats) -> Fl
     A parameter at an open end that would leave the domain is kept there.
     """
     r = jet.point - points
-    gu, gv = _dot(r, jet.du), _dot(r, jet.dv)
-    e, f, g = _dot(jet.du, jet.du), _dot(jet.du, jet.dv), _dot(jet.dv, jet.dv)
-    a, b, c = e + _dot(r, jet.duu), f + _dot(r, jet.duv), g + _dot(r, jet.dvv)
+    gu, gv = dot(r, jet.du), dot(r, jet.dv)
+    e, f, g = dot(jet.du, jet.du), dot(jet.du, jet.dv), dot(jet.dv, jet.dv)
+    a, b, c = e + dot(r, jet.duu), f + dot(r, jet.duv), g + dot(r, jet.dvv)
     convex = (a > 0) & (a * c - b * b > 1e-9 * e * g)
     a, b, c = np.where(convex, a, e), np.where(convex, b, f), np.where(convex, c, g)
     a, c = a + 1e-12 * e.max(initial=0), c + 1e-12 * g.max(initial=0)  # singular points stay where they are
@@ -154,7 +155,3 @@ def _search(
         step[waiting] /= 2
     moved = np.abs(_shortest(nurbs, out - uv) / width).max(axis=1) > CONVERGED
     return out, moved
-
-
-def _dot(a: Floats, b: Floats) -> Floats:
-    return np.asarray(np.einsum("ij,ij->i", a, b))

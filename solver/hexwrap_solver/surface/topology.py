@@ -10,6 +10,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import breadth_first_order, connected_components, depth_first_order
 
 from hexwrap_solver.arrays import Floats, Ints
+from hexwrap_solver.geometry import face_normals, normalize, stable_order
 
 
 def next_half_edge(h: Ints) -> Ints:
@@ -20,13 +21,6 @@ def next_half_edge(h: Ints) -> Ints:
 def half_edges(faces: Ints) -> tuple[Ints, Ints]:
     """(3m,) start and (3m,) end vertex of every half-edge."""
     return faces.ravel(), faces[:, [1, 2, 0]].ravel()
-
-
-def stable_order(key: Ints, n: int) -> Ints:
-    """Stable argsort of integers 0 … n − 1 in linear time: a sparse matrix is transposed by counting."""
-    k = len(key)
-    matrix = csr_array((np.ones(k, dtype=np.int8), key, np.arange(k + 1)), shape=(k, n))
-    return np.asarray(matrix.tocsc().indices, dtype=np.int64)
 
 
 def edge_groups(faces: Ints, n: int) -> tuple[Ints, Ints]:
@@ -102,34 +96,15 @@ def spanning_tree(twin: Ints, root: int = 0) -> tuple[Ints, Ints]:
     return np.asarray(order, dtype=np.int64), np.asarray(before, dtype=np.int64)
 
 
-def face_normals(vertices: Floats, faces: Ints) -> Floats:
-    """(m, 3) normals, their length twice the area."""
-    at = [coordinate[np.ascontiguousarray(faces.T)] for coordinate in np.ascontiguousarray(vertices.T)]
-    (ax, bx), (ay, by), (az, bz) = ((x[1] - x[0], x[2] - x[0]) for x in at)
-    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx]).T
-
-
 def vertex_normals(vertices: Floats, faces: Ints) -> Floats:
     """(n, 3) unit normals, area-weighted means of the faces around; zero where they cancel."""
     around = np.repeat(face_normals(vertices, faces).T, 3, axis=1)
-    return unit(sum_rows(around.T, faces.ravel(), len(vertices)))
+    return normalize(sum_rows(around.T, faces.ravel(), len(vertices)))
 
 
 def sum_rows(rows: Floats, where: Ints, n: int) -> Floats:
     """(n, d) sums of the rows (k, d) that go to each place (k,)."""
     return np.stack([np.bincount(where, x, n).astype(float) for x in rows.T], axis=1)
-
-
-def unit(vectors: Floats) -> Floats:
-    """(n, 3) vectors at length one, zero vectors kept."""
-    length = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))[:, None]
-    return np.asarray(vectors / np.where(length > 0, length, 1.0))
-
-
-def angles_between(one: Floats, two: Floats) -> Floats:
-    """(n,) angles between vectors (n, 3), 0 … π."""
-    sine = np.linalg.norm(np.cross(one, two), axis=1)
-    return np.asarray(np.arctan2(sine, np.einsum("ij,ij->i", one, two)))
 
 
 def edge_lengths(vertices: Floats, faces: Ints) -> Floats:

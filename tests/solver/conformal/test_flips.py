@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 from hexwrap_solver.arrays import Floats, no_progress
-from hexwrap_solver.conformal import boundary, conformal_map
+from hexwrap_solver.conformal import boundary, conformal_map, newton
 from hexwrap_solver.conformal.energy import Energy, opposite_lengths
-from hexwrap_solver.conformal.robust import descent, solve_with_flips
+from hexwrap_solver.conformal.newton import largest
 from hexwrap_solver.conformal.robust import solve as robust
+from hexwrap_solver.conformal.robust import solve_with_flips
 from hexwrap_solver.conformal.robust.delaunay import cosine_sums, flip, make_delaunay
-from hexwrap_solver.conformal.robust.descent import FlipEnergy, descend
+from hexwrap_solver.conformal.robust.descent import RULES, FlipEnergy, FlipPoint, descend
 from hexwrap_solver.conformal.robust.metric import angle_sums, measure, measure_delaunay
 from hexwrap_solver.conformal.robust.mirror import MirrorMesh, mirror_mesh
-from hexwrap_solver.conformal.span import MAX_SPAN
 from hexwrap_solver.conformal.types import BoundaryCondition
 from hexwrap_solver.errors import ConvergenceError
 from hexwrap_solver.surface.types import Surface
@@ -133,14 +133,14 @@ def test_gradient_does_not_jump_across_flips_and_newton_direction_is_its_derivat
     surface = bump(16, 6)
     energy = FlipEnergy(Energy(surface, boundary.straight(surface)), _mirrored(surface))
     x = energy.plain.unknowns_of(_random_u(len(surface.vertices), 1.0))
-    metric, gradient = energy.at(x)
-    direction = energy.newton_direction(metric, gradient)
+    point = energy.at(x)
+    direction = energy.direction(point)
     step = 1e-6 / np.abs(direction).max()
-    ahead, behind = energy.at(x + step * direction)[1], energy.at(x - step * direction)[1]
-    assert np.abs((ahead - behind) / (2 * step) + gradient).max() < 1e-6 * np.abs(gradient).max()
+    ahead, behind = (energy.at(x + t * direction).gradient for t in (step, -step))
+    assert np.abs((ahead - behind) / (2 * step) + point.gradient).max() < 1e-6 * largest(point.gradient)
     # along a line full of flips the gradient stays continuous, and φ' grows
     far = _random_u(len(x), 2.0, 8)
-    gradients = np.array([energy.at(x + t * far)[1] for t in np.linspace(0, 1, 400)])
+    gradients = np.array([energy.at(x + t * far).gradient for t in np.linspace(0, 1, 400)])
     assert energy.flips > 20
     assert (np.diff(gradients @ far) > 0).all()
 
@@ -151,15 +151,15 @@ def test_steps_that_were_tried_in_vain_leave_no_trace(monkeypatch: pytest.Monkey
 
     def iterations() -> int:
         energy = FlipEnergy(Energy(surface, boundary.straight(surface)), _mirrored(surface))
-        return descend(energy, np.zeros(len(surface.vertices)), MAX_SPAN, no_progress).iterations
+        return descend(energy, np.zeros(len(surface.vertices)), no_progress).iterations
 
-    def astray(energy: FlipEnergy, x: Floats, gradient: Floats) -> None:
-        energy.at(x + _random_u(len(x), 0.5))
+    def astray(energy: FlipEnergy, point: FlipPoint) -> None:
+        energy.at(point.x + _random_u(len(point.x), 0.5))
 
-    monkeypatch.setattr(descent, "CHORDS", -1)
+    monkeypatch.setattr(newton, "CHORDS", -1)
     expected = iterations()
-    monkeypatch.setattr(descent, "CHORDS", np.inf)
-    monkeypatch.setattr(descent, "_chord", astray)
+    monkeypatch.setattr(newton, "CHORDS", np.inf)
+    monkeypatch.setattr(newton, "_chord", astray)
     assert iterations() == expected
 
 
@@ -167,19 +167,19 @@ def test_a_disturbance_in_one_place_is_mended_there() -> None:
     """Local steps change nothing far away, and leave what a step of all unknowns then does at once."""
     surface = bump(60, 30)
     energy = FlipEnergy(Energy(surface, boundary.straight(surface)), _mirrored(surface))
-    solution = descend(energy, np.zeros(energy.plain.n), MAX_SPAN, no_progress)
+    solution = descend(energy, np.zeros(energy.plain.n), no_progress)
     x = energy.plain.unknowns_of(solution.u)
     away = np.linalg.norm(energy.plain.points - energy.plain.points[len(x) // 2], axis=1)
     near = away < np.sort(away)[5]
     x[near] += [2.0, -1.0, 1.0, 2.0, -2.0]
-    metric, gradient = energy.at(x)
-    relaxed = descent._relaxed(energy, x, metric, gradient)
-    assert np.abs(gradient).max() > 1
-    assert np.abs(relaxed.gradient).max() < descent.LOCAL
+    disturbed = energy.at(x)
+    relaxed = newton.relaxed(energy, disturbed, RULES)
+    assert largest(disturbed.gradient) > 1
+    assert largest(relaxed.gradient) < RULES.large
     changed = np.flatnonzero(relaxed.x != x)
-    assert 5 < len(changed) < descent.FEW * len(x)
+    assert 5 < len(changed) < newton.FEW * len(x)
     assert away[changed].max() < 0.5 * away.max()
-    again = descend(energy, energy.plain.scale_of(relaxed.x), MAX_SPAN, no_progress)
+    again = descend(energy, energy.plain.scale_of(relaxed.x), no_progress)
     np.testing.assert_allclose(again.u, solution.u, atol=1e-11)
 
 

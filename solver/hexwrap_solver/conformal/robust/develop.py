@@ -12,6 +12,7 @@ from hexwrap_solver.arrays import Complexes, Floats, Ints
 from hexwrap_solver.conformal.robust.metric import Metric
 from hexwrap_solver.conformal.robust.mirror import MirrorMesh
 from hexwrap_solver.conformal.types import Deck
+from hexwrap_solver.geometry import stable_order, sums_to_root
 from hexwrap_solver.tolerances import is_zero
 
 
@@ -35,7 +36,7 @@ def develop(mesh: MirrorMesh, metric: Metric, cone_angle: float) -> Development:
     from there, and tiny triangles keep their digits.
     """
     live = np.flatnonzero(~np.repeat(mesh.crossing, 2))
-    live = live[_order(mesh.origin[live], mesh.n)]
+    live = live[stable_order(mesh.origin[live], mesh.n)]
     root = int(mesh.origin[live[np.argmin(metric.length[live >> 1])]])
     step = _directions(mesh, metric, cone_angle, live) * np.exp(metric.length[live >> 1])
     tail, head = mesh.origin[live], mesh.origin[live ^ 1]
@@ -49,11 +50,11 @@ def develop(mesh: MirrorMesh, metric: Metric, cone_angle: float) -> Development:
     via, up = via[below], np.where(above >= 0, above, root)
     lift = np.zeros(mesh.n, dtype=np.int64)
     lift[below] = turn[via]
-    lift = _accumulate(lift, up, root)
+    lift = sums_to_root(lift, up, root)
     step = step * np.exp(1j * cone_angle * lift[tail])
     uv = np.zeros(mesh.n, dtype=complex)
     uv[below] = step[via]
-    uv = _accumulate(uv, up, root)
+    uv = sums_to_root(uv, up, root)
 
     power = lift[tail] + turn - lift[head]
     rotation = np.exp(1j * cone_angle)
@@ -128,13 +129,8 @@ def _directions(mesh: MirrorMesh, metric: Metric, cone_angle: float, live: Ints)
     via = (beside[up[below]] == below[:, None]).argmax(axis=1)
     direction = np.zeros(t + k)
     direction[below] = angle[up[below], via]
-    direction = _accumulate(direction, up, 0)
+    direction = sums_to_root(direction, up, 0)
     return np.asarray(np.exp(1j * (direction[piece[live]] + within[live])))
-
-
-def _order(key: Ints, n: int) -> Ints:
-    """Stable argsort of integers 0 … n − 1; NumPy sorts short integers by counting."""
-    return np.argsort(key.astype(np.uint16) if n <= 2**16 else key, kind="stable")
 
 
 def _parents(head: Ints, offsets: Ints, root: int) -> Ints:
@@ -144,13 +140,3 @@ def _parents(head: Ints, offsets: Ints, root: int) -> Ints:
     graph = csr_array((np.ones(len(head), dtype=np.int8), head, offsets), shape=(n, n))
     _, parent = breadth_first_order(graph, root)
     return np.where(parent >= 0, parent, -1).astype(np.int64)
-
-
-def _accumulate(values: np.ndarray, up: Ints, root: int) -> np.ndarray:
-    """Sums along the way to the root, by pointer jumping: log(depth) rounds, and rounding grows no faster."""
-    total = values.copy()
-    up = up.copy()
-    while (up != root).any():
-        total += total[up]
-        up = up[up]
-    return total

@@ -13,20 +13,21 @@ from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints
 from hexwrap_solver.conformal.energy import corner_angles, opposite_lengths
 from hexwrap_solver.conformal.robust.retriangulate import flatten_out
 from hexwrap_solver.conformal.types import Targets
+from hexwrap_solver.geometry import dot, normalize
 from hexwrap_solver.surface.flips import angle_sums_opposite
 from hexwrap_solver.surface.topology import half_edges
 from hexwrap_solver.surface.types import Surface
 
 #: A boundary vertex with target angle Θ gets at least Θ / FULLEST triangles.
 FULLEST = 0.95 * np.pi
-#: Where triangles have turned over, boundary vertices get so many that their mean angle is below this.
+#: Where triangles are flipped, boundary vertices get enough triangles for a mean angle below this.
 WIDE = 0.45 * np.pi
-#: After so many attempts half of it.
+#: After this many attempts, half of it.
 HASTE = 3
 #: Edges are split between these places of their length.
 WITHIN = (0.02, 0.98)
 MIDDLE = (0.3, 0.7)
-#: From this ratio of target and angle on, and with so much of the target, a corner counts as opened wide.
+#: From this ratio of target and angle on, and with this share of the target, a corner counts as opened wide.
 OPENED, BROAD = 1.5, 0.25 * np.pi
 #: Opposite angles that add up to more than this call for a split, radians.
 FLAT = np.deg2rad(210.0)
@@ -46,7 +47,7 @@ class Problem:
 
 
 def split_edges(problem: Problem, marked: Ints, place: Floats) -> Problem:
-    """Splits edges at given places; whatever belongs to vertices is interpolated.
+    """Splits edges at given places; values at vertices are interpolated.
 
     marked: (k,) half-edges, any number per face; of two sides of one edge the first counts. place: (k,) in
     (0, 1) from the start of the half-edge to its end. On the boundary new vertices get target angle π, and
@@ -68,7 +69,7 @@ def split_edges(problem: Problem, marked: Ints, place: Floats) -> Problem:
         return np.concatenate([values, (1 - w) * values[i] + w * values[j]])
 
     normals = blend(surface.normals)
-    normals[n:] /= np.maximum(np.linalg.norm(normals[n:], axis=1, keepdims=True), 1e-300)
+    normals[n:] = normalize(normals[n:])
     vertices = blend(surface.vertices)
     parts, source = _subdivide(faces, point.reshape(-1, 3), vertices)
     parent = problem.parent[source]
@@ -178,11 +179,11 @@ def _feet(surface: Surface, faces: Ints, h: Ints, t: Ints) -> Floats:
     """(k,) where to split edges: at the foot of the nearer of the two apexes."""
     tail, head = half_edges(faces)
     start, edge = surface.vertices[tail[h]], surface.vertices[head[h]] - surface.vertices[tail[h]]
-    length = np.einsum("kd,kd->k", edge, edge)
+    length = dot(edge, edge)
     best, nearest = np.full(len(h), 0.5), np.full(len(h), np.inf)
     for side in (h, t):
         apex = surface.vertices[faces[side // 3, (side % 3 + 2) % 3]] - start
-        s = np.clip(np.einsum("kd,kd->k", apex, edge) / length, *WITHIN)
+        s = np.clip(dot(apex, edge) / length, *WITHIN)
         away = np.linalg.norm(apex - s[:, None] * edge, axis=1)
         best, nearest = np.where(away < nearest, s, best), np.minimum(away, nearest)
     return best
@@ -258,7 +259,7 @@ def split_places(
     rows = np.arange(len(wrong))
     edge = along[rows, side]
     apex = corner[rows, (side + 2) % 3] - corner[rows, side]
-    foot = np.einsum("kd,kd->k", apex, edge) / length[rows, side] ** 2
+    foot = dot(apex, edge) / length[rows, side] ** 2
     foot = np.where(middle, np.clip(foot, *MIDDLE), np.clip(foot, *WITHIN))
     wide = WIDE / (1 + attempt / HASTE)
     fan = _crowded(surface, targets, wide, np.unique(surface.faces[wrong]))

@@ -40,6 +40,8 @@ class Cells:
 
     def part(self, keep: Bools) -> Cells:
         """Some of the cells."""
+        if keep.all():
+            return self
         side = np.repeat(keep, self.corner.lengths)
         renumber = np.where(side, np.cumsum(side) - 1, -1)
         twin = self.twin[side]
@@ -65,6 +67,8 @@ class WholeCells:
         return self.corner.n_rows
 
     def part(self, keep: Bools) -> WholeCells:
+        if keep.all():
+            return self
         side = np.repeat(keep, self.corner.lengths)
         offsets = np.concatenate([[0], np.cumsum(self.corner.lengths[keep])])
         corner = Ragged(self.corner.values[side], offsets)
@@ -77,35 +81,42 @@ def whole_cells(lattice: Lattice, edges: PatternEdges) -> WholeCells:
     A walk that has gone around the surface (w of its isometry) bounds no cell. Otherwise it bounds a disk, or
     a disk with boundary loops inside that no edge of the pattern meets; see ``enclosed_loops``.
     """
-    order = lattice.order
+    order, turned = lattice.order, edges.isometries[:, 0]
     start = np.flatnonzero(edges.head.ravel() >= 0)
     node, way = start // order, start % order
-    isometry = np.zeros((len(start), 4), dtype=np.int64)
+    products = np.zeros((1, 4), dtype=np.int64)  # of the gluings met: few walks meet any
+    product = np.zeros(len(start), dtype=np.int64)  # which of them each walk has met, 0: none
     walk = np.arange(len(start))
     first, visits = start, []
     closed = np.zeros(len(start), dtype=bool)
     for _ in range(lattice.sides + MOST_EXTRA_SIDES):
-        visits.append((walk, node, way, isometry))
-        across = edges.isometry(node, way)
+        visits.append((walk, node, way, product))
+        gluing = edges.gluing[node, way]
         node = edges.head[node, way]
-        way = (way - across[:, 0] + lattice.turn) % order
-        isometry = lattice.compose(isometry, across)
+        way = (way - turned[gluing] + lattice.turn) % order
+        glued = np.flatnonzero(gluing)
+        if len(glued):
+            met = lattice.compose(products[product[glued]], edges.isometries[gluing[glued]])
+            product = product.copy()
+            product[glued] = len(products) + np.arange(len(glued))
+            products = np.concatenate([products, met])
         slot = node * order + way
         back = (node >= 0) & (slot == first)
-        closed[walk[back]] = isometry[back, 3] == 0
+        closed[walk[back]] = products[product[back], 3] == 0
         # Each cell once, from its lowest side on; a walk that comes to a lower one is another's, or none.
         going = (node >= 0) & (slot > first)
-        walk, first, node, way, isometry = (x[going] for x in (walk, first, node, way, isometry))
+        walk, first, node, way, product = (x[going] for x in (walk, first, node, way, product))
         if not len(walk):
             break
     kept = [closed[walk] for walk, *_ in visits]
-    walk, node, way, isometry = (
+    walk, node, way, product = (
         np.concatenate([visit[i][keep] for visit, keep in zip(visits, kept, strict=True)]) for i in range(4)
     )
     sorted_by_walk = np.argsort(walk, kind="stable")
     lengths = np.bincount(walk, minlength=len(start))[closed]
     offsets = np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
-    return WholeCells(Ragged(node[sorted_by_walk], offsets), way[sorted_by_walk], isometry[sorted_by_walk])
+    isometry = products[product[sorted_by_walk]]
+    return WholeCells(Ragged(node[sorted_by_walk], offsets), way[sorted_by_walk], isometry)
 
 
 def sides_by_edge(lattice: Lattice, edges: PatternEdges, cells: WholeCells) -> Ints:

@@ -51,7 +51,8 @@ class _Found:
         self._many = 1
 
     def glue(self, slot: Ints, isometry: Ints) -> None:
-        moved = isometry.any(axis=1)
+        a, b, c, d = isometry.T
+        moved = (a | b | c | d) != 0
         self._row[slot] = 0
         self._row[slot[moved]] = self._many + np.arange(np.count_nonzero(moved))
         self._rows.append(isometry[moved])

@@ -136,7 +136,9 @@ def _same_place(layout: Layout, found: Nodes) -> tuple[Ints, Ints, Ints]:
     near = found.near_edges(layout, 4 * layout.tolerance)
     at, c = np.nonzero(near & (layout.across[found.face] >= 0))
     across, crossing = layout.across[found.face[at], c], layout.crossing[found.face[at], c]
-    other = found.find(across, layout.lattice.apply(layout.into(crossing), found.point[at]))
+    point, glued = found.point[at], np.flatnonzero(crossing)
+    point[glued] = layout.lattice.apply(layout.into(crossing[glued]), point[glued])
+    other = found.find(across, point)
     same = other >= 0
     return at[same], other[same], crossing[same]
 

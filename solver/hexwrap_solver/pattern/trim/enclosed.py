@@ -19,10 +19,12 @@ def met_by_pattern(layout: Layout, nodes: Nodes, edges: PatternEdges, boundary: 
     """(loops,) whether a node lies on a loop, or an edge from a node ends there."""
     met = np.zeros(int(boundary.loop.max(initial=-1)) + 1, dtype=bool)
     exits = edges.exits[(edges.exits >= 0) & (edges.head < 0)]
-    near = nodes.near_edges(layout, layout.tolerance)
-    incidence, c = np.nonzero(near)
-    at = np.concatenate([boundary.number[exits // 3, exits % 3], boundary.number[nodes.face[incidence], c]])
+    at = boundary.number[exits // 3, exits % 3]
     met[boundary.loop[at[at >= 0]]] = True
+    if not met.all():
+        incidence, c = np.nonzero(nodes.near_edges(layout, layout.tolerance))
+        at = boundary.number[nodes.face[incidence], c]
+        met[boundary.loop[at[at >= 0]]] = True
     return met
 
 

@@ -13,17 +13,17 @@ import numpy as np
 import shapely
 
 from hexwrap_solver.arrays import Floats
+from hexwrap_solver.geometry import angles_between
 from hexwrap_solver.surface.brep.face import Outline, polygon_of
 from hexwrap_solver.surface.brep.pull import Patch, patch_of, pull
 from hexwrap_solver.surface.brep.sizes import Field, bilinear
 from hexwrap_solver.surface.mesh_sizes import cumulated
 from hexwrap_solver.surface.nurbs import evaluate, evaluate_points
-from hexwrap_solver.surface.topology import angles_between
 from hexwrap_solver.surface.types import NurbsSurface
 
 #: Normals that turn by more than this across a knot make a kink, radians.
 KINK = np.deg2rad(1.0)
-#: Sides of a line are told apart beyond this part of the parameter's range.
+#: Sides of a line are distinguished beyond this part of the parameter's range.
 ON_LINE = 1e-7
 #: Places along a line at which normals are compared.
 PLACES = 33

@@ -14,6 +14,7 @@ import numpy as np
 import shapely
 
 from hexwrap_solver.arrays import Floats, Ints
+from hexwrap_solver.geometry import angles_between, dot, normalize, quarter_turn
 from hexwrap_solver.surface.brep.curves import corners, curvature, evaluate_curve, places
 from hexwrap_solver.surface.brep.face import Outline, Piece, piece_of, polygon_of
 from hexwrap_solver.surface.brep.kinks import crossings, kink_lines, kinks_of
@@ -23,7 +24,7 @@ from hexwrap_solver.surface.brep.types import Brep, Edge, Face, Trim
 from hexwrap_solver.surface.errors import EmptySurfaceError, TooFineError
 from hexwrap_solver.surface.mesh_sizes import GRADE, ROW, check_settings
 from hexwrap_solver.surface.nurbs import evaluate
-from hexwrap_solver.surface.topology import angles_between, sum_rows, unit
+from hexwrap_solver.surface.topology import sum_rows
 from hexwrap_solver.surface.types import MeshSettings
 
 #: Normals of two faces that differ by more than this along their edge make a crease, radians.
@@ -224,7 +225,7 @@ def _refined(edge: Edge, t: Floats, sizes: Sizes) -> Floats:
         chord = np.diff(point, axis=0)
         length = np.linalg.norm(chord, axis=1)
         offset = evaluate_curve(edge.curve, middle)[0] - (point[1:] + point[:-1]) / 2
-        along = np.einsum("ij,ij->i", offset, chord) / np.maximum(length, 1e-300) ** 2
+        along = dot(offset, chord) / np.maximum(length, 1e-300) ** 2
         height = np.linalg.norm(offset - along[:, None] * chord, axis=1)
         bad = (length > sizes.longest) | (height > sizes.height)
         if not bad.any():
@@ -287,7 +288,7 @@ def _sewn(
         BrepMesh(
             np.concatenate(points),
             np.concatenate(faces),
-            unit(sum_rows(normals, labels, total)),
+            normalize(sum_rows(normals, labels, total)),
             np.concatenate(names),
             np.concatenate(uvs),
             np.concatenate(creases),
@@ -365,8 +366,7 @@ def _beside(side: _Side, one: Floats, two: Floats) -> Floats:
     """(k, 3) outward normals just to the left of segments in the parameters' plane."""
     box = np.array([side.field.u[-1] - side.field.u[0], side.field.v[-1] - side.field.v[0]])
     along = (two - one) / box
-    left = np.stack([-along[:, 1], along[:, 0]], axis=1)
-    left /= np.maximum(np.linalg.norm(left, axis=1, keepdims=True), 1e-300)
+    left = normalize(quarter_turn(along))
     uv = np.clip((one + two) / 2 + BESIDE * left * box, side.patch.low, side.patch.low + side.patch.width)
     normal = evaluate(side.patch.opened, uv).normal
     return -normal if side.face.reversed else normal

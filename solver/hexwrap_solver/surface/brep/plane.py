@@ -11,6 +11,7 @@ import shapely
 from scipy.spatial import Delaunay
 
 from hexwrap_solver.arrays import Bools, Floats, Ints
+from hexwrap_solver.geometry import cross_2d
 from hexwrap_solver.surface.topology import half_edges, twins
 
 #: Points around the outside, so that the polygon's own boundary is inside the triangulation.
@@ -45,15 +46,11 @@ def triangulated(points: Floats, segments: Ints, polygon: shapely.Polygon) -> In
 
 def _areas(points: Floats, faces: Ints) -> Floats:
     a, b, c = (points[faces[:, k]] for k in range(3))
-    return _cross(b - a, c - a)
-
-
-def _cross(a: Floats, b: Floats) -> Floats:
-    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
+    return cross_2d(b - a, c - a)
 
 
 def missing(faces: Ints, segments: Ints, n: int) -> Bools:
-    """(k,) which segments are no edge of any face."""
+    """(k,) which segments are not an edge of any face."""
     start, end = half_edges(faces)
     have = np.minimum(start, end) * n + np.maximum(start, end)
     low, high = segments.min(axis=1), segments.max(axis=1)
@@ -82,7 +79,7 @@ def _force_one(points: Floats, faces: Ints, twin: Ints, a: int, b: int) -> bool:
             return False
         c, d = int(faces.flat[_after(_after(h))]), int(faces.flat[_after(_after(int(twin[h])))])
         pa, pb, pc, pd = points[start], points[end], points[c], points[d]
-        if _cross(pd - pa, pc - pa) <= 0 or _cross(pb - pd, pc - pd) <= 0:
+        if cross_2d(pd - pa, pc - pa) <= 0 or cross_2d(pb - pd, pc - pd) <= 0:
             waiting.append((start, end))
             continue
         _flip(faces, twin, h)
@@ -99,8 +96,8 @@ def _crossing(points: Floats, faces: Ints, twin: Ints, a: int, b: int) -> list[t
     apart = (s != a) & (s != b) & (e != a) & (e != b)
     s, e = s[apart], e[apart]
     pa, pb, ps, pe = points[a], points[b], points[s], points[e]
-    one, two = _cross(pb - pa, ps - pa), _cross(pb - pa, pe - pa)
-    three, four = _cross(pe - ps, pa - ps), _cross(pe - ps, pb - ps)
+    one, two = cross_2d(pb - pa, ps - pa), cross_2d(pb - pa, pe - pa)
+    three, four = cross_2d(pe - ps, pa - ps), cross_2d(pe - ps, pb - ps)
     hit = (one * two < 0) & (three * four < 0)
     return list(zip(s[hit].tolist(), e[hit].tolist(), strict=True))
 
@@ -109,8 +106,8 @@ def _crosses(points: Floats, a: int, b: int, c: int, d: int) -> bool:
     if {a, b} & {c, d}:
         return False
     pa, pb, pc, pd = points[a], points[b], points[c], points[d]
-    one, two = _cross(pb - pa, pc - pa), _cross(pb - pa, pd - pa)
-    three, four = _cross(pd - pc, pa - pc), _cross(pd - pc, pb - pc)
+    one, two = cross_2d(pb - pa, pc - pa), cross_2d(pb - pa, pd - pa)
+    three, four = cross_2d(pd - pc, pa - pc), cross_2d(pd - pc, pb - pc)
     return bool(one * two < 0 and three * four < 0)
 
 
