@@ -10,7 +10,7 @@ HexwrapError                    (hexwrap_solver.errors) one sentence for the cli
 ├── DrawingError                points and curves for ``lift`` that cannot be read or followed
 ├── HttpError                   about the request as such: no such job, host not allowed, queue full …
 │   ├── HopsError               the call does not fit the Hops component
-│   └── JobFailedError          the problem of a job, told again
+│   └── JobFailedError          the problem of a job, repeated
 ├── GoneError                   410: the result was pruned
 └── WorkError                   no result, and not because of what was asked
     ├── TimeLimitError          ┐

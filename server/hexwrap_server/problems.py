@@ -1,4 +1,4 @@
-"""Errors → problem documents (RFC 9457), the body of every answer that is no success."""
+"""Errors → problem documents (RFC 9457), the body of every unsuccessful answer."""
 
 from __future__ import annotations
 

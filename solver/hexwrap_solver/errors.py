@@ -58,7 +58,7 @@ class HexwrapError(Exception):
 
 
 def _rebuild(kind: type[HexwrapError], detail: str, state: dict[str, object]) -> HexwrapError:
-    error = kind.__new__(kind, detail)  # whatever else its constructor takes is in state
+    error = kind.__new__(kind, detail)  # other arguments of its constructor are in state
     error.__dict__.update(state)
     return error
 

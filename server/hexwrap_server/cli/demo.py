@@ -25,7 +25,7 @@ from hexwrap_server.output.writers import WRITERS
 ANSWER, START, STOP, LOOK = 120.0, 60.0, 10.0, 0.2
 ALL = "all"
 
-#: Told while a job runs: stage, fraction 0..1, words.
+#: Called while a job runs: stage, fraction 0..1, words.
 Listener = Callable[[str, float, str], None]
 
 

@@ -64,8 +64,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _refuse(2, str(error))
     except FormError as error:
         status = 2 if is_option_at_fault(asked, [pointer for pointer, _ in error.faults]) else 1
-        told = as_options(asked, error.faults) if error.faults else error
-        return _refuse(status, told.detail, *(f"{place}: {detail}" for place, detail in told.faults[1:]))
+        shown = as_options(asked, error.faults) if error.faults else error
+        return _refuse(status, shown.detail, *(f"{place}: {detail}" for place, detail in shown.faults[1:]))
     except HexwrapError as error:
         return _refuse(1, error.detail)
     except KeyboardInterrupt:

@@ -130,14 +130,14 @@ def _run(server: uvicorn.Server, app: FastAPI, listener: socket.socket) -> None:
 def _without_traceback(app: FastAPI) -> ASGIApp:
     """Whoever called ``serve`` tells why it did not start, in one sentence."""
 
-    async def told(scope: Scope, receive: Receive, send: Send) -> None:
+    async def answered(scope: Scope, receive: Receive, send: Send) -> None:
         async def short(message: Message) -> None:
             failed = message["type"] == "lifespan.startup.failed"
             await send({**message, "message": ""} if failed else message)
 
         await app(scope, receive, short if scope["type"] == "lifespan" else send)
 
-    return told
+    return answered
 
 
 class _Server(uvicorn.Server):

@@ -41,6 +41,7 @@ _MAP = _all(
     iterations=_COUNT,
     residual=NUMBER,
     flips=_COUNT,
+    apart=nullable(_all(face=listed(_INDEX), cell=nullable(listed(_INDEX)), shift=listed(PLANE))),
 )
 _PATTERN = _all(
     kind=_KIND,
@@ -73,6 +74,15 @@ _SIZE = _all(
     sides=_COUNT,
     color=_TEXT | {"pattern": "^#[0-9a-fA-F]{6}$"},
 )
+_CURVE = _all(
+    sizes=_COUNT,
+    taken=_INDEX,
+    coarse=_TRUTH,
+    number=listed(_COUNT),
+    uncovered=listed(NUMBER),
+    scale_ratio=listed(NUMBER),
+    at=listed(listed(_all(point=POINT, index=_INTEGER))),
+)
 _QUALITY = _all(
     scale_ratio=NUMBER,
     quasi_conformal=_all(mean=NUMBER, max=NUMBER),
@@ -91,6 +101,7 @@ _QUALITY = _all(
     overlaps=nullable(_COUNT),
     coverage=_MEASURE,
     distinct_panels=_COUNT,
+    singularity_curve=nullable(_CURVE),
     notes=listed(_TEXT),
 )
 #: The parts that ``?include=`` picks, by default all.

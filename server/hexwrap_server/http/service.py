@@ -26,7 +26,7 @@ from hexwrap_server.settings import MIB, Settings
 ERRANDS_PRELOAD = "hexwrap_server.jobs.reading"
 #: Longest errand (reading a body, writing a file), seconds.
 ERRAND_SECONDS = 120.0
-#: Bodies of up to so many MiB, unpacked, do not wait for larger ones and for files.
+#: Bodies of up to this many MiB, unpacked, do not wait for larger ones and for files.
 SMALL_BODY = 4.0
 #: Bodies whose contents are remembered by their hash.
 KNOWN_BODIES = 256

@@ -61,12 +61,16 @@ class Leaf:
         return any(get_args(part)[-1:] == (...,) for part in _parts(self.annotation))
 
     @property
-    def entry(self) -> tuple[str, str]:
-        """Of the entries of such a list: the field that numbers their place, and the one that says what is
-        wanted there, which has no default."""
+    def entry(self) -> tuple[str | None, str, str]:
+        """Of the entries of such a list: the field that numbers their place, if any; the one that gives it by
+        a point or a line of points; and the one that says what is wanted there."""
         (section,) = (get_args(part)[0] for part in _parts(self.annotation))
-        place = next(leaf.path[0] for leaf in leaves(section) if int in _parts(leaf.annotation))
-        return place, next(f.name for f in fields(section) if f.default is MISSING)
+        hints = get_type_hints(section, include_extras=True)
+        number = next(
+            (f.name for f in fields(section) if f.default is None and int in _parts(hints[f.name])), None
+        )
+        points = "line" if "line" in hints else "point"
+        return number, points, next(f.name for f in fields(section) if f.name not in (number, points))
 
     @property
     def numbers(self) -> int:
@@ -209,7 +213,7 @@ def _accepted(annotation: Any, setting: Setting) -> Any:
 
 
 def _moderate(value: float) -> float:
-    """Neither so large nor so small that its square or its inverse is no number."""
+    """Neither so large nor so small that its square or inverse overflows."""
     if value and not SMALLEST <= abs(value) <= LARGEST:
         raise ValueError(f"must be 0, or between {SMALLEST:g} and {LARGEST:g} in size")
     return value

@@ -81,11 +81,11 @@ class DaskEngine:
             with contextlib.suppress(OSError, RuntimeError):
                 await asyncio.wait_for(end(), STOP_SECONDS)
 
-    async def wait_for_place(self, seconds: float, told: Callable[[str], None]) -> None:
+    async def wait_for_place(self, seconds: float, report: Callable[[str], None]) -> None:
         """Clusters that grow with their work have no machines at first."""
         if self._machines:
             return
-        told("waiting for a machine of the cluster")
+        report("waiting for a machine of the cluster")
         try:
             async with asyncio.timeout(seconds):
                 while not self._machines:

@@ -47,8 +47,8 @@ class Engine(Protocol):
         """Kill all running processes of the engine."""
         ...
 
-    async def wait_for_place(self, seconds: float, told: Callable[[str], None]) -> None:
-        """Until there is any place where a call could run. told: called with what it waits for, if it has to.
+    async def wait_for_place(self, seconds: float, report: Callable[[str], None]) -> None:
+        """Until there is a place where a call could run. report: called with what it waits for, if it has to.
 
         Raises WorkError after seconds.
         """
@@ -100,7 +100,7 @@ class ProcessEngine:
         self._tending = asyncio.create_task(self._tend())
 
     def give_up(self) -> None:
-        """Kill all calls and refuse new ones; whoever waits for one is told that the server stops."""
+        """Kill all calls and refuse new ones; waiting callers get a ShuttingDownError."""
         self._stopping = True
         for worker in self._workers:
             worker.stop()
@@ -115,7 +115,7 @@ class ProcessEngine:
         for worker in self._workers:
             worker.close()
 
-    async def wait_for_place(self, seconds: float, told: Callable[[str], None]) -> None:
+    async def wait_for_place(self, seconds: float, report: Callable[[str], None]) -> None:
         return  # workers that die are started again
 
     async def run(self, function: str, *arguments: Any, report: Report, seconds: float, mib: float) -> Any:

@@ -199,10 +199,10 @@ def _write_inside(space: Modelspace, laid: Ragged, panels: Panels, names: list[s
     turn = np.degrees(np.arctan2(-up[:, 0], up[:, 1])).tolist()
     for row, (edge, r) in enumerate(zip(panels.edge_length.tolist(), inradius.tolist(), strict=True)):
         size = sizes[row]
-        told = f"– / {length(edge)}" if size < 0 else f"{size:02d} / {size_words[size]}"
+        label = f"– / {length(edge)}" if size < 0 else f"{size:02d} / {size_words[size]}"
         for layer, words, high, at in (
             ("engrave-label", names[row], LABEL, LABEL_AT),
-            ("engrave-label", told, SIZE, SIZE_AT),
+            ("engrave-label", label, SIZE, SIZE_AT),
             ("engrave-up", "outside", SIDE, SIDE_AT),
         ):
             height = min(high, ROOM / (LETTER * len(words))) * r

@@ -23,7 +23,7 @@ SUN, SUN_DISTANCE = (-0.52, 0.62, 0.72), 40.0
 #: Samples of the map of distances from the sun; how much nearer, in radii, a thing must be to cast a shadow.
 SUN_MAP, BIAS = 700, 0.014
 #: Places looked up for a shadow, and the blur of its edge in samples of the map: on the model, and on the
-#: ground, where it is so soft that one pixel in so many is enough.
+#: ground, where it is so soft that a coarser grid of pixels is enough.
 TAPS, PENUMBRA = 6, 2.2
 GROUND_TAPS, GROUND_BLUR, GROUND_STEP = 24, 15.0, 6
 SUNLIGHT, SKYLIGHT, GLOSS, GLOSS_EXPONENT = 0.70, 0.52, 0.10, 40.0
@@ -35,7 +35,7 @@ SHELL, BACK, BACK_COLOUR = "#4a4f58", "#b3b0ab", 0.25
 DIP = 0.6
 #: What is left of the light on an outline; the panel width in pixels from which outlines have full strength.
 OUTLINE, OUTLINE_FULL = 0.40, 22.0
-#: Steps of light that are told apart before it becomes colour.
+#: Steps of light that are distinguished before it becomes colour.
 SHADES = 4096
 #: Darkest shadow on the ground; it fades towards the rim of the picture over this many pixels.
 GROUND_SHADOW, FADE = 0.32, 220.0

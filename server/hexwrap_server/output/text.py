@@ -35,7 +35,7 @@ def lengths(values: list[float]) -> list[str]:
 
 
 def _digits(value: float, digits: int) -> str:
-    """So many significant digits, trailing zeros kept."""
+    """The given number of significant digits, trailing zeros kept."""
     if not 1e-5 < abs(value) < 1e9:
         return f"{value:.{digits}g}"
     return f"{value:.{max(0, digits - 1 - int(np.floor(np.log10(abs(value)))))}f}"

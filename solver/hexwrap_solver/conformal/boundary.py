@@ -145,7 +145,7 @@ def spread_evenly(angles: Floats, curvature: float) -> Floats:
 def rounded_jointly(found: Floats, quantum: float, total: float) -> Floats:
     """(k,) multiples of the quantum that add up to ``total``, as near to ``found`` (k,) as possible.
 
-    Where the total is no multiple, because of prescribed loops that are none, the last one takes the rest.
+    Where the total is not a multiple, because prescribed loops are not, the last one takes the rest.
     """
     steps = np.round(found / quantum)
     missing = round(total / quantum - float(steps.sum()))

@@ -303,7 +303,7 @@ def _gauss_bonnet_error(
     example, sentence = _repair(surface, vertices, angles, missing, unlisted, unit)
     degrees = "" if unit == "deg" else f" ({np.degrees(missing):.6g}°)"
     each = [f"{_told(one, unit)} on loop {i}" for i, one in enumerate(sums)]
-    told = each[0] if len(each) == 1 else ", ".join(each[:-1]) + f" and {each[-1]}"
+    added = each[0] if len(each) == 1 else ", ".join(each[:-1]) + f" and {each[-1]}"
     if len(sums) == 2 and not cones:
         wanted = (
             "equation (1) wants the two sums to cancel, but together they make "
@@ -316,7 +316,7 @@ def _gauss_bonnet_error(
             f"{_told(missing, unit)}{degrees}"
         )
     return GaussBonnetError(
-        f"The boundary curvatures π − θ add up to {told}; {wanted}, so the angles must add up to "
+        f"The boundary curvatures π − θ add up to {added}; {wanted}, so the angles must add up to "
         f"{_told(abs(missing), unit)} {'more' if missing > 0 else 'less'}: {sentence}.",
         vertices=surface.input_vertex[vertices],
         field=("angles",),

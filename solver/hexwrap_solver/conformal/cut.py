@@ -100,7 +100,7 @@ def _grow(surface: Surface, cones: Ints) -> list[_Path]:
 
 def _shortest(surface: Surface, sources: Ints, barred: Bools, terminal: Ints, joined: Bools) -> Ints | None:
     """Fewest edges from any of the sources to a terminal that is not joined yet, past barred vertices,
-    through an extra vertex n tied to the sources; None where there is no way."""
+    through an extra vertex n tied to the sources; None where they are not connected."""
     n = len(surface.vertices)
     low, high = surface.edge_ends  # in the order of their lower ends, as rows of a matrix want them
     free = ~barred

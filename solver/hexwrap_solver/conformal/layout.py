@@ -255,7 +255,7 @@ def normalise(
 
 
 def _loop_length(surface: Surface, uv: Complexes, sheet: Ints, deck: Deck) -> float:
-    """Geometric mean of the two loops' lengths in the domain, whatever copies the cut has picked."""
+    """Geometric mean of the two loops' lengths in the domain; it does not depend on the cut."""
     start, end, first = _rim(surface, uv, sheet, deck)
     edge = np.abs(end - start)
     return float(np.sqrt(edge[first].sum()) * np.sqrt(edge[~first].sum()))

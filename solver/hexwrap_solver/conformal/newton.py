@@ -36,7 +36,7 @@ CHORDS = 6
 #: What a chord step may leave of the residual to be kept.
 CHORD_GAIN = 0.2
 #: Where a step was cut short, the unknowns with a large residual, and RINGS of their neighbours, are brought
-#: near the minimum first, where these are no more than the share FEW of all; by at most LOCAL_STEPS steps.
+#: near the minimum first, where these are at most the share FEW of all; by at most LOCAL_STEPS steps.
 RINGS, FEW, LOCAL_STEPS = 3, 0.25, 8
 #: After this many times that this left more than STAGNATION of the residual, it is not tried again.
 FRUITLESS = 3
@@ -84,7 +84,7 @@ class Convex(Protocol[P]):
 
 @dataclass(frozen=True)
 class Rules:
-    """steps: at most so many. leap: the longest single step, see ``Convex.change``. accepted: the residual
+    """steps: the most. leap: the longest single step, see ``Convex.change``. accepted: the residual
     from which on stagnation counts as rounding; at the ``stalls``-th time the search ends. large, share:
     residuals above this, radians, and this share of the largest are brought down locally; at_first: before
     the first step, too. settled: a step that leaves at most this share of the residual is near the minimum.
@@ -125,8 +125,8 @@ def descend(
         point = relaxed(energy, point, rules)
     iterations, factorisations, fruitless, stalls, chord = 0, 0, 0, 0, False
     while (residual := largest(point.gradient)) > tolerance and iterations < rules.steps:
-        told = f"Newton step {iterations + 1}{rules.words}, residual {residual:.1e} rad"
-        progress(min(0.9, iterations / rules.usual), told)
+        words = f"Newton step {iterations + 1}{rules.words}, residual {residual:.1e} rad"
+        progress(min(0.9, iterations / rules.usual), words)
         step = _chord(energy, point) if chord else None
         if step is None:
             factorisations += 1

@@ -35,14 +35,14 @@ def misdrawn(found: ConformalMap) -> Bools:
     turned = ~positive(corners)
     if turned.any():
         return np.asarray(turned)
-    told = np.full(len(found.surface.vertices), 2 * np.pi)
-    told[found.cones.vertex] -= found.cones.curvature
+    expected = np.full(len(found.surface.vertices), 2 * np.pi)
+    expected[found.cones.vertex] -= found.cones.curvature
     for loop, angles in zip(found.surface.loops, found.boundary_angles, strict=True):
-        told[loop] = angles
+        expected[loop] = angles
     here, one, two = corners, np.roll(corners, -1, axis=1), np.roll(corners, -2, axis=1)
     angle = np.angle(np.conj(one - here) * (two - here))
-    sums = np.bincount(faces.ravel(), angle.ravel(), len(told))
-    wound = np.abs(sums - told) > np.pi
+    sums = np.bincount(faces.ravel(), angle.ravel(), len(expected))
+    wound = np.abs(sums - expected) > np.pi
     return np.asarray(wound[faces].any(axis=1))
 
 
@@ -72,8 +72,8 @@ def drawn_errors(found: ConformalMap) -> DrawnErrors:
 
 
 def _off_told(found: ConformalMap, sums: Floats) -> Floats:
-    told = np.concatenate([*found.boundary_angles, 2 * np.pi - found.cones.curvature])
-    return np.asarray(np.abs(sums - told))
+    expected = np.concatenate([*found.boundary_angles, 2 * np.pi - found.cones.curvature])
+    return np.asarray(np.abs(sums - expected))
 
 
 def _off_turn(found: ConformalMap, sums: Floats) -> float:

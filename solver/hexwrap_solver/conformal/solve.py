@@ -34,7 +34,7 @@ from hexwrap_solver.tolerances import ANGLE
 #: A cone angle this near to a multiple of π/6 is made one, radians, where the map does not come out with the
 #: angle as it is: its apex would lie so far away that coordinates lose the digits in which they differ.
 NEARLY = 1e-7
-#: Relative errors of boundary lengths that are told.
+#: Smaller relative errors of boundary lengths are not worth a note.
 TELLING = 1e-6
 NO_ANGLES = (
     "The boundary's mode is angles, but its list of angles is empty: every boundary angle is 180°, as with"
@@ -182,11 +182,11 @@ def _rounding_notes(surface: Surface, free: list[int], found: Floats, rounded: F
             f"The isometric boundary has a cone angle of {np.degrees(found[0]):.4g}°; the domain was given "
             f"{shape}.",
         )
-    told = [
+    changes = [
         f"{np.degrees(found[i]):.4g}° to {np.degrees(rounded[i]):.6g}° on loop {free[i]}" for i in changed[:4]
     ]
     more = f" and {len(changed) - 4} more" if len(changed) > 4 else ""
-    return (f"Curvatures of the isometric loops were rounded from {', '.join(told)}{more}.",)
+    return (f"Curvatures of the isometric loops were rounded from {', '.join(changes)}{more}.",)
 
 
 @dataclass(frozen=True)

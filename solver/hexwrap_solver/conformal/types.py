@@ -78,7 +78,7 @@ class BoundaryCondition:
     be straight, for they turn by −2π.
     quantum: π/3, π/2 or none, by the pattern that is meant; ``auto``: that of the pattern that is laid.
     spread: how ``isometric`` distributes the rounding: ``even`` (the paper) or ``optimal`` (u constant on
-    each loop). angle_unit: in which problems give angles; the same condition whatever it is.
+    each loop). angle_unit: in which error messages give angles; it does not change the condition.
     """
 
     mode: Annotated[

@@ -33,7 +33,7 @@ def lift(cmap: ConformalMap, places: Complexes) -> Lifted:
 
     z and g(z) go to the same point. Where the unrolled domain overlaps itself, the sheet nearest to 0 is
     meant; a net has one image, and where that overlaps itself the deepest place counts. Never raises: what
-    lies outside is told in ``inside``.
+    lies outside is marked in ``inside``.
     """
     places = np.asarray(places, dtype=complex).ravel()
     known = (np.abs(places.real) <= BEYOND) & (np.abs(places.imag) <= BEYOND)  # NaN is not

@@ -103,7 +103,7 @@ def _pack(x: Ints, y: Ints) -> Ints:
 
 
 def find_places(cmap: ConformalMap, places: Complexes) -> tuple[Ints, Floats]:
-    """The triangle of each place of the unrolled domain, on whatever sheet it lies; as TriangleIndex.find.
+    """The triangle of each place of the unrolled domain, on any sheet; as TriangleIndex.find.
 
     Where the domain overlaps itself, the sheet nearest to 0 is meant; of a net, the triangle in which the
     place lies deepest.

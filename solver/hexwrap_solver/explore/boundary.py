@@ -11,8 +11,8 @@ from hexwrap_solver.errors import HexwrapError
 from hexwrap_solver.singularities.sizes import uncovered
 from hexwrap_solver.surface.types import Surface
 
-#: Sizes by which boundary conditions are compared, whatever number is asked for, so that another number does
-#: not bring another domain: the default of ``PanelSettings.sizes``.
+#: Sizes by which boundary conditions are compared, irrespective of the number asked for, so that another
+#: number does not bring another domain: the default of ``PanelSettings.sizes``.
 SIZES = 11
 #: Straight ends carry whole rows, on lattice lines; an isometric boundary has to leave this much less of the
 #: area uncovered to be preferred.
@@ -23,7 +23,7 @@ def best_boundary_map(
     surface: Surface, condition: BoundaryCondition, progress: Progress = no_progress
 ) -> ConformalMap:
     """The map under mode ``auto``: with a straight boundary, unless an isometric one leaves less of the
-    surface uncovered by more than MARGIN, or the straight one is impossible. A note tells both figures.
+    surface uncovered by more than MARGIN, or the straight one is impossible. A note gives both figures.
 
     Raises RequestError, ConvergenceError where neither is possible: what is wrong with the isometric one.
     """
@@ -47,7 +47,7 @@ def best_boundary_map(
 
 
 def foreseen(cmap: ConformalMap, sizes: int = SIZES) -> float:
-    """Share of the area that so many sizes leave uncovered because cells differ in size, from e^−u alone."""
+    """Area share that this many sizes leave uncovered because cells differ in size, by e^−u alone."""
     area = cmap.surface.areas
     return uncovered(cmap.log_scale[cmap.surface.faces].mean(axis=1), area / area.sum(), sizes)
 

@@ -19,11 +19,11 @@ from hexwrap_solver.geometry import stable_order
 LEAF = 160
 #: Steps that bring each cutting plane to its part's median.
 MEDIAN_STEPS = 3
-#: Where a plane leaves so much more than half of its part on one side, as happens where vertices were
+#: Where a plane leaves this much more than half of its part on one side, as happens where vertices were
 #: inserted in clusters, the median is found by sorting.
 LOPSIDED = 0.2
-#: Planes are found from about so many unknowns per part, and from one in four of all at most: a plane that is
-#: a little off costs nothing.
+#: Planes are found from about this many unknowns per part, and from one in four of all at most: a plane that
+#: is a little off costs nothing.
 SAMPLE, SHARE = 512, 4
 
 
@@ -79,7 +79,7 @@ def _parts(points: Floats, placed: Bools, depth: int) -> Ints:
         return part
     centred = np.ascontiguousarray(points.T)
     everywhere = np.flatnonzero(placed)
-    random = np.random.default_rng(0)  # whatever the numbering, and the same every time
+    random = np.random.default_rng(0)  # independent of the numbering, and the same every time
     sample = everywhere[random.integers(0, len(everywhere), len(everywhere) // SHARE)]
     # Second moments far from the origin lose their digits.
     centred -= centred[:, sample].mean(axis=1)[:, None]

@@ -22,7 +22,7 @@ from hexwrap_solver.linalg.dissection import Dissection, dissect
 from hexwrap_solver.linalg.workspace import borrow
 
 #: Blocks of at least this many entries are added run by run, where their places come in few runs without
-#: holes: the index arrays of so many single entries would not stay in the processor's cache.
+#: holes: the index arrays of that many single entries would not stay in the processor's cache.
 LARGE = 8000
 #: Adding one slice costs as much as adding this many entries one by one.
 ENTRIES_PER_SLICE = 600
@@ -123,7 +123,7 @@ class Factorisation:
         factor.fill(0.0)
         factor[self._diagonal_at] = diagonal[self._order]
         factor[self._off_diagonal_at] = off_diagonal
-        with np.errstate(over="ignore", invalid="ignore"):  # in upper halves, which hold whatever was there
+        with np.errstate(over="ignore", invalid="ignore"):  # in upper halves, which hold old values
             self._eliminate()
 
     def _eliminate(self) -> None:
@@ -137,7 +137,7 @@ class Factorisation:
                     raise np.linalg.LinAlgError("matrix is not positive definite")
             if rest.size:
                 dtrsm(1.0, own.T, rest.T, side=1, lower=1, trans_a=1, overwrite_b=1)
-                # The upper half of an update is never looked at, whatever stands there.
+                # The upper half of an update is never read.
                 dsyrk(-1.0, rest.T, beta=0.0, c=update.T, lower=1, overwrite_c=1)
             else:
                 update.fill(0.0)

@@ -19,7 +19,7 @@ _SPARE: list[Floats] = []
 
 
 def borrow(size: int, owner: object) -> Floats:
-    """(size,) numbers, whatever they are. They are lent until ``owner`` is gone, and no view of them may
+    """(size,) numbers, not initialized. They are lent until ``owner`` is gone, and no view of them may
     outlive it."""
     try:
         array = _SPARE.pop()

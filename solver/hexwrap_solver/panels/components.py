@@ -177,7 +177,7 @@ def _ears(corner: Floats) -> Ints:
             covered &= cross_2d((q - p)[:, None], corner[left] - p[:, None]) >= 0
         own = np.eye(len(left), dtype=bool)
         covered &= ~(own | np.roll(own, 1, axis=1) | np.roll(own, -1, axis=1))
-        # Where rounding leaves no ear, whatever bulges most.
+        # Where rounding leaves no ear, the corner that bulges most.
         k = int(np.argmax(np.where(covered.any(axis=1) | (bulge <= 0), -np.inf, bulge)))
         triangles.append([left[k - 1], left[k], left[(k + 1) % len(left)]])
         left = np.delete(left, k)

@@ -1,4 +1,4 @@
-"""Which panels have the same shape: congruent up to rotation, mirror images told apart."""
+"""Which panels have the same shape: congruent up to rotation, mirror images distinguished."""
 
 from __future__ import annotations
 

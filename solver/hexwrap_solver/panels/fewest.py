@@ -22,7 +22,7 @@ SLACK = 1e-9
 BLOCK = 4096
 #: Rounds in which room is divided anew between the two panels of a joint.
 ROUNDS = 8
-#: Above so many classes none is tried to be taken away: nobody builds with them.
+#: Above this many classes no attempt is made to save one: nobody builds with them.
 MANY = 400
 
 

@@ -86,7 +86,7 @@ FLAT = 1e-9
 #: saddle: their angles would have to sum up to more than 2π (Li, Liu and Wang 2015).
 FOUR_AT_A_NODE = ("quad", "diamond", "trihexagonal", "rhombitrihexagonal")
 
-#: An energy above this that no step lowers is told.
+#: An energy above this that no step lowers is worth a note.
 MINIMAL = 1e-12
 STUCK_NOTE = ("No step lowered the energy: the corners stand where the pattern has them.",)
 
@@ -179,7 +179,7 @@ class _Special:
         return cls(face, sides, poses, len(chosen))
 
     def inscribed(self, pattern: Pattern, planes: Separation) -> tuple[Ragged, Floats, Bools]:
-        """As ``_trimmed``: the largest that fit, whatever the target, since they belong to no size class."""
+        """As ``_trimmed``: the largest that fit for any target, since they belong to no size class."""
         at = pattern.faces.offsets[:-1][self.face][:, None] + np.arange(self.sides)
         length, center = limits.inscribed(self.poses, planes.direction[at], planes.offset[at])
         kept = np.zeros(self.cells, dtype=bool)

@@ -27,7 +27,7 @@ from hexwrap_solver.panels.types import Panels, Quality
 from hexwrap_solver.pattern.types import Pattern
 from hexwrap_solver.surface.types import Surface
 
-#: A share of the surface without cells that is told.
+#: A smaller share of the surface without cells is not worth a note.
 BARE = 0.03
 
 

@@ -2,7 +2,7 @@
 
 With the corner angles θ_i = 2πi/p, a = (2/p) Σ cos θ_i p_i and b = (2/p) Σ sin θ_i p_i, the sum of squared
 distances between the cell's corners p_i and those of a regular polygon of given size is least when its
-centre is the centroid and its axes are the polar factor of the 3×2 matrix [a b], whatever the size; the best
+centre is the centroid and its axes are the polar factor of the 3×2 matrix [a b] for every size; the best
 circumradius is then (σ₁ + σ₂)/2. (An orthogonal Procrustes problem with scale; Schönemann and Carroll 1970.)
 """
 

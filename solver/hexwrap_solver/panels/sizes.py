@@ -3,7 +3,7 @@
 The best classes are intervals of the sorted limits, and a class takes the least limit of its members. What is
 lost is then an exact dynamic programme over the number of classes.
 
-Two things are not left to what is lost alone. Sizes that nobody could tell apart are not wanted: fewer are
+Two things are not left to what is lost alone. Sizes that nobody could distinguish are not wanted: fewer are
 used then (``unlike``). And panels may not vanish for nothing: a few tiny cells lose so little area that the
 least loss lets dozens of larger panels shrink to them. Where panels would become shorter than a quarter of
 their limit, relative losses count beside the area, as far as a bounded share of the area allows
@@ -61,7 +61,7 @@ def floor_to(length: Floats, increment: float) -> Floats:
 
 
 def level(length: Floats) -> Floats:
-    """Ascending lengths, those that rounding alone tells apart (on symmetric surfaces) made the least of
+    """Ascending lengths, those that differ by rounding only (on symmetric surfaces) made the least of
     them: they need no size of their own."""
     new = np.append(True, np.diff(length) > ROUNDING * length[:-1])
     return np.asarray(length[np.flatnonzero(new)[np.cumsum(new) - 1]])
@@ -206,7 +206,7 @@ def lengths_of(start: Ints, floored: Floats) -> Floats:
 def unlike(made: Partition, floored: Floats, classes: int, cost: str) -> int:
     """How many of the classes are worth while.
 
-    One after the other is given up as long as two of the best so many lengths are ``ALIKE``, unless that
+    One after the other is given up as long as two of the remaining best lengths are ``ALIKE``, unless that
     loses more than ``ALIKE_AREA`` (``ALIKE``) of the whole against ``classes`` of them.
     """
     lost = ALIKE_AREA * float(floored @ floored) if cost == "area" else ALIKE * float(np.median(floored))

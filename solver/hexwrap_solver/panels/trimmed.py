@@ -100,7 +100,7 @@ class _Outlines:
         return np.asarray(self.after(1))
 
     def after(self, step: int) -> Ints:
-        """(h,) position of the corner so many further on."""
+        """(h,) position of the corner that many further on."""
         start = self.offsets[:-1][self.row]
         return np.asarray(start + (np.arange(len(self.row)) - start + step) % self.count[self.row])
 

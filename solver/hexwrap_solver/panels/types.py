@@ -9,6 +9,7 @@ from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged
 from hexwrap_solver.errors import SettingError
 from hexwrap_solver.panels.facing import Facing
 from hexwrap_solver.setting import Setting
+from hexwrap_solver.singularities.types import Choices
 
 
 @dataclass(frozen=True)
@@ -91,7 +92,7 @@ class PanelSettings:
 
 @dataclass(frozen=True)
 class TradeOff:
-    """From this curve an architect chooses the number of sizes: the least that so many can leave open.
+    """From this curve an architect chooses the number of sizes: the least that this many can leave open.
 
     sizes: (k,) numbers of classes 1…; uncovered: (k,) fraction of the cells' area left open;
     worst_gap: (k,) greatest mean gap of a panel to its cell, model units.
@@ -187,9 +188,10 @@ class Quality:
     planarity, edge_deviation, angle_deviation (rad): relative to ℓ, per panel arrays.
     gap_tangential, gap_normal, kink (rad): aligned with the pattern's neighbours, NaN where there is none.
     surface_distance: (q,) greatest distance of a panel's corners and its centre to the input surface.
-    convex: (q,). congruence: (q,) class of congruent shapes (mirror images told apart).
+    convex: (q,). congruence: (q,) class of congruent shapes (mirror images distinguished).
     gaps_over: panels with a joint wider than was wanted, None where nothing was said of that.
     movement: greatest distance a shared vertex was moved (watertight), 0 otherwise.
+    singularities: what other numbers of them would leave open; None where none was looked at.
     """
 
     scale_ratio: float
@@ -208,6 +210,7 @@ class Quality:
     overlaps: int = 0
     coverage: float = 0.0
     movement: float = 0.0
+    singularities: Choices | None = None
     notes: tuple[str, ...] = ()
 
 

@@ -185,6 +185,10 @@ class Lattice:
         )
         return np.asarray(every[np.argmin(abs(np.angle(self.position(every) / direction)))])
 
+    def period_along(self, direction: complex) -> float:
+        """Length of the shortest translation along an edge or across a corner."""
+        return float(abs(complex(self.position(self.shortest_towards(direction)))))
+
     def ring_near(self, around: int, direction: complex) -> Ints:
         """Of all translations with that number of cells around, the nearest in direction."""
         distance = max(1, round(around / (2 if self.kind == "triangle" else 1)))

@@ -38,8 +38,10 @@ from hexwrap_solver.pattern.place.size import ASKED, fitting_number
 from hexwrap_solver.pattern.trim.arrangement import Points
 from hexwrap_solver.pattern.trim.boundary import Boundary, boundary_of
 from hexwrap_solver.pattern.trim.enclosed import around_enclosed, met_by_pattern
-from hexwrap_solver.pattern.trim.trim import TooCoarse, Trimmed, trim
+from hexwrap_solver.pattern.trim.folds import cut_open
+from hexwrap_solver.pattern.trim.trim import Folded, TooCoarse, Trimmed, trim
 from hexwrap_solver.pattern.types import Pattern, PatternSettings
+from hexwrap_solver.surface.features import FeatureEdges
 from hexwrap_solver.surface.normals import with_tangents
 from hexwrap_solver.surface.projection import project, start_parameters
 
@@ -91,6 +93,11 @@ def _lay(cmap: ConformalMap, placing: Placing, settings: PatternSettings, progre
     progress(0.1, "placing the lattice")
     layout = layout_of(placing.cmap, lattice, placement)
     _check_count(cmap, layout, settings)
+    surface = placing.cmap.surface
+    numbers = sorted(placing.features)
+    features = FeatureEdges.of(surface, [surface.features[i] for i in numbers])
+    if len(features):
+        layout = cut_open(layout, features)
     nodes = find_nodes(layout)
     if not nodes.n:
         raise _too_coarse(cmap, settings, placement)
@@ -100,11 +107,13 @@ def _lay(cmap: ConformalMap, placing: Placing, settings: PatternSettings, progre
     whole = whole_cells(lattice, edges)
     boundary = boundary_of(cmap.surface, layout)
     met = met_by_pattern(layout, nodes, edges, boundary)
+    met[boundary.loop[boundary.rim < 0]] = True  # where folds meet the boundary, cells are cut anyway
     if cmap.kind != "net":
-        met[:2] = True  # a cell that encloses an end goes around the surface
-    if settings.boundary == "trim" and len(boundary.face):
+        met[boundary.loop[(boundary.rim == 0) | (boundary.rim == 1)]] = True  # it would go around the surface
+    if len(boundary.face) and (settings.boundary == "trim" or len(features)):
+        folded = Folded(surface.faces, placement.glued, features) if len(features) else None
         try:
-            cut = trim(layout, boundary, met, nodes, edges, whole)
+            cut = trim(layout, boundary, met, nodes, edges, whole, folded, rim=settings.boundary == "trim")
         except TooCoarse:
             raise _too_coarse(cmap, settings, placement) from None
     else:
@@ -167,7 +176,7 @@ def _check_count(cmap: ConformalMap, layout: Layout, settings: PatternSettings) 
 def _finish(
     cmap: ConformalMap, settings: PatternSettings, placement: Placement, layout: Layout, cut: Trimmed
 ) -> Pattern:
-    keep, narrow = _usable(cut.cells, placement.narrows)
+    keep, narrow = _usable(cut.cells, placement.narrows or cut.seams is not None)
     if not keep.any():
         raise _too_coarse(cmap, settings, placement)
     cells, whole = cut.cells.part(keep), cut.whole[keep]
@@ -281,6 +290,8 @@ def _told(cut: Trimmed, narrow: int, apart: int) -> list[str]:
         notes.append(
             f"{narrow} cells at the narrow end were left out: so few go around it there that they touch "
             "themselves."
+            if cut.seams is None
+            else f"{narrow} cells that touch themselves were left out."
         )
     if cut.holed:
         notes.append(

@@ -42,6 +42,8 @@ FREE, ASKED = 0.05, 0.015
 #: Where the least moves that close are longer than this, in cells, singularities are seated anew, so many
 #: times.
 FAR, AGAIN = 0.6, 2
+#: Creases whose surroundings are more than this part of the surface are no lines to keep away from.
+FACETED = 0.5
 #: Sums of listed angles this near to a multiple of the quantum are one, radians.
 NEARLY = 1e-3
 
@@ -113,6 +115,11 @@ def frame_of(
         most=most,
         from_loops=settings.from_boundary,
         angles=angles if "angles" in ends else None,
+        away=_lines(surface, settings, width),
+        only=np.array([[*one.point, one.radius or width] for one in settings.only])
+        if settings.only
+        else None,
+        symmetric=settings.symmetric,
     )
     turn = None
     if tube is not None and all(aligned):
@@ -120,6 +127,17 @@ def frame_of(
     free_scale = ASKED if pattern.edge_length is not None else FREE
     line = _line(lattice, angle, pattern.boundary) if any(aligned) else None
     return Frame(lattice, rules, width, line, aligned, turn, free_scale)
+
+
+def _lines(surface: Surface, settings: SingularitySettings, width: float) -> tuple[tuple[Floats, float], ...]:
+    """Polylines to keep away from, with how many cells: creases, unless these are everywhere, as on a faceted
+    surface, and the curves that were asked for."""
+    creases = [surface.vertices[feature.vertices] for feature in surface.features]
+    length = sum(float(np.linalg.norm(np.diff(crease, axis=0), axis=1).sum()) for crease in creases)
+    if 2 * length * settings.from_features * width > FACETED * vertex_areas(surface).sum():
+        creases = []
+    asked = [(np.array(one.line, dtype=float), one.distance) for one in settings.keep_off]
+    return (*((crease, settings.from_features) for crease in creases), *asked)
 
 
 @dataclass(frozen=True)
@@ -345,9 +363,11 @@ def _notes(frame: Frame, found: Closed, placing: Placing) -> Iterator[str]:
     none = placing.proposals[0]
     if len(placing.proposals) > 1 and none.count == 0:
         yield (
-            f"In {frame.rules.sizes} sizes, the sizes alone leave about {proposal.uncovered:.1%} uncovered, "
-            f"without singularities {none.uncovered:.1%} (linear model)."
+            f"In {frame.rules.sizes} sizes about {proposal.uncovered:.1%} is left uncovered, "
+            f"without singularities about {none.uncovered:.1%} (linear model)."
         )
+    if placing.symmetry:
+        yield f"They stand symmetrically but for these moves; the surface has {placing.symmetry}."
     lines = [f"loop {i}" for i, on in enumerate(frame.aligned) if on]
     if lines:
         yield (

@@ -31,7 +31,7 @@ ROUNDING = 1e-4
 OPPOSITE = 0.5
 #: A cap is upright whose normal is within 45° of the vertical.
 UPRIGHT = np.sqrt(0.5)
-#: So many times longer than the upright pair another one must be to be taken.
+#: Another pair is taken only if it is this many times longer than the upright one.
 LONGER = 2.5
 #: More flat regions than this make a faceted surface, not a mass with caps.
 MOST = 60

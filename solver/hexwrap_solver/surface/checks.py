@@ -17,7 +17,7 @@ from hexwrap_solver.surface.types import SentMesh
 
 #: Fourth powers of coordinates, which areas squared are, must neither overflow nor vanish.
 LARGEST, SMALLEST = 1e60, 1e-60
-#: At most so many faulty elements are listed in an error.
+#: At most this many faulty elements are listed in an error.
 LISTED = 1000
 
 

@@ -14,13 +14,13 @@ from hexwrap_solver.geometry import dot
 #: bound the memory of the search, not its result. A point on the axis of a tube is as near to whole rings.
 CHUNK, MOST_PAIRS, COMPARED = 65536, 1 << 22, 1 << 18
 
-#: At most so many points descend the tree together: as many as there are for each triangle, since the box of
-#: points that lie further apart than triangles meets too many of these.
+#: At most this many points descend the tree together: as many as there are for each triangle, since the box
+#: of points that lie further apart than triangles meets too many of these.
 LARGEST_GROUP = 8
 
-#: A point further away than so many sizes of the mesh is moved straight towards it, to this distance, for the
-#: search. From there rays to the mesh differ from parallel ones by the inverse part of its size; much further
-#: away the digits that tell triangles apart are lost, and squares overflow in the end.
+#: A point further away than this many sizes of the mesh is moved straight towards it, to this distance, for
+#: the search. From there rays to the mesh differ from parallel ones by the inverse part of its size; much
+#: further away the digits that distinguish triangles are lost, and squares overflow in the end.
 FAR = 1e6
 
 #: Bits per coordinate of the Morton code that sorts the triangles.
@@ -33,7 +33,7 @@ SPREAD = (
     (4, 0x10C30C30C30C30C3),
     (2, 0x1249249249249249),
 )
-#: Distances from boxes are good to so many roundings of the coordinates.
+#: Distances from boxes are good to this many roundings of the coordinates.
 ROUNDINGS = 8
 
 

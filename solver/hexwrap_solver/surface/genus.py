@@ -26,7 +26,7 @@ from hexwrap_solver.surface.topology import (
     spanning_tree,
 )
 
-#: A loop around a handle is looked for through so many vertices at most.
+#: A loop around a handle is searched through at most this many vertices.
 TRIALS = 24
 
 

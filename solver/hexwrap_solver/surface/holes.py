@@ -22,7 +22,7 @@ from hexwrap_solver.surface.types import Openings, Surface
 
 #: Vertices inside keep this many edge lengths away from the loop.
 CLEARANCE = 0.6
-#: A hole gets at most so many vertices for each one of its loop: a loop of very short edges around a large
+#: A hole gets at most this many vertices for each one of its loop: a loop of very short edges around a large
 #: hole would ask for millions.
 MOST_PER_VERTEX = 40
 #: Cotangents are cut off here: the fairest fill must not hang on needles.

@@ -56,7 +56,7 @@ def surface_from_mesh(sent: SentMesh, settings: SurfaceSettings | None = None) -
             return _build(sent, mesh, polygon, label, settings)
         except NotOrientableError:  # without the weld at its seam a Möbius band would pass for a strip
             raise
-        except SurfaceError as error:  # less welding may help; where it does not, the fullest one's is told
+        except SurfaceError as error:  # less welding may help; else the fullest one's error stands
             refusal = refusal or error
     raise refusal or AssertionError("there is always one way to weld")
 
@@ -69,7 +69,7 @@ class _Draft:
     polygon: Ints
     repairs: list[str]
 
-    def tell(self, count: int, one: str, many: str, what: str) -> None:
+    def note(self, count: int, one: str, many: str, what: str) -> None:
         """Notes a repair of count elements; ``was`` in what agrees with their number."""
         if count:
             noun, was = (one, "was") if count == 1 else (many, "were")
@@ -85,7 +85,7 @@ class _Draft:
 
     def drop(self, keep: Bools, what: str) -> None:
         if not keep.all():
-            self.tell(int((~keep).sum()), "triangle", "triangles", what)
+            self.note(int((~keep).sum()), "triangle", "triangles", what)
             self.faces, self.polygon = self.faces[keep], self.polygon[keep]
 
 
@@ -94,9 +94,9 @@ def _build(sent: SentMesh, mesh: Triangles, polygon: Ints, label: Ints, settings
     vertices, n = mesh.vertices, len(mesh.vertices)
     draft = _Draft(relabelled(mesh, label), polygon, [])
     used = _mark(mesh.faces, n)
-    draft.tell(int(n - used.sum()), "vertex", "vertices", "that no face uses {was} left out")
+    draft.note(int(n - used.sum()), "vertex", "vertices", "that no face uses {was} left out")
     welded = int((used & (label != np.arange(n))).sum())
-    draft.tell(
+    draft.note(
         welded, "vertex", "vertices", f"{{was}} welded to one within {TOLERANCE:g} of the model's size"
     )
     _drop_collapsed(draft)
@@ -146,12 +146,13 @@ def _features(surface: Surface, sent: SentMesh, settings: SurfaceSettings) -> tu
     rim = np.zeros(len(surface.vertices), dtype=bool)
     for loop in surface.loops:
         rim[loop] = True
-    # Edges of the boundary are no creases; nor are edges that a repair has taken out of the mesh.
+    # Edges of the boundary are not creases; nor are edges that a repair has taken out of the mesh.
     low, high = surface.edge_ends
     n = len(surface.vertices)
     inside = (low * n + high)[np.diff(surface.edge_groups[1]) == 2]
     keep = np.isin(edges.min(axis=1) * n + edges.max(axis=1), inside)
-    return chained(surface.vertices, edges[keep], fold[keep], rim)
+    chains = chained(surface.vertices, edges[keep], fold[keep], rim)
+    return tuple(replace(chain, given=sent.creases is not None) for chain in chains)
 
 
 def _uncap(draft: _Draft) -> None:
@@ -189,7 +190,7 @@ def _orient(draft: _Draft, names: SentNames) -> None:
     if not turn.any():
         return
     turned = len(np.unique(draft.polygon[turn]))
-    draft.tell(turned, "face", "faces", "{was} turned over to agree with the others")
+    draft.note(turned, "face", "faces", "{was} turned over to agree with the others")
     draft.faces = np.where(turn[:, None], draft.faces[:, ::-1], draft.faces)
 
 
@@ -206,5 +207,5 @@ def _flatten(draft: _Draft) -> None:
             f"neighbours ({len(polygons)} such in all). Move its middle corner off the line or delete it.",
             faces=polygons[:LISTED],
         )
-    draft.tell(int(bad.sum()), "triangle", "triangles", "without area {was} merged into the neighbours")
+    draft.note(int(bad.sum()), "triangle", "triangles", "without area {was} merged into the neighbours")
     draft.faces, draft.polygon = draft.faces[keep], draft.polygon[keep]

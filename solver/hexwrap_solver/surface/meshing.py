@@ -31,9 +31,9 @@ from hexwrap_solver.surface.types import MeshSettings, NurbsSurface, Surface
 
 #: Rows with up to this ratio of needed vertices get the same number, which keeps most vertices regular.
 STEP = 1.08
-#: A row may be so much flatter than equilateral where lines along the surface are shorter than elsewhere.
+#: A row may be this much flatter than equilateral where lines along the surface are shorter than elsewhere.
 FLATTEST = 3.0
-#: Places around a row are told apart to this part of it: sums with row numbers stay exact.
+#: Places around a row are distinguished to this part of it: sums with row numbers stay exact.
 PLACES = 2.0**32
 #: Sizes are planned a little below what was asked, and reduced again while the finished mesh exceeds it.
 MARGIN, TRIES = 0.97, 6

@@ -58,8 +58,10 @@ def checked(nurbs: NurbsSurface) -> tuple[NurbsSurface, list[str]]:
             f"The NURBS surface is closed in no direction: its ends are up to {gap[0]:.4g} apart in u and "
             f"{gap[1]:.4g} in v. A tube must close up in one of them to within {TOLERANCE * size:.2g}."
         )
-    told = [] if any(nurbs.closed) else [f"The surface was found to close up in {NAMES[closed.index(True)]}."]
-    return replace(nurbs, closed=(closed[0], closed[1])), told
+    notes = (
+        [] if any(nurbs.closed) else [f"The surface was found to close up in {NAMES[closed.index(True)]}."]
+    )
+    return replace(nurbs, closed=(closed[0], closed[1])), notes
 
 
 def check_data(nurbs: NurbsSurface) -> None:
@@ -115,7 +117,7 @@ def _check_knots(nurbs: NurbsSurface, direction: int) -> None:
 
 
 def spans(nurbs: NurbsSurface, direction: int, per_span: int) -> Floats:
-    """Parameters from end to end of the domain, so many steps in every knot span."""
+    """Parameters from end to end of the domain, the given number of steps in every knot span."""
     low, high = domain(nurbs, direction)
     knots = nurbs.knots[direction]
     marks = np.unique(knots[(knots >= low) & (knots <= high)])

@@ -17,7 +17,7 @@ CHORD_STEPS = 1
 CONVERGED = 1e-13
 #: … and steps below this part end it where the start was good.
 SETTLED = 1e-9
-#: A step that does not bring the point nearer is halved so many times at most.
+#: A step that does not bring the point nearer is halved at most this many times.
 HALVINGS = 12
 
 

@@ -44,7 +44,7 @@ def _repeated_corner_last(quads: Ints) -> tuple[Ints, Ints]:
 def _split(vertices: Floats, quads: Ints) -> Ints:
     """(k, 2, 3) triangles. The angles at the two corners that the diagonal does not touch sum up to at
     most π; where both diagonals do equally well, the one through the lowest vertex is taken, so that equal
-    quads are split alike whatever their order."""
+    quads are split alike in any order."""
     points = vertices[quads]
     angle = _corner_angles(points)
     excess = angle[:, 1] + angle[:, 3] - angle[:, 0] - angle[:, 2]  # > 0: diagonal 0–2 is the worse one

@@ -115,7 +115,7 @@ class NurbsSurface:
 
     degree: (p, q). knots: two arrays of lengths n+p+1 and m+q+1. control_points: (n, m, 4) as
     (x, y, z, w), coordinates not premultiplied by the weight. closed: whether the surface closes up
-    (with whatever knots; clamped-and-coincident or periodic) in u, in v.
+    (with clamped and coincident, or periodic knots) in u, in v.
     """
 
     degree: tuple[int, int]
@@ -171,12 +171,14 @@ class Feature:
     """A line along which the surface folds, from a junction, a corner or the boundary to the next.
 
     vertices: (k,) of the mesh, neighbours joined by edges; a closed line ends where it begins. fold: mean
-    angle between the faces beside it, radians.
+    angle between the faces beside it, radians. given: of the exact surface, or drawn; not only seen on the
+    mesh.
     """
 
     vertices: Ints
     fold: float
     closed: bool
+    given: bool = False
 
 
 @dataclass(frozen=True)
@@ -191,8 +193,8 @@ class Surface(Triangles):
     normals: (n, 3) unit vertex normals (sent ones, the NURBS surface's, or area-weighted face normals).
     repairs: one sentence each.
     features: creases of the surface as chains of mesh edges.
-    openings: so many loops, the last ones, are openings of the wall: the map is found with them filled, and
-    they are cut out of it. patch: (m,) on a filled surface, the faces that fill openings; None if there
+    openings: how many loops, the last ones, are openings of the wall: the map is found with them filled,
+    and they are cut out of it. patch: (m,) on a filled surface, the faces that fill openings; None if there
     are none.
     nurbs, parameters: the NURBS surface the mesh was made from, and (n, 2) its parameters at the
     vertices (in the closed direction, parameters are in the base period); None for sent meshes.
@@ -213,7 +215,7 @@ class Surface(Triangles):
     origin: Origin = field(default_factory=Origin)
 
     def knowing(self, mesh: Triangles) -> Surface:
-        """The surface itself, told what is known of the same triangles by other names of their vertices."""
+        """The surface itself, which takes over what was computed for the same triangles."""
         known = ("edge_groups", "twin", "lengths", "areas")
         self.__dict__.update({name: mesh.__dict__[name] for name in known if name in mesh.__dict__})
         return self

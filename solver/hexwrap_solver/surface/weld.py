@@ -17,9 +17,9 @@ from hexwrap_solver.surface.types import Triangles
 
 #: Relative to the bounding diagonal.
 TOLERANCE = 1e-6
-#: So many neighbours of a vertex are looked at; bounds memory where thousands stand within the tolerance.
+#: This many neighbours of a vertex are considered; bounds memory where thousands stand within the tolerance.
 NEIGHBOURS = 8
-#: Edges shorter than so many units in the last place of the coordinates have no direction.
+#: Edges shorter than this many units in the last place of the coordinates have no direction.
 ULPS = 4
 
 

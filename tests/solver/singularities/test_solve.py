@@ -127,17 +127,52 @@ def lobed():
     return shapes.surface_of(np.stack([x * wide, y * wide, z + 0.1 * x], axis=1), plain.faces)
 
 
-def test_says_what_singularities_would_bring():
-    surface = lobed()
-    plain = solved(surface, mode="straight", around=24)
+@pytest.fixture(scope="module")
+def found():
+    return solved(lobed(), count="auto", around=24)
+
+
+@pytest.fixture(scope="module")
+def plain():
+    return solved(lobed(), mode="straight", around=24)
+
+
+def test_says_what_singularities_would_bring(plain, found):
     said = [note for note in plain.quality.notes if "would leave about" in note]
     assert len(said) == 1
     assert "heptagons" in said[0]
-    better = solved(surface, count="auto", around=24)
-    assert better.quality.coverage > plain.quality.coverage
-    assert not any("would leave about" in note for note in better.quality.notes)
+    assert found.quality.coverage > plain.quality.coverage
+    assert not any("would leave about" in note for note in found.quality.notes)
     even = solved(shapes.straight(), mode="straight", around=16)
     assert not any("would leave about" in note for note in even.quality.notes)
+
+
+class TestCurve:
+    def test_what_was_taken_is_measured(self, found):
+        curve = found.quality.singularities
+        assert curve.uncovered[curve.taken] == 1 - found.quality.coverage
+        assert curve.number[curve.taken] == len(found.map.cones)
+        assert (np.diff(curve.number) > 0).all()
+        assert curve.number[0] == 0
+        assert len(curve.places[0]) == 0
+
+    def test_each_point_can_be_asked_for(self, found):
+        curve = found.quality.singularities
+        i = curve.taken
+        at = tuple(
+            SingularityAt(int(k), point=tuple(place.tolist()))
+            for place, k in zip(curve.places[i], curve.index[i], strict=True)
+        )
+        again = solved(lobed(), at=at, around=24)
+        assert again.map.cones.index.tolist() == found.map.cones.index.tolist()
+        assert again.quality.coverage == pytest.approx(found.quality.coverage, abs=1e-4)
+
+    def test_a_coarse_one_without_any(self, plain):
+        curve = plain.quality.singularities
+        assert curve.coarse
+        assert curve.taken == 0
+        assert curve.uncovered[0] == 1 - plain.quality.coverage
+        assert curve.uncovered.min() < 0.7 * curve.uncovered[0]
 
 
 def test_triangles_with_singularities_are_refused():

@@ -66,7 +66,7 @@ class MirrorMesh:
         return self._found()[1]
 
     def flipped(self) -> None:
-        """To be told after every flip."""
+        """To be called after every flip."""
         self._faces = None
 
     def _found(self) -> tuple[Ints, Ints]:

@@ -32,8 +32,8 @@ from hexwrap_solver.surface.topology import half_edges
 MAX_ROUNDS, PATIENCE = 200, 100
 #: From this round on the edges to split are those that are longest in the domain.
 DRAWN = 2
-#: Insertion that makes more than so many times the vertices, and so many more, does not come to an end. It is
-#: worth some patience: solving again with new vertices takes many times as long.
+#: Insertion does not end if it makes more than MOST times the vertices and MOST_MORE. It is worth some
+#: patience: solving again with new vertices takes many times as long.
 MOST, MOST_MORE = 2, 2000
 
 
@@ -167,7 +167,7 @@ class Refined:
 
 
 def insert(overlay: Overlay, targets: Targets) -> Refined | None:
-    """The map with new vertices, until no triangle turns over; None where there is no end to it.
+    """The map with new vertices, until no triangle turns over; None where that does not end.
 
     targets: of the surface that the map was found on.
     """

@@ -20,14 +20,14 @@ from hexwrap_solver.surface.types import Surface
 
 #: A boundary vertex with target angle Θ gets at least Θ / FULLEST triangles.
 FULLEST = 0.95 * np.pi
-#: Where triangles have turned over, boundary vertices get so many that their mean angle is below this.
+#: Where triangles are flipped, boundary vertices get enough triangles for a mean angle below this.
 WIDE = 0.45 * np.pi
-#: After so many attempts half of it.
+#: After this many attempts, half of it.
 HASTE = 3
 #: Edges are split between these places of their length.
 WITHIN = (0.02, 0.98)
 MIDDLE = (0.3, 0.7)
-#: From this ratio of target and angle on, and with so much of the target, a corner counts as opened wide.
+#: From this ratio of target and angle on, and with this share of the target, a corner counts as opened wide.
 OPENED, BROAD = 1.5, 0.25 * np.pi
 #: Opposite angles that add up to more than this call for a split, radians.
 FLAT = np.deg2rad(210.0)
@@ -47,7 +47,7 @@ class Problem:
 
 
 def split_edges(problem: Problem, marked: Ints, place: Floats) -> Problem:
-    """Splits edges at given places; whatever belongs to vertices is interpolated.
+    """Splits edges at given places; values at vertices are interpolated.
 
     marked: (k,) half-edges, any number per face; of two sides of one edge the first counts. place: (k,) in
     (0, 1) from the start of the half-edge to its end. On the boundary new vertices get target angle π, and

@@ -44,14 +44,14 @@ from hexwrap_solver.surface.types import Surface
 
 #: Rounds of refinement; meshes seen so far need up to a handful.
 MAX_ROUNDS = 40
-#: From this round on, where no more than so many triangles still turn over, the mesh gets shells around their
-#: vertices every so many rounds; where there are more of them, it is no cascade around single vertices. A
-#: cascade that is left to itself makes edges as short as rounding within a dozen rounds.
+#: From round PATIENCE on, while at most FEW triangles still turn over, the mesh gets shells around their
+#: vertices every SHELLS rounds: few triangles mean a cascade around single vertices, which would make edges
+#: as short as rounding within a dozen rounds.
 PATIENCE, FEW, SHELLS = 6, 30, 2
-#: Refinement that makes more than so many times the vertices, and so many more, does not come to an end.
+#: Refinement does not end if it makes more than MOST times the vertices and MOST_MORE.
 MOST, MOST_MORE = 2, 4000
-#: ``spread`` makes at most so many times the vertices, or is left out: where it goes on and on it often makes
-#: the mesh worse. Only where no map is found without, it is tried.
+#: ``spread`` is left out where it makes more than this many times the vertices, since that often makes the
+#: mesh worse; it is tried only if no map is found otherwise.
 SPREAD_MOST = 1.5
 #: How exact prescribed boundary angles are, radians.
 PROMISED = 1e-9
@@ -103,17 +103,17 @@ def _refined(
             u, wrong = found.log_scale, np.flatnonzero(misdrawn(found))
             if not len(wrong):
                 _check_drawn(found, flat.off)
-                return _told(_in_one_piece(found, first), surface, iterations)
+                return _with_notes(_in_one_piece(found, first), surface, iterations)
             if attempt == 0:
                 refined = _inserted(problem, flat, found, lift, first)
                 if refined is not None:
-                    return _told(refined, surface, iterations)
+                    return _with_notes(refined, surface, iterations)
         else:
             u, _ = _centred(flat.descent, problem.targets)
             net, wrong = _draw_net(problem, flat, cones)
             if net is not None:
                 _check_drawn(net, flat.off)
-                return _told(net, surface, iterations)
+                return _with_notes(net, surface, iterations)
         problem = replace(problem, u=u)
         before = len(problem.surface.vertices)
         if attempt >= PATIENCE and attempt % SHELLS == 0 and len(wrong) <= FEW:
@@ -217,8 +217,8 @@ def _sheets(surface: Surface) -> Ints:
 
 def _uncollapse(problem: Problem, unrolled: bool) -> tuple[Problem, Ints]:
     """Splits what has no room in the domain, until there is nothing of the kind. Also gives the sheets of an
-    annulus. In other nets every edge between two vertices of one side counts, whatever lies between: more are
-    split than need be."""
+    annulus. In other nets every edge between two vertices of one side counts, so more are split than
+    need be."""
     while True:
         sheet = (
             _sheets(problem.surface) if unrolled else np.zeros(problem.surface.faces.shape, dtype=np.int64)
@@ -306,10 +306,10 @@ def _draw_net(problem: Problem, flat: _Flat, cones: Cones) -> tuple[ConformalMap
         return None, np.flatnonzero(turned)
     lengths = np.ascontiguousarray(np.abs(side).T[[1, 2, 0]]) * np.exp(flat.unit)
     corners = corner_angles(lengths)
-    told = 2 * np.pi - np.bincount(cones.vertex, cones.curvature, len(u))
-    told[surface.boundary] = flat.sums[surface.boundary]
+    expected = 2 * np.pi - np.bincount(cones.vertex, cones.curvature, len(u))
+    expected[surface.boundary] = flat.sums[surface.boundary]
     drawn = total(surface.faces.T.ravel(), corners.angle.ravel(), len(u))
-    wound = (np.abs(drawn - told) > np.pi)[surface.faces].any(axis=1)
+    wound = (np.abs(drawn - expected) > np.pi)[surface.faces].any(axis=1)
     if wound.any():
         return None, np.flatnonzero(wound)
     layout = lay_out(surface, lengths, corners, flat.curvature, cones.vertex)
@@ -386,7 +386,7 @@ def _check_drawn(found: ConformalMap, off: float) -> None:
         )
 
 
-def _told(found: ConformalMap, surface: Surface, iterations: int) -> ConformalMap:
+def _with_notes(found: ConformalMap, surface: Surface, iterations: int) -> ConformalMap:
     """The result with what was done to the triangulation."""
     notes = []
     if found.flips:
@@ -394,12 +394,12 @@ def _told(found: ConformalMap, surface: Surface, iterations: int) -> ConformalMa
             f"{found.flips} edge flips: the map is discretely conformal on an intrinsic Delaunay "
             "triangulation of the surface instead of the mesh's own."
         )
-    told = replace(found, iterations=iterations, notes=tuple(notes))
-    return with_inserted(told, len(found.surface.vertices) - len(surface.vertices))
+    noted = replace(found, iterations=iterations, notes=tuple(notes))
+    return with_inserted(noted, len(found.surface.vertices) - len(surface.vertices))
 
 
 def with_inserted(found: ConformalMap, count: int) -> ConformalMap:
-    """The same map, told that ``count`` vertices were inserted (besides those that it tells of already)."""
+    """The same map, noting ``count`` more inserted vertices."""
     if not count:
         return found
     total = found.inserted + count

@@ -125,7 +125,8 @@ def minimise_watertight(
     problem = _Problem(pattern, length, replace(aims, weights=weights), surface)
     stages = FLATNESS if aims.flat else (0.0,)
     enough = DECREASE if aims.flat else ONLY_DECREASE
-    points, curve = pattern.vertices, []
+    points = pattern.vertices
+    curve: list[float] = []
     if aims.flat and problem.bend(points) >= FLAT:
         points = points + NUDGE * pattern.edge_length * _nudges(pattern)
     for stage, flatness in enumerate(stages):
@@ -346,4 +347,4 @@ def _across(p: int) -> Floats:
     one; (0, p) where p is odd, and no edges are opposite."""
     if p % 2:
         return np.zeros((0, p))
-    return (np.roll(np.eye(p), p // 2 - 1, axis=1) - np.eye(p)) / np.sqrt(2)
+    return np.asarray((np.roll(np.eye(p), p // 2 - 1, axis=1) - np.eye(p)) / np.sqrt(2))

@@ -32,7 +32,7 @@ class Placement:
     glued: how the corners of the faces follow. isometries: (t, 4) what the motions of the net are on the
     lattice. rotation: angle from the boundary direction to an edge. around: cells once around (middle ring on
     cones, longest loop on nets). distortion: worst ratio of singular values − 1 of the stretch. step: around
-    is one of its multiples. motion: on annuli, what g is.
+    is one of its multiples. motion: on annuli, what g is. straight: features that lie on lattice lines.
     """
 
     place: Complexes
@@ -44,6 +44,7 @@ class Placement:
     notes: tuple[str, ...]
     step: int = 1
     motion: Isometry | None = None
+    straight: frozenset[int] = frozenset()
 
     @classmethod
     def on_annulus(

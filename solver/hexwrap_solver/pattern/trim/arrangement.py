@@ -39,7 +39,8 @@ class Points:
 class HalfEdges:
     """tail, head: points. isometry: (h, 4) from the head's own coordinates to the tail's. key: order around
     the tail. twin: the same edge the other way. outer: runs along the boundary outside of the domain. name:
-    order·node + direction of a pattern edge from a node, −1 for others."""
+    order·node + direction of a pattern edge from a node, −1 for others. rim: runs along the boundary of the
+    surface."""
 
     tail: Ints
     head: Ints
@@ -48,6 +49,7 @@ class HalfEdges:
     twin: Ints
     outer: Bools
     name: Ints
+    rim: Bools
 
     def without(self, gone: Bools) -> HalfEdges:
         keep = ~gone
@@ -69,8 +71,9 @@ class HalfEdges:
 
 def arrangement(
     layout: Layout, boundary: Boundary, nodes: Nodes, edges: PatternEdges, used: Bools
-) -> tuple[Points, HalfEdges]:
-    """Points and half-edges near the boundary: everything that does not bound a whole cell."""
+) -> tuple[Points, HalfEdges, BoundaryPoints]:
+    """Points and half-edges near the boundary, everything that does not bound a whole cell; and the points
+    that lie on it."""
     lattice, order = layout.lattice, layout.lattice.order
     leaving, chord = exits_of(layout, nodes, edges, boundary), chords(layout, boundary)
     at_node = nodes_on_boundary(layout, nodes, boundary)
@@ -92,7 +95,7 @@ def arrangement(
     start = nodes.n + len(end) + np.arange(len(chord.edge))
     middle = np.zeros(len(start))
     unnamed = np.full(len(start), -1)
-    return points, _join(
+    halves = _join(
         [
             _among_nodes(layout, edges, near, key),
             _pairs(layout, leaving.node, end, leaving.isometry, out_key, no_key, name),
@@ -100,6 +103,7 @@ def arrangement(
             _along_boundary(layout, boundary, on_boundary),
         ]
     )
+    return points, halves, on_boundary
 
 
 def _points_on_boundary(
@@ -132,9 +136,9 @@ def _among_nodes(layout: Layout, edges: PatternEdges, near: Bools, key: Floats) 
     position = np.full(edges.head.size, -1, dtype=np.int64)
     position[slot] = np.arange(len(slot))
     twin = position[edges.reverse(lattice, tail, way)]
-    outer = np.zeros(len(slot), dtype=bool)
+    no = np.zeros(len(slot), dtype=bool)
     isometry = edges.isometry(tail, way)
-    return HalfEdges(tail, edges.head[tail, way], isometry, key[tail, way], twin, outer, slot)
+    return HalfEdges(tail, edges.head[tail, way], isometry, key[tail, way], twin, no, slot, no)
 
 
 def _keys(layout: Layout, boundary: Boundary, at_node: BoundaryPoints, n: int) -> Floats:
@@ -163,6 +167,7 @@ def _pairs(
         np.concatenate([number + k, number]),
         np.zeros(2 * k, dtype=bool),
         np.concatenate([name, np.full(k, -1)]),
+        np.zeros(2 * k, dtype=bool),
     )
 
 
@@ -196,7 +201,7 @@ def _along_boundary(layout: Layout, boundary: Boundary, on: BoundaryPoints) -> H
         np.full(k, BACK),
         np.full(k, -1),
     )
-    return replace(halves, outer=np.repeat([False, True], k))
+    return replace(halves, outer=np.repeat([False, True], k), rim=np.tile(boundary.rim[edge] >= 0, 2))
 
 
 def _join(parts: list[HalfEdges]) -> HalfEdges:

@@ -1,10 +1,16 @@
-"""The boundary loops of the domain, and the points of the pattern that lie on them."""
+"""The boundary loops of the domain, and the points of the pattern that lie on them.
+
+Where the surface is folded, the domain is cut open along the folds: these are boundary, too, with an edge on
+either side.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints
 from hexwrap_solver.domain.locate import runs
@@ -23,15 +29,16 @@ class Boundary:
     """Boundary edges, loop after loop in their order, the domain on the left.
 
     face, edge: (b,) where each lies. number: (m, 3) the boundary edge at a face's edge, −1 inside.
-    loop: (b,) number of its loop. following: (b,) the next boundary edge. step: (b, 4) isometry from the
-    coordinates of the next edge's face to those of this one's. tail, head: (b,) complex, in the face's
-    coordinates.
+    loop: (b,) number of its loop. rim: (b,) loop of the surface that it is of, −1 along a fold. following:
+    (b,) the next boundary edge. step: (b, 4) isometry from the coordinates of the next edge's face to those
+    of this one's. tail, head: (b,) complex, in the face's coordinates.
     """
 
     face: Ints
     edge: Ints
     number: Ints
     loop: Ints
+    rim: Ints
     following: Ints
     step: Ints
     tail: Complexes
@@ -39,27 +46,65 @@ class Boundary:
 
 
 def boundary_of(surface: Surface, layout: Layout) -> Boundary:
-    """The boundary of the layout of a surface."""
-    faces = surface.faces
+    """The boundary of the layout of a surface; along folds, where the layout is cut open, of both sides.
+
+    Loops begin, and are sorted, as those of the surface; loops of folds alone come last.
+    """
+    faces, m = surface.faces, len(surface.faces)
     face, edge = np.nonzero(layout.across < 0)
-    by_tail = np.full(len(surface.vertices), -1, dtype=np.int64)
-    by_tail[faces[face, edge]] = np.arange(len(face))
-    order = by_tail[np.concatenate([*surface.loops, np.zeros(0, dtype=np.int64)])]
-    face, edge = face[order], edge[order]
-    lengths = np.array([len(loop) for loop in surface.loops], dtype=np.int64)
     b = len(face)
-    following = np.arange(1, b + 1)
-    following[np.cumsum(lengths) - 1] = np.cumsum(lengths) - lengths
+    number = np.full(3 * m, -1, dtype=np.int64)
+    number[3 * face + edge] = np.arange(b)
+    inner = surface.twin[3 * face + edge] >= 0
+    place = np.full(len(surface.vertices), -1, dtype=np.int64)
+    of_vertex = np.zeros(len(surface.vertices), dtype=np.int64)
+    place[surface.boundary] = np.arange(len(surface.boundary))
+    of_vertex[surface.boundary] = np.repeat(
+        np.arange(len(surface.loops)), [len(loop) for loop in surface.loops]
+    )
+    tail = faces[face, edge]
+    step, reached = _around_heads(layout, face, edge)
+    following = number[reached]
+    order, loop = _in_cycles(following, np.where(inner, len(place) + np.arange(b), place[tail]))
+    renumber = np.argsort(order)
+    face, edge = face[order], edge[order]
     number = np.full(faces.shape, -1, dtype=np.int64)
     number[face, edge] = np.arange(b)
-    step = _around_heads(layout, face, edge)
-    tail, head = layout.corners[face, edge], layout.corners[face, (edge + 1) % 3]
-    loop = np.repeat(np.arange(len(lengths)), lengths)
-    return Boundary(face, edge, number, loop, following, step, tail, head)
+    return Boundary(
+        face,
+        edge,
+        number,
+        loop,
+        np.where(inner, -1, of_vertex[tail])[order],
+        renumber[following[order]],
+        step[order],
+        layout.corners[face, edge],
+        layout.corners[face, (edge + 1) % 3],
+    )
 
 
-def _around_heads(layout: Layout, face: Ints, edge: Ints) -> Ints:
-    """(b, 4) the isometries met on the way from each boundary edge around its head to the next one."""
+def _in_cycles(following: Ints, priority: Ints) -> tuple[Ints, Ints]:
+    """Order of the elements of a permutation, cycle after cycle, each from its element of least priority on
+    and sorted by that; and (b,) which cycle each element then is of."""
+    b = len(following)
+    graph = coo_array((np.ones(b), (np.arange(b), following)), shape=(b, b))
+    n, cycle = connected_components(graph, directed=False)
+    least = np.full(n, np.iinfo(np.int64).max)
+    np.minimum.at(least, cycle, priority)
+    first = priority == least[cycle]
+    # Steps back to the first element, by pointers that reach twice as far in each round.
+    before = np.argsort(following)
+    before[first] = np.flatnonzero(first)
+    steps = (~first).astype(np.int64)
+    while not first[before].all():
+        steps, before = steps + steps[before], before[before]
+    order = np.lexsort((steps, least[cycle]))
+    return order, np.unique(least[cycle][order], return_inverse=True)[1]
+
+
+def _around_heads(layout: Layout, face: Ints, edge: Ints) -> tuple[Ints, Ints]:
+    """(b, 4) the isometries met on the way from each boundary edge around its head to the next one, and (b,)
+    that one, as 3·face + edge."""
     step = np.zeros((len(face), 4), dtype=np.int64)
     at = 3 * face + (edge + 1) % 3
     turning = np.arange(len(face))
@@ -71,7 +116,7 @@ def _around_heads(layout: Layout, face: Ints, edge: Ints) -> Ints:
         step[glued] = layout.lattice.compose(step[glued], layout.isometries[crossing[crossing != 0]])
         beyond = layout.twin[at[turning]]
         at[turning] = beyond - beyond % 3 + (beyond + 1) % 3
-    return step
+    return step, at
 
 
 @dataclass(frozen=True)

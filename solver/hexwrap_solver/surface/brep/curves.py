@@ -9,7 +9,7 @@ from hexwrap_solver.geometry import angles_between
 from hexwrap_solver.surface.brep.types import Edge, NurbsCurve
 from hexwrap_solver.surface.nurbs import basis
 
-#: An edge is looked at in so many places, at least, and so often between two knots.
+#: An edge is sampled in at least PLACES places, and PER_SPAN between two knots.
 PLACES, PER_SPAN = 16, 2
 #: Tangents that turn by more than this at a knot make a corner, radians.
 CORNER = np.deg2rad(0.5)
@@ -29,7 +29,7 @@ def evaluate_curve(curve: NurbsCurve, t: Floats) -> tuple[Floats, Floats, Floats
 
 
 def places(edge: Edge) -> Floats:
-    """(k,) ascending parameters close enough to tell the shape of the edge by, knots and ends included."""
+    """(k,) ascending parameters close enough to show the shape of the edge, knots and ends included."""
     marks = np.concatenate([[edge.interval[0]], _knots_inside(edge), [edge.interval[1]]])
     per_span = max(-(-PLACES // (len(marks) - 1)), 1 if edge.curve.degree == 1 else PER_SPAN)
     steps = marks[:-1, None] + np.diff(marks)[:, None] * np.arange(per_span) / per_span

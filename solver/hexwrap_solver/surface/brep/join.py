@@ -15,7 +15,7 @@ from hexwrap_solver.geometry import dot
 from hexwrap_solver.surface.brep.curves import evaluate_curve, places
 from hexwrap_solver.surface.brep.types import Brep, Edge, Face, Trim
 
-#: Each step between two places of a curve is looked at in so many points.
+#: Each step between two places of a curve is sampled at this many points.
 FINER = 4
 #: Newton's steps to the nearest point of a curve.
 STEPS = 6
@@ -124,7 +124,7 @@ def _divided(brep: Brep, tolerance: float) -> Brep:
         if len(other) == 0:
             continue
         t, distance = nearest_on(edge, brep.vertices[other])
-        # A corner near an end of the edge, but not one with it, is no place to cut.
+        # A corner near an end of the edge, but not one with it, is not a place to cut.
         margin = np.linalg.norm(
             brep.vertices[other][:, None] - brep.vertices[[edge.start, edge.end]], axis=2
         ).min(axis=1)
@@ -189,7 +189,7 @@ def _apart(one: Edge, two: Edge) -> tuple[float, Floats, bool]:
     t, distance = nearest_on(two, points)
     _, other = nearest_on(one, evaluate_curve(two.curve, places(two))[0])
     turned = one.start != two.start
-    if one.start == one.end:  # closed: the direction tells
+    if one.start == one.end:  # closed: the direction decides
         tangent = evaluate_curve(one.curve, places(one))[1]
         turned = bool(dot(tangent, evaluate_curve(two.curve, t)[1]).sum() < 0)
     return float(max(distance.max(), other.max())), points[int(distance.argmax())], turned

@@ -23,7 +23,7 @@ from hexwrap_solver.surface.types import NurbsSurface
 
 #: Normals that turn by more than this across a knot make a kink, radians.
 KINK = np.deg2rad(1.0)
-#: Sides of a line are told apart beyond this part of the parameter's range.
+#: Sides of a line are distinguished beyond this part of the parameter's range.
 ON_LINE = 1e-7
 #: Places along a line at which normals are compared.
 PLACES = 33

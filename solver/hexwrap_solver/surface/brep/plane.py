@@ -50,7 +50,7 @@ def _areas(points: Floats, faces: Ints) -> Floats:
 
 
 def missing(faces: Ints, segments: Ints, n: int) -> Bools:
-    """(k,) which segments are no edge of any face."""
+    """(k,) which segments are not an edge of any face."""
     start, end = half_edges(faces)
     have = np.minimum(start, end) * n + np.maximum(start, end)
     low, high = segments.min(axis=1), segments.max(axis=1)

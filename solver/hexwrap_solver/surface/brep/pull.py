@@ -20,13 +20,13 @@ from hexwrap_solver.surface.nurbs_checks import closed_within, spans
 from hexwrap_solver.surface.projection import project, settle
 from hexwrap_solver.surface.types import NurbsSurface
 
-#: Closest points are looked for from a grid of so many lines in each direction, at least and at most.
+#: The search for closest points starts from a grid with at least and at most this many lines per direction.
 LINES, MOST_LINES = 16, 160
-#: So many grid points are tried where the nearest one leads astray.
+#: This many grid points are tried where the nearest one leads astray.
 ATTEMPTS = 6
 #: A parameter whose whole range moves a point by less than this part of the surface's size is free there.
 POLE = 1e-6
-#: Edges may lie off a face by so many times the file's tolerance; further off, the face is refused.
+#: Edges may lie off a face by this many times the file's tolerance; further off, the face is refused.
 FAR = 100.0
 
 

@@ -21,17 +21,17 @@ from hexwrap_solver.surface.mesh_sizes import (
 from hexwrap_solver.surface.nurbs import evaluate
 from hexwrap_solver.surface.types import MeshSettings
 
-#: Grid lines per face in each direction, and at least so many between two knots.
+#: Grid lines per face in each direction, and at least PER_SPAN between two knots.
 LINES, PER_SPAN, MOST_LINES = 24, 3, 240
 #: Grid lines keep this part of the width away from its ends, where poles may be.
 NUDGE = 1e-4
-#: Neighbouring normals differ by no more than this, radians, so that no rounding looks like a crease …
+#: Neighbouring normals differ by at most this, radians, so that rounding does not look like a crease …
 TURN = 0.35
 #: … but for that alone edges become no shorter than this part of the longest.
 LEAST = 1 / 4
 #: Sizes are planned a little below what was asked, where something was, and exceeded a little elsewhere.
 MARGIN, LOOSE = 0.88, 1.7
-#: So many vertices are enough for a shape where only a tolerance is asked for.
+#: This many vertices are enough for a shape where only a tolerance is asked for.
 FEWEST = 64
 
 
