@@ -11,11 +11,21 @@ from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.errors import ConvergenceError, PanelsError
 from hexwrap_solver.panels import limits
 from hexwrap_solver.panels.best import Bound, jointly_largest
-from hexwrap_solver.panels.energy import minimise_watertight
+from hexwrap_solver.panels.energy import NEAREST, functionals, minimise_watertight
 from hexwrap_solver.panels.facing import facing_edges
 from hexwrap_solver.panels.halfedges import HalfEdges, half_edges
 from hexwrap_solver.panels.planar import crossing_themselves
-from hexwrap_solver.panels.polygons import edge_lengths, fan_areas, mean_edges, means, row_minima, take_rows
+from hexwrap_solver.panels.polygons import (
+    best_plane_distances,
+    convex,
+    edge_lengths,
+    fan_areas,
+    mean_edges,
+    means,
+    row_maxima,
+    row_minima,
+    take_rows,
+)
 from hexwrap_solver.panels.poses import fit_poses, target_lengths
 from hexwrap_solver.panels.regular import Poses, outline_areas
 from hexwrap_solver.panels.separation import Separation, separating_planes
@@ -23,6 +33,7 @@ from hexwrap_solver.panels.trimmed import flatten_and_clear, plane_normals
 from hexwrap_solver.panels.types import FittedPanels, PanelSettings, Weights
 from hexwrap_solver.pattern.lattice import LATTICES
 from hexwrap_solver.pattern.types import Pattern
+from hexwrap_solver.surface.curvature import saddle_share
 from hexwrap_solver.surface.types import Surface
 
 #: A trimmed cell of whose size (root of the area) less than this fraction is left gets no panel.
@@ -62,9 +73,16 @@ class FitKey:
 
 
 WATERTIGHT_NOTES = (
-    "Watertight panels share their corners: joint, orientation and size classes do not apply, and method is"
-    " always energy.",
+    "Watertight panels share their corners: joint, orientation and size classes do not apply.",
 )
+WEIGHTS_NOTE = ("Weights were given, so that the energies were minimised, as with method energy.",)
+
+#: Corners farther from their panel's plane than this fraction of its mean edge: it did not become flat.
+FLAT = 1e-9
+
+#: Patterns in which four panels meet at each node. Where only three meet, flat convex panels follow no
+#: saddle: their angles would have to sum up to more than 2π (Li, Liu and Wang 2015).
+FOUR_AT_A_NODE = ("quad", "diamond", "trihexagonal", "rhombitrihexagonal")
 
 #: An energy above this that no step lowers is worth a note.
 MINIMAL = 1e-12
@@ -221,20 +239,24 @@ def _fit_watertight(
     surface: Surface, pattern: Pattern, settings: PanelSettings, progress: Progress
 ) -> FittedPanels:
     """All cells, trimmed ones too, as polygons over shared corners."""
-    target = target_lengths(pattern.cells, settings)
-    tree = surface.tree if settings.weights.surface > 0 else None
-    moved, energy = minimise_watertight(pattern, target, settings.weights, tree, progress)
+    energies = settings.method == "energy" or settings.weights != Weights()
+    aims = functionals(settings.weights) if energies else NEAREST
+    moved, energy = minimise_watertight(
+        pattern, target_lengths(pattern.cells, settings), aims, surface, progress
+    )
     shapes = Ragged(moved[pattern.faces.values.astype(np.int64)], pattern.faces.offsets)
-    unmoved = 2 if settings.weights.planarity > 0 else 1  # energies: the beginning, and the end made flat
-    stuck = len(energy) <= unmoved and energy[0] > MINIMAL
+    unmoved = 2 if aims.flat else 1  # energies: the beginning, and the end made flat
+    stuck = energies and len(energy) <= unmoved and energy[0] > MINIMAL
     center, normal = means(shapes), plane_normals(shapes)
+    away = surface.tree.nearest(moved).distance / mean_edges(shapes).mean()
     notes = (
+        *(WEIGHTS_NOTE if energies and settings.method == "exact" else ()),
         *(STUCK_NOTE if stuck else ()),
+        *(_bent_note(shapes) if aims.flat else ()),
         *collapsed_note(shapes),
-        *_crossing_note(crossing_themselves(shapes, center, normal), settings.weights, pattern.kind),
-        *_far_note(
-            surface.tree.nearest(moved).distance / mean_edges(shapes).mean(), settings.weights, pattern.kind
-        ),
+        *_crossing_note(crossing_themselves(shapes, center, normal)),
+        *_convex_note(shapes, normal, pattern, surface),
+        *(_pulled_note if energies else _far_note)(away, settings.weights),
     )
     return FittedPanels(
         mode="watertight",
@@ -252,6 +274,35 @@ def _fit_watertight(
     )
 
 
+def _bent_note(shapes: Ragged) -> tuple[str, ...]:
+    bend = row_maxima(np.abs(best_plane_distances(shapes)), shapes.offsets) / mean_edges(shapes)
+    count = int(np.sum(bend > FLAT))
+    if not count:
+        return ()
+    return (
+        f"Watertight panels that could not be made flat: {count}, bent by up to {bend.max():.1e} of their"
+        " mean edge; smaller cells, or another pattern, leave them more room.",
+    )
+
+
+def _convex_note(shapes: Ragged, normal: Floats, pattern: Pattern, surface: Surface) -> tuple[str, ...]:
+    """How many are not, and the pattern that would be."""
+    count = int(np.sum(~convex(shapes, normal)))
+    if not count:
+        return ()
+    saddle = saddle_share(surface)
+    if saddle > 0 and pattern.kind not in FOUR_AT_A_NODE:
+        better = (
+            f"; {max(saddle, 0.01):.0%} of the surface is curved like a saddle, where only patterns with four"
+            " panels at each node can be flat and convex: ask for kind trihexagonal"
+        )
+    elif saddle == 0 and pattern.kind != "hex":
+        better = "; on this surface, which is nowhere a saddle, ask for kind hex"
+    else:
+        better = "; smaller cells leave fewer"
+    return (f"Watertight panels that are not convex: {count} of {shapes.n_rows}{better}.",)
+
+
 def collapsed_note(shapes: Ragged) -> tuple[str, ...]:
     """Says so where flatness was bought with edges that have all but vanished."""
     length, mean = edge_lengths(shapes), mean_edges(shapes)
@@ -265,33 +316,30 @@ def collapsed_note(shapes: Ragged) -> tuple[str, ...]:
     )
 
 
-def _crossing_note(crossing: Bools, weights: Weights, kind: str) -> tuple[str, ...]:
+def _crossing_note(crossing: Bools) -> tuple[str, ...]:
     count = int(crossing.sum())
     if not count:
         return ()
-    less = "less weight on surface, for " if weights.surface else ""
-    quads = "" if kind == "quad" else "quads, which seldom do, or for "
     return (
-        f"Watertight panels whose outline crosses itself: {count}; ask for {less}{quads}split panels, which"
-        " cannot.",
+        f"Watertight panels whose outline crosses itself: {count}; ask for another pattern, for smaller"
+        " cells, or for split panels, which cannot.",
     )
 
 
-def _far_note(away: Floats, weights: Weights, kind: str) -> tuple[str, ...]:
+def _far_note(away: Floats, weights: Weights, cure: str = "smaller cells stay nearer") -> tuple[str, ...]:
     """away: (p,) distances of the corners from the surface / mean edge."""
     if away.max(initial=0.0) <= FAR:
         return ()
-    flat_quads = kind == "quad" and weights.planarity > 0
-    ways = []
-    if weights.surface < HOLD:
-        cost = "in waves where flat quads do not follow it" if flat_quads else "with less even shapes"
-        ways.append(f"a weight of {HOLD:g} on surface holds them nearer, {cost}; ")
-    if flat_quads:
-        ways.append("quads that need not be flat (planarity 0, surface 1) follow it smoothly; ")
     return (
         f"Watertight panels leave the surface by up to {away.max():.0%} of their mean edge,"
-        f" {away.mean():.0%} on average; {''.join(ways)}split panels stay beside it.",
+        f" {away.mean():.0%} on average; {cure}, and split panels stay beside it.",
     )
+
+
+def _pulled_note(away: Floats, weights: Weights) -> tuple[str, ...]:
+    """The same of the energies, whose weight of the surface is the user's."""
+    nearer = f"a weight of {HOLD:g} on surface holds them nearer, with less even shapes"
+    return _far_note(away, weights, nearer if weights.surface < HOLD else "other weights may hold them")
 
 
 def _limits(

@@ -16,6 +16,7 @@ from hexwrap_solver.panels.halfedges import HalfEdges, half_edges
 from hexwrap_solver.panels.overlap import overlapping_pairs
 from hexwrap_solver.panels.polygons import (
     best_plane_distances,
+    convex,
     edge_lengths,
     fan_areas,
     interior_angles,
@@ -64,7 +65,7 @@ def measure(
         gap_normal=between.normal,
         kink=between.kink,
         gaps_over=_count_wide(edges, panels, between.tangential),
-        convex=row_maxima(angle, polygons.offsets) <= np.pi + 1e-9,
+        convex=convex(polygons, panels.normal),
         congruence=congruence_classes(polygons, panels.normal),
         overlaps=_count_overlaps(pattern, edges, panels),
         coverage=float(fan_areas(polygons).sum()) / cell_area,

@@ -38,7 +38,9 @@ class PanelSettings:
     """How panels are rationalized (paper, section 5).
 
     sizes: fewer where more would be alike; ``fewest``: as few as leave no joint wider than ``max_gap``; None:
-    one length per panel. size_cost: ``area`` (least uncovered area) or ``worst`` (least greatest loss).
+    one length per panel. method: ``exact`` is the closed form of split panels, and the nearest flat faces of
+    watertight ones, unless weights are given; ``energy`` minimises the functionals with their weights.
+    size_cost: ``area`` (least uncovered area) or ``worst`` (least greatest loss).
     Raises SettingError for an ``edge_range`` out of order.
     """
 
@@ -71,7 +73,7 @@ class PanelSettings:
         float, Setting("least width left open between neighbouring panels", ge=0, unit="length")
     ] = 0.0
     method: Annotated[
-        Literal["exact", "energy"], Setting("closed forms, or minimized energies", rare=True)
+        Literal["exact", "energy"], Setting("exact shapes, or minimized energies", rare=True)
     ] = "exact"
     weights: Annotated[Weights, Setting("weights of the energies", rare=True)] = Weights()
     increment: Annotated[
@@ -147,8 +149,9 @@ class Panels:
     quantization. center, normal: (q, 3). whole: (q,). class_length, class_count, class_sides: (s,) the size
     classes, ascending for each kind of cell, the kind with most sides first, and after them the regular
     panels with another number of sides (around singularities), a class each; n_special of those. trade_off:
-    None where sizes make no sense. energy: (steps,) value of the weighted energy, None for method ``exact``.
-    outside: panels whose limit lies below the allowed ``edge_range``. max_gap: widest joint wanted.
+    None where sizes make no sense. energy: (steps,) value of the weighted energy, None for split panels of
+    method ``exact``. outside: panels whose limit lies below the allowed ``edge_range``. max_gap: widest joint
+    wanted.
     """
 
     mode: Literal["split", "watertight"]
