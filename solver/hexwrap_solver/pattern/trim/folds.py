@@ -140,7 +140,7 @@ def sewn(lattice: Lattice, cells: Cells, seam: Seams) -> Cells:
     one, other = open_side[two[facing]].T
     twin = cells.twin.copy()
     twin[one], twin[other] = other, one
-    return Cells(Ragged(corner, cells.corner.offsets), isometry, twin)
+    return Cells(Ragged(corner, cells.corner.offsets), isometry, twin, cells.index)
 
 
 def without_ends(lattice: Lattice, cells: Cells) -> tuple[Cells, Bools]:
@@ -164,4 +164,4 @@ def without_ends(lattice: Lattice, cells: Cells) -> tuple[Cells, Bools]:
         frame = lattice.invert(isometry[offsets[row]])  # the first corner may have gone
         corner = Ragged(cells.corner.values[keep], offsets)
         twin = np.where(twin >= 0, renumber[twin], -1)
-        cells = Cells(corner, lattice.compose(frame, isometry), twin)
+        cells = Cells(corner, lattice.compose(frame, isometry), twin, cells.index)
