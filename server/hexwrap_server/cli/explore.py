@@ -166,7 +166,7 @@ def print_front(console: Console, name: str, result: dict[str, Any]) -> None:
     """The front as a table, the proposed one marked."""
     table = Table(title=name or "front", title_justify="left", title_style="bold", box=None, pad_edge=False)
     heads = ("no.", "boundary", "singular", "edge", "sizes", "uncovered", "panels", "types", "joint", "cost")
-    for head in (*heads, ""):
+    for head in heads:
         table.add_column(head, justify="right", no_wrap=True)
     order = sorted(result["front"], key=lambda i: result["variants"][i]["measured"]["uncovered"])
     for i in order:
@@ -177,11 +177,12 @@ def print_front(console: Console, name: str, result: dict[str, Any]) -> None:
         )
         size = f"{edge:g}" if edge != "" else f"{around} around" if around != "" else "default"
         gap = "" if found["gap_max"] is None else length(found["gap_max"])
-        row = [str(i), boundary, str(count), size, str(sizes), f"{found['uncovered']:.2%}"]
-        row += [str(found["panels"]), str(found["types"]), gap, f"{found['cost']:,.0f}"]
-        table.add_row(
-            *row, "proposed" if i == result["best"] else "", style="bold" if i == result["best"] else ""
-        )
+        is_best = i == result["best"]
+        row = [f"* {i}" if is_best else str(i), boundary, str(count), size, str(sizes)]
+        row += [f"{found['uncovered']:.2%}", str(found["panels"]), str(found["types"]), gap]
+        table.add_row(*row, f"{found['cost']:,.0f}", style="bold" if is_best else "")
     console.print(table)
+    if result["best"] is not None:
+        console.print(f"* no. {result['best']} is proposed", highlight=False)
     for note in result["notes"]:
         console.print(f"• {note}", highlight=False)

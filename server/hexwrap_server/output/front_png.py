@@ -55,7 +55,8 @@ def front_png(result: dict[str, Any]) -> bytes:
         )  # fmt: skip
     figure.colorbar(found, ax=axes, label="types")
     axes.set_yscale("log")
-    axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    for formatted in (axes.yaxis.set_major_formatter, axes.yaxis.set_minor_formatter):
+        formatted(lambda value, _: f"{value:g}")
     axes.xaxis.set_major_formatter(lambda value, _: f"{value:,.0f}")
     axes.set(xlabel="cost", ylabel="uncovered, % of the cells")
     name = variants[0]["request"].get("name") if variants else ""
