@@ -25,6 +25,7 @@ from hexwrap_solver.panels.polygons import (
 from hexwrap_solver.panels.types import Panels, Quality
 from hexwrap_solver.pattern.types import Pattern
 from hexwrap_solver.surface.types import Surface
+from hexwrap_solver.tolerances import ANGLE, TINY
 
 #: A smaller share of the surface without cells is not worth a note.
 BARE = 0.03
@@ -63,7 +64,7 @@ def measure(
         gap_normal=between.normal,
         kink=between.kink,
         gaps_over=_count_wide(edges, panels, between.tangential),
-        convex=row_maxima(angle, polygons.offsets) <= np.pi + 1e-9,
+        convex=row_maxima(angle, polygons.offsets) <= np.pi + ANGLE,
         congruence=congruence_classes(polygons, panels.normal),
         overlaps=_count_overlaps(pattern, edges, panels),
         coverage=float(fan_areas(polygons).sum()) / cell_area,
@@ -130,4 +131,4 @@ def stretch_ratio(cmap: ConformalMap) -> tuple[Floats, Floats]:
     dx = w1 / x
     dy = (w2 - a * dx) / h
     conformal, anti = np.abs(dx - 1j * dy) / 2, np.abs(dx + 1j * dy) / 2
-    return (conformal + anti) / np.maximum(np.abs(conformal - anti), 1e-300), double_area / 2
+    return (conformal + anti) / np.maximum(np.abs(conformal - anti), TINY), double_area / 2
