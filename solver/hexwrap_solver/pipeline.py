@@ -22,9 +22,9 @@ from hexwrap_solver.panels.types import Components, ComponentSettings, Panels, P
 from hexwrap_solver.pattern import lay_pattern
 from hexwrap_solver.pattern.types import Pattern, PatternSettings
 from hexwrap_solver.setting import Setting
-from hexwrap_solver.singularities.outlook import outlook
-from hexwrap_solver.singularities.solve import closed_map, needs_singularities, seated
-from hexwrap_solver.singularities.types import SingularitySettings
+from hexwrap_solver.singularities.outlook import outlook, outlook_note
+from hexwrap_solver.singularities.solve import SIZES, closed_map, needs_singularities, seated
+from hexwrap_solver.singularities.types import Choices, SingularitySettings
 from hexwrap_solver.surface.types import Surface
 from hexwrap_solver.threads import one_blas_thread
 
@@ -105,11 +105,12 @@ def _solve(
     take_in: Callable[[], Surface], settings: SolveSettings, run: StageRunner, source: Any
 ) -> Solution:
     pattern, panels = settings.pattern, settings.panels
-    boundary = settings.boundary.adapted(pattern.kind if pattern else None)
-    surface = run("surface", source, lambda progress: take_in())
-    cmap = _map(surface, settings, boundary, run)
+    cmap, choices = mapped(take_in, settings, run, source=source)
     if pattern is None:
-        return Solution(cmap, run("quality", None, lambda progress: measure(cmap, None, None)))
+        return Solution(
+            cmap,
+            run("quality", None, lambda progress: replace(measure(cmap, None, None), singularities=choices)),
+        )
     laid = run("pattern", pattern, lambda progress: lay_pattern(cmap, pattern, progress))
     made, wanted = None, None
     if panels is not None:
@@ -117,7 +118,7 @@ def _solve(
         fitted = run("fit", FitKey.of(panels), lambda progress: fit_panels(cmap, laid, panels, progress))
         made = run("panels", SizeKey.of(panels), lambda progress: quantize(fitted, panels))
         wanted = panels.components or (ComponentSettings() if settings.support else None)
-    quality = run("quality", None, lambda progress: _measured(cmap, laid, made, panels, progress))
+    quality = run("quality", None, lambda progress: _measured(cmap, laid, made, panels, choices, progress))
     parts, frame = None, None
     if made is not None and wanted is not None:
         parts = run("components", wanted, lambda progress: make_components(made, wanted))
@@ -127,44 +128,62 @@ def _solve(
     return Solution(cmap, quality, laid, made, parts, frame)
 
 
+def mapped(
+    take_in: Callable[[], Surface], settings: SolveSettings, run: StageRunner, *, source: Any = None
+) -> tuple[ConformalMap, Choices | None]:
+    """The first stages alone, as ``solve`` runs them. Raises HexwrapError."""
+    pattern = settings.pattern
+    surface = run("surface", source, lambda progress: take_in())
+    return _map(surface, settings, settings.boundary.adapted(pattern.kind if pattern else None), run)
+
+
 def _measured(
     cmap: ConformalMap,
     laid: Pattern,
     made: Panels | None,
     settings: PanelSettings | None,
+    choices: Choices | None,
     progress: Progress,
 ) -> Quality:
-    """With a note where singularities would bring much."""
-    quality = measure(cmap, laid, made, progress)
+    """With what other numbers of singularities would leave open, and a note where they would bring much."""
+    quality = replace(measure(cmap, laid, made, progress), singularities=choices)
     if made is None or settings is None or made.mode == "watertight" or not isinstance(settings.sizes, int):
         return quality
-    more = outlook(cmap, laid, settings.sizes, 1 - quality.coverage)
-    return replace(quality, notes=(*quality.notes, *more))
+    left = 1 - quality.coverage
+    if choices is not None:
+        return replace(quality, singularities=choices.with_measured(left))
+    choices = outlook(cmap, laid, settings.sizes, left)
+    if choices is None:
+        return quality
+    return replace(quality, singularities=choices, notes=(*quality.notes, *outlook_note(laid, choices)))
 
 
 def _map(
     surface: Surface, settings: SolveSettings, boundary: BoundaryCondition, run: StageRunner
-) -> ConformalMap:
-    """With singularities where they are asked for, or needed."""
+) -> tuple[ConformalMap, Choices | None]:
+    """With singularities where they are asked for, or needed; and what one may choose from then."""
     asked, pattern = settings.singularities, settings.pattern
     if asked is None and needs_singularities(surface, boundary):
         asked = SingularitySettings("auto")
     if asked is None or (asked.count in (None, 0) and not asked.at):
         make = best_boundary_map if boundary.mode == "auto" else conformal_map
-        return run("map", boundary, lambda progress: make(surface, boundary, progress))
+        return run("map", boundary, lambda progress: make(surface, boundary, progress)), None
     if boundary.mode == "auto":  # ends that are free take up what singularities need
         boundary = replace(boundary, mode="isometric")
     wanted = asked
     sizes = settings.panels.sizes if settings.panels is not None else None
-    classes = sizes if isinstance(sizes, int) else None
+    # where they stand is not chosen for the sizes then: variants with other sizes share the map
+    classes = sizes if isinstance(sizes, int) and not asked.at else None
     shape = None if pattern is None else replace(pattern, phase=(0.0, 0.0), max_cells=0)
     seats = run(
         "singularities",
         (wanted, boundary, shape, classes),
         lambda progress: seated(surface, boundary, wanted, pattern, classes, progress),
     )
-    return run(
+    cmap = run(
         "map",
         boundary,
         lambda progress: closed_map(surface, seats.frame, seats.placing, boundary, progress),
     )
+    placing = seats.placing
+    return cmap, Choices.of(placing.proposals, placing.chosen, classes or SIZES, surface.vertices)

@@ -128,6 +128,9 @@ def refusal(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[i
         (["--around", "many"], "--around"),
         (["--edge-range", "2", "1"], "min ≤ max"),
         (["--angle", "12"], "give VERTEX=ANGLE or X,Y,Z=ANGLE"),
+        (["--at", "1,2=1"], "give VERTEX=INDEX or X,Y,Z=INDEX"),
+        (["--only", "3=1"], "give X,Y,Z=RADIUS"),
+        (["--keep-off", "1,2,3;4=1"], "give X,Y,Z;X,Y,Z=DISTANCE"),
         (["--around", "8", "--edge-length", "2"], "give either 'around' or 'edge_length'"),
         (["-o", "x.docx"], "ending must be one of"),
         (["-o", "no/such/folder/x.obj"], "does not exist"),
@@ -199,6 +202,19 @@ def test_values_may_begin_with_a_minus() -> None:
     assert [(entry.loop, entry.mode) for entry in asked.wanted.boundary.loops] == [(1, "isometric")]
     assert asked.wanted.pattern is not None
     assert asked.wanted.pattern.phase == (-1e-3, -2)
+
+
+def test_rules_for_singularities() -> None:
+    words = ["--singularities", "3", "--at", "17=-1", "--at", "-1,2,3=1", "--symmetric"]
+    words += ["--keep-off", "-1,0,0;1,0,2.5;1,1,1=1.5", "--keep-off", "4,4,4=3", "--only", "0,0,1=2"]
+    asked = task("sample:tower", make_parser().parse_args(["solve", "sample:tower", "-o", "x.obj", *words]))
+    found = asked.wanted.singularities
+    assert found is not None
+    assert (found.count, found.symmetric) == (3, True)
+    assert [(one.vertex, one.point, one.index) for one in found.at] == [(17, None, -1), (None, (-1, 2, 3), 1)]
+    lines = [(one.line, one.distance) for one in found.keep_off]
+    assert lines == [(((-1, 0, 0), (1, 0, 2.5), (1, 1, 1)), 1.5), (((4, 4, 4),), 3)]
+    assert [(one.point, one.radius) for one in found.only] == [((0, 0, 1), 2)]
 
 
 def test_an_output_that_is_a_folder_is_refused_before_the_work(

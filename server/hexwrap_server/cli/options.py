@@ -55,7 +55,7 @@ class Option:
         """What it does, with its default."""
         text, default = self.leaf.setting.help, self.leaf.default
         if self.leaf.is_list:
-            return f"{text}; PLACE is the number of a {self.leaf.entry[0]} or X,Y,Z (any number of times)"
+            return f"{text}; PLACE is {_places(self.leaf)} (any number of times)"
         if self.is_first:
             text += "; 'none' leaves it out"
         if default is None or default is False or default == "":
@@ -87,7 +87,7 @@ def add_request_options(parser: argparse.ArgumentParser) -> None:
         common: dict[str, Any] = {"dest": option.name, "default": argparse.SUPPRESS, "help": option.help}
         if option.leaf.is_list:
             group.add_argument(
-                option.flag, action="append", metavar=f"PLACE={option.leaf.entry[1].upper()}", **common
+                option.flag, action="append", metavar=f"PLACE={option.leaf.entry[-1].upper()}", **common
             )
         elif option.leaf.default is False:
             group.add_argument(option.flag, action="store_true", **common)
@@ -185,18 +185,30 @@ def _value(text: str) -> object:
     return text
 
 
+def _places(leaf: Leaf) -> str:
+    """How an entry of a list names its place."""
+    number, points, _ = leaf.entry
+    ways = [] if number is None else [f"the number of a {number}"]
+    return " or ".join([*ways, "X,Y,Z;X,Y,Z;…" if points == "line" else "X,Y,Z"])
+
+
 def _entry(option: Option, text: str) -> dict[str, object]:
     """An entry of a list: a place, and what is wanted there."""
-    name, wanted = option.leaf.entry
-    what = wanted.upper()
-    place, sign, number = text.rpartition("=")
-    parts = place.split(",")
-    if not sign or len(parts) not in (1, 3):
+    number, points, wanted = option.leaf.entry
+    place, sign, value = text.rpartition("=")
+    parts = [part.split(",") for part in place.split(";")]
+    asked = {wanted: _value(value)}
+    if sign and number is not None and len(parts) == 1 and len(parts[0]) == 1:
+        return {number: _value(place), **asked}
+    if not sign or any(len(part) != 3 for part in parts) or (len(parts) > 1 and points != "line"):
+        ways = [] if number is None else [number.upper()]
+        ways.append("X,Y,Z;X,Y,Z" if points == "line" else "X,Y,Z")
         raise FormError.at(
-            pointer(option.path), f"{option.flag} {text}: give {name.upper()}={what} or X,Y,Z={what}"
+            pointer(option.path),
+            f"{option.flag} {text}: give {' or '.join(f'{way}={wanted.upper()}' for way in ways)}",
         )
-    where = {name: _value(place)} if len(parts) == 1 else {"point": [_value(part) for part in parts]}
-    return {**where, wanted: _value(number)}
+    line = [[_value(x) for x in part] for part in parts]
+    return {points: line if points == "line" else line[0], **asked}
 
 
 def _put(body: dict[str, Any], path: Path, value: object) -> None:

@@ -43,6 +43,8 @@ def print_summary(console: Console, name: str, result: dict[str, Any]) -> None:
         console.print(_sizes(result["sizes"]))
         if result["quality"]["trade_off"]:
             console.print(_trade_off(result["quality"]["trade_off"], len(result["sizes"])))
+    if result["quality"].get("singularity_curve"):
+        console.print(_curve(result["quality"]["singularity_curve"]))
     for note in (*result["mesh"]["repairs"], *result["quality"]["notes"]):
         console.print(Text(f"• {note}"))
 
@@ -99,6 +101,11 @@ def _quality(result: dict[str, Any]) -> Rows:
     if found["gap"]["over"] is not None:
         yield "wider than wanted", f"{found['gap']['over']} panels"
     yield "off the surface", f"at most {_length(found['surface_distance']['max'])}"
+    if result["panels"]["mode"] == "watertight":
+        yield "moved", f"at most {_length(found['movement'])}"
+        yield "convex", f"{found['convex']:.1%}"
+        if found["kink"]["max"] is not None:
+            yield "kinks", f"at most {angle(found['kink']['max'])}"
 
 
 def _trade_off(curve: dict[str, Any], taken: int) -> Table:
@@ -115,6 +122,22 @@ def _trade_off(curve: dict[str, Any], taken: int) -> Table:
         joints = [length(curve[key][i]) for key in ("joint_mean", "joint_max")]
         bar = Text("▒" * max(1, round(BAR * uncovered / most)), style="bold" if sizes == taken else "dim")
         table.add_row(str(sizes), f"{uncovered:.2%}", *joints, bar)
+    return table
+
+
+def _curve(found: dict[str, Any]) -> Table:
+    """What fewer or more singularities would leave open."""
+    table = Table(box=None, pad_edge=False)
+    table.add_column("singularities", justify="right")
+    table.add_column(f"uncovered, {found['sizes']} sizes", justify="right")
+    table.add_column("largest / smallest cell", justify="right")
+    table.add_column("")
+    most = max(*found["uncovered"], 1e-12)
+    for i, number in enumerate(found["number"]):
+        uncovered, taken = found["uncovered"][i], i == found["taken"]
+        bar = Text("▒" * max(1, round(BAR * uncovered / most)), style="bold" if taken else "dim")
+        about = "" if taken else "about "
+        table.add_row(str(number), f"{about}{uncovered:.2%}", f"{found['scale_ratio'][i]:.2f}", bar)
     return table
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from hexwrap_server.http.schema_words import NUMBER, PLANE, POINT, listed, nullable, record
+from hexwrap_solver.pattern.lattice import LATTICES
 
 _INDEX = {"type": "integer", "minimum": 0}
 _COUNT = _INDEX
@@ -12,7 +13,7 @@ _INTEGER = {"type": "integer"}
 _TEXT = {"type": "string"}
 _TRUTH = {"type": "boolean"}
 _MEASURE = nullable(NUMBER)  # null where nothing was measured
-_KIND = {"enum": ["hex", "triangle", "quad"]}
+_KIND = {"enum": list(LATTICES)}
 
 
 def _all(**properties: Any) -> dict[str, Any]:
@@ -41,6 +42,7 @@ _MAP = _all(
     iterations=_COUNT,
     residual=NUMBER,
     flips=_COUNT,
+    apart=nullable(_all(face=listed(_INDEX), cell=nullable(listed(_INDEX)), shift=listed(PLANE))),
 )
 _PATTERN = _all(
     kind=_KIND,
@@ -73,6 +75,15 @@ _SIZE = _all(
     sides=_COUNT,
     color=_TEXT | {"pattern": "^#[0-9a-fA-F]{6}$"},
 )
+_CURVE = _all(
+    sizes=_COUNT,
+    taken=_INDEX,
+    coarse=_TRUTH,
+    number=listed(_COUNT),
+    uncovered=listed(NUMBER),
+    scale_ratio=listed(NUMBER),
+    at=listed(listed(_all(point=POINT, index=_INTEGER))),
+)
 _QUALITY = _all(
     scale_ratio=NUMBER,
     quasi_conformal=_all(mean=NUMBER, max=NUMBER),
@@ -85,9 +96,13 @@ _QUALITY = _all(
         normal=_all(mean=_MEASURE, max=_MEASURE),
         over=nullable(_COUNT),
     ),
+    kink=_all(mean=_MEASURE, max=_MEASURE),
+    convex=_MEASURE,
+    movement=NUMBER,
     overlaps=nullable(_COUNT),
     coverage=_MEASURE,
     distinct_panels=_COUNT,
+    singularity_curve=nullable(_CURVE),
     notes=listed(_TEXT),
 )
 #: The parts that ``?include=`` picks, by default all.

@@ -19,7 +19,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fin
 
 from hexwrap_server.errors import FormError
 from hexwrap_server.input.faults import Path, faults, pointer
-from hexwrap_server.input.requests import Wanted
+from hexwrap_server.input.requests import Exploration, Wanted
 from hexwrap_solver.conformal.types import ANGLE_UNITS
 from hexwrap_solver.setting import Setting
 from hexwrap_solver.surface.checks import LARGEST, SMALLEST
@@ -32,6 +32,13 @@ class Body(Wanted):
     """Everything of a request but the arrays of its surface."""
 
     name: Annotated[str, Setting("name of the job, the title of pictures and drawings", most=200)] = ""
+
+
+@dataclass(frozen=True)
+class ExploreBody(Exploration):
+    """The same of an exploration."""
+
+    name: Annotated[str, Setting("name of the job", most=200)] = ""
 
 
 @dataclass(frozen=True)
@@ -61,12 +68,16 @@ class Leaf:
         return any(get_args(part)[-1:] == (...,) for part in _parts(self.annotation))
 
     @property
-    def entry(self) -> tuple[str, str]:
-        """Of the entries of such a list: the field that numbers their place, and the one that says what is
-        wanted there, which has no default."""
+    def entry(self) -> tuple[str | None, str, str]:
+        """Of the entries of such a list: the field that numbers their place, if any; the one that gives it by
+        a point or a line of points; and the one that says what is wanted there."""
         (section,) = (get_args(part)[0] for part in _parts(self.annotation))
-        place = next(leaf.path[0] for leaf in leaves(section) if int in _parts(leaf.annotation))
-        return place, next(f.name for f in fields(section) if f.default is MISSING)
+        hints = get_type_hints(section, include_extras=True)
+        number = next(
+            (f.name for f in fields(section) if f.default is None and int in _parts(hints[f.name])), None
+        )
+        points = "line" if "line" in hints else "point"
+        return number, points, next(f.name for f in fields(section) if f.name not in (number, points))
 
     @property
     def numbers(self) -> int:

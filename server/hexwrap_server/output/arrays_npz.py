@@ -35,8 +35,12 @@ def result_npz(solution: Solution, meta: Meta) -> bytes:
         arrays |= _components(solution.components)
     if solution.support is not None:
         arrays |= _support(solution.support)
+    found = solution.quality.singularities
+    if found is not None:
+        curve = {"number": found.number, "uncovered": found.uncovered, "taken": np.array(found.taken)}
+        arrays |= {f"quality.singularity_curve.{key}": value for key, value in curve.items()}
     for key, value in vars(solution.quality).items():
-        if value is not None:
+        if value is not None and value is not found:
             arrays[f"quality.{key}"] = np.asarray(value)
     out = io.BytesIO()
     np.savez_compressed(out, allow_pickle=False, **arrays)

@@ -7,13 +7,16 @@ its Hessian at the solution without singularities tells what any of them would d
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
+from scipy.spatial.distance import cdist
 
-from hexwrap_solver.arrays import Bools, Floats, Ints
+from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged
 from hexwrap_solver.conformal.energy import Energy
 from hexwrap_solver.conformal.fixed import minimise
 from hexwrap_solver.conformal.types import Targets
@@ -28,15 +31,48 @@ BLOCK = 128
 
 
 @dataclass(frozen=True)
+class Steepness:
+    """pairs: (k, 2) neighbouring patches. inverse: (k,) inverse distances between their middles. share: how
+    pairs add up to patches, a sparse (p, k) matrix. The mean squared slope of a linear function towards the
+    neighbours is half its squared gradient."""
+
+    pairs: Ints
+    inverse: Floats
+    share: csr_array
+
+    def of(self, u: Floats) -> Floats:
+        """(p, …) norm of the gradient of functions u (p, …)."""
+        one, other = self.pairs.T
+        slope = ((u[one] - u[other]).T * self.inverse).T
+        return np.asarray(np.sqrt(2 * (self.share @ slope**2)))
+
+    @classmethod
+    def between(cls, surface: Surface, patch: Ints, middle: Floats) -> Steepness:
+        """middle: (p, 3) centres of the patches."""
+        one, other = patch[surface.faces].T, patch[np.roll(surface.faces, -1, axis=1)].T
+        edge = np.sort(np.stack([one.ravel(), other.ravel()], axis=1), axis=1)
+        pairs = np.unique(edge[edge[:, 0] != edge[:, 1]], axis=0).reshape(-1, 2)
+        far = np.linalg.norm(middle[pairs[:, 0]] - middle[pairs[:, 1]], axis=1)
+        at, n = np.arange(len(pairs)), len(middle)
+        degree = np.maximum(np.bincount(pairs.ravel(), minlength=n), 1)
+        row = pairs.T.ravel()
+        share = csr_array((1.0 / degree[row], (row, np.concatenate([at, at]))), shape=(n, len(pairs)))
+        return cls(pairs, 1 / np.maximum(far, 1e-300), share)
+
+
+@dataclass(frozen=True)
 class Model:
     """Mean u of every patch: reference + response @ k + loop_response @ dK.
 
     seat: (q,) mesh vertices on which a singularity may stand. place: (q, 3). weight: (p,) the patches'
     shares of the area. reference: (p,). response: (p, q), per k = 1. loop_response: (p, f), per quantum
     more on each free loop but the first, which takes what is left. free: indices of the free loops. loops:
-    per loop, its curvature in quanta at the reference. total: Σ k wanted where no loop can take a rest,
+    per loop, its curvature in quanta at the reference. steepness: gives |∇u| on the patches. total:
+    Σ k wanted where no loop can take a rest,
     None elsewhere. turn: (q,) for two straight loops on a tube: where seats stand around it, in turns; Σ
-    k·turn quanta is how far the second loop is turned against the first.
+    k·turn quanta is how far the second loop is turned against the first. orbits: per seat all vertices that
+    get a singularity along with it, where places must be symmetric, and member_place: where these are; None:
+    the seat alone.
     """
 
     seat: Ints
@@ -48,7 +84,15 @@ class Model:
     free: tuple[int, ...]
     loops: tuple[int, ...]
     total: int | None
+    steepness: Steepness
     turn: Floats | None = None
+    orbits: Ragged | None = None
+    member_place: Floats | None = None
+
+    @cached_property
+    def size(self) -> Ints:
+        """(q,) singularities per seat."""
+        return np.ones(len(self.seat), dtype=np.int64) if self.orbits is None else self.orbits.lengths
 
 
 def vertex_areas(surface: Surface) -> Floats:
@@ -109,11 +153,13 @@ def linear_model(
     seats: Ints | None = None,
     patches: int = PATCHES,
     steps: bool = True,
+    orbits: Callable[[Ints], list[Ints]] | None = None,
 ) -> Model:
     """One nonlinear solution without singularities, one factorisation, and a solve for every seat.
 
     turn: (n,) see Model. seats: vertices that singularities may stand on; None: as the rules allow. patches:
     about so many. steps: with the nonlinear solution; else the metric of the surface itself stands in.
+    orbits: from seats to lists of vertices that get singularities together.
     """
     turns = round(2 * np.pi / rules.quantum)
     free = tuple(i for i, end in enumerate(rules.ends) if end == "free")
@@ -132,7 +178,9 @@ def linear_model(
     def mean(values: Floats) -> Floats:
         return np.asarray(share @ values)
 
-    seats = seat[_allowed(surface, seat, rules)] if seats is None else seats
+    seats = _seats(surface, seat, rules) if seats is None else seats
+    together = None if orbits is None else _ragged(orbits(seats))
+    seats = seats if together is None else np.asarray(together.values, dtype=np.int64)
     shift = np.zeros(len(seat))
     if not free:  # a singularity takes its curvature from everywhere
         shift = mean(energy.scale_of(factor.solve(energy.reduce(area / area.sum()))))
@@ -143,9 +191,18 @@ def linear_model(
     response -= shift[:, None]
     ties = np.arange(energy.n_dof - max(len(free) - 1, 0), energy.n_dof)
     loop_response = mean(_scales(energy, factor, ties))
+    around = None if turn is None else turn[seats]
+    places = surface.vertices[seats]
+    if together is not None and together.n_rows:
+        first = together.offsets[:-1]
+        response = np.add.reduceat(response, first, axis=1)
+        around = None if around is None else np.add.reduceat(around, first)
+    elif together is not None:
+        response = response[:, :0]
+        around = None if around is None else around[:0]
     return Model(
-        seats,
-        surface.vertices[seats],
+        seats if together is None else seats[together.offsets[:-1]],
+        places if together is None else places[together.offsets[:-1]],
         weight / weight.sum(),
         mean(u),
         rules.quantum * response,
@@ -153,8 +210,17 @@ def linear_model(
         free,
         loops,
         None if free else rest,
-        None if turn is None else turn[seats],
+        Steepness.between(surface, patch, _means(surface.vertices, patch, area)),
+        around,
+        together,
+        None if together is None else places,
     )
+
+
+def _ragged(rows: list[Ints]) -> Ragged:
+    lengths = np.array([len(row) for row in rows], dtype=np.int64)
+    offsets = np.concatenate([[0], np.cumsum(lengths)])
+    return Ragged(np.concatenate([np.zeros(0, dtype=np.int64), *rows]), offsets)
 
 
 def _reference(energy: Energy, steps: bool) -> tuple[Floats, Factorisation]:
@@ -209,6 +275,14 @@ def _means(points: Floats, group: Ints, weight: Floats) -> Floats:
     return np.stack([np.bincount(group, weight * x) / total for x in points.T], axis=1)
 
 
+def _seats(surface: Surface, seat: Ints, rules: Rules) -> Ints:
+    """Of the patches' middles, and the vertices next to the middles of balls, those that the rules leave."""
+    if rules.only is not None:  # a ball may be smaller than a patch
+        near = np.asarray(cKDTree(surface.vertices).query(rules.only[:, :3])[1], dtype=np.int64)
+        seat = np.concatenate([seat, np.setdiff1d(near, seat)])
+    return np.asarray(seat[_allowed(surface, seat, rules)])
+
+
 def _allowed(surface: Surface, seat: Ints, rules: Rules) -> Bools:
     """Which seats the rules leave."""
     place = surface.vertices[seat]
@@ -216,8 +290,23 @@ def _allowed(surface: Surface, seat: Ints, rules: Rules) -> Bools:
     for loop in surface.loops:
         allowed &= cKDTree(surface.vertices[loop]).query(place)[0] >= rules.from_loops * rules.cell
         allowed &= ~np.isin(seat, loop)
-    if rules.away is not None and len(rules.away):
-        allowed &= cKDTree(rules.away).query(place)[0] >= rules.from_away * rules.cell
-    if rules.only is not None and len(rules.only):
-        allowed &= cKDTree(rules.only).query(place)[0] <= rules.cell
+    for line, cells in rules.away:
+        allowed &= distance_to(place, line) >= cells * rules.cell
+    if rules.only is not None:
+        allowed &= (cdist(place, rules.only[:, :3]) <= rules.only[:, 3]).any(axis=1)
     return allowed
+
+
+def distance_to(place: Floats, line: Floats) -> Floats:
+    """(q,) of points (q, 3) from a polyline (k, 3), or from its one point."""
+    start, end = (line[:-1], line[1:]) if len(line) > 1 else (line, line)
+    along = end - start
+    square = np.maximum((along**2).sum(axis=1), 1e-300)
+    least = np.full(len(place), np.inf)
+    for a, step, length in zip(
+        *(np.array_split(part, range(256, len(start), 256)) for part in (start, along, square)), strict=True
+    ):
+        off = place[:, None] - a
+        t = np.clip((off * step).sum(axis=2) / length, 0, 1)
+        least = np.minimum(least, np.linalg.norm(off - t[:, :, None] * step, axis=2).min(axis=1))
+    return least

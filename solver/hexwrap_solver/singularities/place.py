@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -12,21 +13,25 @@ from hexwrap_solver.arrays import Floats, Ints
 from hexwrap_solver.errors import SingularitiesError
 from hexwrap_solver.singularities.linear import linear_model
 from hexwrap_solver.singularities.search import Search, State, curve
+from hexwrap_solver.singularities.symmetry import OFF, Group, orbits, symmetries
 from hexwrap_solver.singularities.types import Proposal, Rules, SingularityAt
 from hexwrap_solver.surface.types import Surface
 
 #: Share of the area that one more singularity must be worth, and the part of what is uncovered without any
 #: that all of them together must save.
 WORTH, CLEARLY = 0.002, 0.25
+#: Groups of symmetries that are tried.
+GROUPS = 5
 
 
 @dataclass(frozen=True)
 class Placing:
     """proposals: the best with each number of singularities that is possible, ascending. chosen: index of
-    the one to take."""
+    the one to take. symmetry: of the surface, which they keep to; empty where that is not asked for."""
 
     proposals: tuple[Proposal, ...]
     chosen: int
+    symmetry: str = ""
 
     @property
     def proposal(self) -> Proposal:
@@ -41,13 +46,48 @@ def place(
 
     turn: see ``linear.Model``. Raises SingularitiesError where no number is possible.
     """
-    proposals = curve(Search(linear_model(surface, rules, turn), rules))
+    proposals, symmetry = (
+        _symmetric(surface, rules, turn) if rules.symmetric else (_curve(surface, rules, turn), "")
+    )
     if not proposals:
         raise SingularitiesError(
             f"No {rules.most} singularities or fewer can make the angles of this surface add up, "
             f"{_told(rules)}, and keep the distances asked for: allow more."
         )
-    return Placing(tuple(proposals), _choice(proposals, count))
+    return Placing(tuple(proposals), _choice(proposals, count), symmetry)
+
+
+def _curve(surface: Surface, rules: Rules, turn: Floats | None, group: Group | None = None) -> list[Proposal]:
+    """Raises SingularitiesError where rules that are asked for leave no place."""
+    kept = None if group is None else partial(orbits, surface, group=group, rules=rules)
+    model = linear_model(surface, rules, turn, orbits=kept)
+    if not len(model.seat) and (rules.away or rules.only is not None):
+        raise SingularitiesError(
+            "The rules leave no place for a singularity: it would have to stand "
+            f"{rules.from_loops:g} cells from the boundary (a cell is {rules.cell:.3g} wide), off the lines "
+            "named in keep_off and the creases, and inside the balls of only. Ask for less.",
+            field=("singularities",),
+        )
+    return curve(Search(model, rules))
+
+
+def _symmetric(surface: Surface, rules: Rules, turn: Floats | None) -> tuple[list[Proposal], str]:
+    """The best for each number among all symmetries of the surface, and what these are. Raises
+    SingularitiesError where it has none."""
+    groups = symmetries(surface, rules.cell)[:GROUPS]
+    if not groups:
+        raise SingularitiesError(
+            "Singularities are to stand symmetrically, but no mirror plane and no axis carries this surface "
+            f"to itself within {OFF:g} cells: leave 'symmetric' out.",
+            field=("singularities", "symmetric"),
+        )
+    best: dict[int, Proposal] = {}
+    for group in groups:
+        for one in _curve(surface, rules, turn, group):
+            if one.count not in best or one.uncovered < best[one.count].uncovered:
+                best[one.count] = one
+    names = list(dict.fromkeys(group.name for group in groups))
+    return [best[number] for number in sorted(best)], ", ".join(names)
 
 
 def _choice(proposals: list[Proposal], count: int | Literal["auto"]) -> int:
@@ -63,13 +103,12 @@ def _choice(proposals: list[Proposal], count: int | Literal["auto"]) -> int:
                 field=("singularities", "count"),
             )
         return int(possible[np.argmin(uncovered[possible])])
-    return chosen_of(proposals)
+    return number_of(uncovered, number)
 
 
-def chosen_of(proposals: list[Proposal]) -> int:
-    """As many as pay."""
-    uncovered = np.array([one.uncovered for one in proposals])
-    best = int(np.argmin(uncovered + WORTH * np.array([one.count for one in proposals])))
+def number_of(uncovered: Floats, number: Ints) -> int:
+    """Index of as many as pay."""
+    best = int(np.argmin(uncovered + WORTH * number))
     return best if uncovered[best] <= (1 - CLEARLY) * uncovered[0] else 0
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hexwrap_solver.arrays import Bools, Floats, Ints
-from hexwrap_solver.geometry import angles_between, dot
+from hexwrap_solver.geometry import dot
 from hexwrap_solver.surface.topology import half_edges, next_half_edge, twins
 
 #: Flips to Delaunay end long before on meshes that are not torture.
@@ -34,46 +34,76 @@ def diagonal(faces: Ints, h: Ints, twin: Ints) -> tuple[Ints, Ints]:
 def joins_new(faces: Ints, h: Ints, twin: Ints, n: int) -> Bools:
     """Whether flipping h joins two vertices that neither an edge nor an earlier flip of h joins."""
     c, d = diagonal(faces, h, twin)
-    start, end = half_edges(faces)
     key = np.minimum(c, d) * n + np.maximum(c, d)
-    existing = np.sort(np.minimum(start, end) * n + np.maximum(start, end))
-    taken = existing[np.minimum(np.searchsorted(existing, key), len(existing) - 1)] == key
+    ends = np.zeros(n, dtype=bool)
+    ends[c] = ends[d] = True
+    start, end = half_edges(faces)
+    near = ends[start]
+    near[near] = ends[end[near]]
+    start, end = start[near], end[near]
+    taken = np.isin(key, np.minimum(start, end) * n + np.maximum(start, end))
     once = np.zeros(len(h), dtype=bool)
     once[np.unique(key, return_index=True)[1]] = True
     return np.asarray(~taken & once & (c != d))
 
 
 def flip(faces: Ints, h: Ints, twin: Ints) -> None:
-    """Turns the edges a→b of faces (a, b, c) | (b, a, d) into c–d, in place."""
-    start, end = half_edges(faces)
-    a, b = start[h], end[h]
-    c, d = diagonal(faces, h, twin)
-    faces[h // 3] = np.stack([a, d, c], axis=1)
-    faces[twin[h] // 3] = np.stack([d, b, c], axis=1)
+    """Turns the edges a→b of faces (a, b, c) | (b, a, d) into c–d, in place; no two may touch one face.
+
+    twin: (3m,) brought up to date, too.
+    """
+    corner = faces.ravel()
+    t = twin[h]
+    f, g = h // 3, t // 3
+    bc, ad = next_half_edge(h), next_half_edge(t)
+    ca, db = next_half_edge(bc), next_half_edge(ad)
+    a, b, c, d = corner[h], corner[bc], corner[ca], corner[db]
+    faces[f] = np.stack([a, d, c], axis=1)
+    faces[g] = np.stack([d, b, c], axis=1)
+    old = np.concatenate([ad, ca, db, bc])
+    new = np.concatenate([3 * f, 3 * f + 2, 3 * g, 3 * g + 1])
+    place = np.arange(len(twin))
+    place[old] = new
+    across = twin[old]
+    across = np.where(across >= 0, place[across], -1)
+    twin[new] = across
+    twin[across[across >= 0]] = new[across >= 0]
+    twin[3 * f + 1], twin[3 * g + 2] = 3 * g + 2, 3 * f + 1
 
 
-def flip_to_delaunay(vertices: Floats, faces: Ints, keep: Ints | None = None) -> Ints:
+def flip_to_delaunay(
+    vertices: Floats, faces: Ints, keep: Ints | None = None, around: Bools | None = None
+) -> Ints:
     """Faces over the same vertices in which no two angles opposite to an edge exceed π together.
 
     In space this shortens obtuse pairs of triangles as in the plane, while the mesh bends little over one
-    edge; pairs that would fold are left. keep: (k, 2) pairs of vertices whose edges stay.
+    edge; pairs that would fold are left. keep: (k, 2) pairs of vertices whose edges stay. around: (n,)
+    vertices that have moved or are new since the faces were last Delaunay; None: all.
     """
     faces, n = faces.copy(), len(vertices)
-    kept = None if keep is None else keep.min(axis=1) * n + keep.max(axis=1)
+    kept = None if keep is None or len(keep) == 0 else keep.min(axis=1) * n + keep.max(axis=1)
+    twin = twins(faces, n)
+    changed = np.arange(len(faces)) if around is None else np.flatnonzero(around[faces].any(axis=1))
+    waiting = np.zeros(0, dtype=np.int64)
     for _ in range(ROUNDS):
-        twin = twins(faces, n)
-        h = np.arange(len(twin))
-        h = h[(twin > h)]
+        h = np.concatenate([waiting, 3 * changed, 3 * changed + 1, 3 * changed + 2])
+        h = np.unique(np.minimum(h, twin[h]))
+        h = h[h >= 0]
         if kept is not None:
-            start, end = (side[h] for side in half_edges(faces))
+            start, end = faces.ravel()[h], faces.ravel()[next_half_edge(h)]
             h = h[~np.isin(np.minimum(start, end) * n + np.maximum(start, end), kept)]
         angle = angle_sums_opposite(vertices, faces, h, twin[h])
         order = np.argsort(-angle, kind="stable")
-        h = h[order[: int((angle > np.pi + SLACK).sum())]]
-        h = independent(h[_stays_unfolded(vertices, faces, h, twin)], twin, len(faces))
+        waiting = h[order[: int((angle > np.pi + SLACK).sum())]]
+        h = independent(waiting[_stays_unfolded(vertices, faces, waiting, twin)], twin, len(faces))
         h = h[joins_new(faces, h, twin, n)]
         if len(h) == 0:
             break
+        changed = np.concatenate([h // 3, twin[h] // 3])
+        touched = np.zeros(len(faces), dtype=bool)
+        touched[changed] = True
+        # An edge of a face that changes is looked at again anyway, and its half-edges move.
+        waiting = waiting[~(touched[waiting // 3] | touched[twin[waiting] // 3])]
         flip(faces, h, twin)
     return faces
 
@@ -84,17 +114,28 @@ def angle_sums_opposite(points: Floats, faces: Ints, one: Ints, other: Ints) -> 
 
 
 def _seen_under(points: Floats, faces: Ints, h: Ints) -> Floats:
-    tail, head = half_edges(faces)
-    apex = points[faces.ravel()[next_half_edge(next_half_edge(h))]]
-    a, b = points[tail[h]] - apex, points[head[h]] - apex
-    return angles_between(a, b)
+    corner = faces.ravel()
+    head = next_half_edge(h)
+    apex = points[corner[next_half_edge(head)]]
+    a, b = points[corner[h]] - apex, points[corner[head]] - apex
+    sine, cosine = _cross(a, b), np.einsum("kd,kd->k", a, b)
+    return np.asarray(np.arctan2(np.sqrt(np.einsum("kd,kd->k", sine, sine)), cosine))
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    """(k, 3) cross products, or (k, 1) of vectors in the plane; np.cross takes several times as long."""
+    if a.shape[1] == 2:
+        return np.asarray(a[:, :1] * b[:, 1:] - a[:, 1:] * b[:, :1])
+    x, y, z = a.T
+    u, v, w = b.T
+    return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=1)
 
 
 def _stays_unfolded(vertices: Floats, faces: Ints, h: Ints, twin: Ints) -> Bools:
     """Whether both triangles after the flip look to the same side as the two before together."""
-    start, end = half_edges(faces)
+    corner = faces.ravel()
     c, d = diagonal(faces, h, twin)
-    pa, pb, pc, pd = (vertices[x] for x in (start[h], end[h], c, d))
-    before = np.cross(pb - pa, pc - pa) + np.cross(pa - pb, pd - pb)
-    one, two = np.cross(pd - pa, pc - pa), np.cross(pb - pd, pc - pd)
+    pa, pb, pc, pd = (vertices[x] for x in (corner[h], corner[next_half_edge(h)], c, d))
+    before = _cross(pb - pa, pc - pa) + _cross(pa - pb, pd - pb)
+    one, two = _cross(pd - pa, pc - pa), _cross(pb - pd, pc - pd)
     return np.asarray((dot(one, before) > 0) & (dot(two, before) > 0))

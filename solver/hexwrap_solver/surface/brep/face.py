@@ -17,7 +17,7 @@ from hexwrap_solver.surface.brep.sizes import Field, Sizes, bilinear
 from hexwrap_solver.surface.errors import TrimError
 from hexwrap_solver.surface.flips import flip_to_delaunay, independent
 from hexwrap_solver.surface.mesh_sizes import ROW, cumulated
-from hexwrap_solver.surface.nurbs import evaluate, evaluate_points
+from hexwrap_solver.surface.nurbs import evaluate_points, tangents
 from hexwrap_solver.surface.projection import project
 from hexwrap_solver.surface.topology import edge_lengths, half_edges, sum_rows, twins
 from hexwrap_solver.tolerances import TINY
@@ -232,50 +232,62 @@ def _split_long(patch: Patch, piece: Piece, sizes: Sizes, most: int) -> Piece:
         long = _too_long(patch, piece, sizes)
         if len(long) == 0 or len(piece.points) > most:
             break
+        old = len(piece.points)
         piece = _halved(patch, piece, long)
-        piece = replace(piece, faces=flip_to_delaunay(piece.points, piece.faces, keep=piece.lines))
-        piece = _smoothed(patch, piece)
+        fresh = np.arange(len(piece.points)) >= old
+        piece = replace(piece, faces=flip_to_delaunay(piece.points, piece.faces, piece.lines, fresh))
+        piece = _smoothed(patch, piece, fresh)
     return piece
 
 
-def _smoothed(patch: Patch, piece: Piece) -> Piece:
+def _smoothed(patch: Patch, piece: Piece, fresh: Bools | None = None) -> Piece:
     """Vertices around triangles of small angles move to the middle of their neighbours, on the surface, where
-    that turns no triangle over; then edges are flipped to Delaunay."""
+    that turns no triangle over; then edges are flipped to Delaunay.
+
+    fresh: (n,) vertices beside which triangles have changed; None: all are looked at.
+    """
     n = len(piece.points)
-    poor = piece.faces[_least_angles(piece.points, piece.faces) < SMALL].ravel()
+    faces = piece.faces
+    if fresh is not None:
+        beside = np.zeros(n, dtype=bool)
+        beside[faces[fresh[faces].any(axis=1)]] = True
+        faces = faces[beside[faces].any(axis=1)]
+    poor = faces[_least_angles(piece.points, faces) < SMALL].ravel()
     near = np.zeros(n, dtype=bool)
     near[poor] = True
     near[piece.faces[near[piece.faces].any(axis=1)]] = True
     pole = np.logical_or(*piece.loose.T)
     near[piece.faces[pole[piece.faces].any(axis=1)]] = False
-    move = np.flatnonzero(near & ~piece.fixed)
+    near &= ~piece.fixed
+    move = np.flatnonzero(near)
     if len(move) == 0:
         return piece
-    start, end = half_edges(piece.faces)
+    star = piece.faces[near[piece.faces].any(axis=1)]
+    start, end = half_edges(star)
     count = np.maximum(np.bincount(start, minlength=n), 1)
     middle = sum_rows(piece.points[end], start, n) / count[:, None]
-    jet = evaluate(patch.opened, piece.uv[move])
-    away = middle[move] - jet.point
-    pairs = (jet.du, jet.du), (jet.du, jet.dv), (jet.dv, jet.dv)
-    e, f, g = (dot(a, b) for a, b in pairs)
-    p, q = dot(away, jet.du), dot(away, jet.dv)
+    at, du, dv = tangents(patch.opened, piece.uv[move])
+    away = middle[move] - at
+    e, f, g, p, q = (dot(a, b) for a, b in ((du, du), (du, dv), (dv, dv), (away, du), (away, dv)))
     determinant = np.maximum(e * g - f * f, 1e-12 * np.maximum(e * g, TINY))
     step = np.stack([g * p - f * q, e * q - f * p], axis=1) / determinant[:, None]
     uv, points = piece.uv.copy(), piece.points.copy()
     uv[move] += step
     points[move] = evaluate_points(patch.opened, uv[move])
-    before = _least_angles(piece.points, piece.faces)
-    normal = face_normals(piece.points, piece.faces)
+    allowed = np.minimum(_least_angles(piece.points, star), SMALL) * 0.7
+    normal = face_normals(piece.points, star)
     for _ in range(UNDOINGS):
-        worse = dot(face_normals(points, piece.faces), normal) <= 0
-        worse |= _least_angles(points, piece.faces) < np.minimum(before, SMALL) * 0.7
+        worse = dot(face_normals(points, star), normal) <= 0
+        worse |= _least_angles(points, star) < allowed
         if not worse.any():
             break
-        back = np.unique(piece.faces[worse])
+        back = np.unique(star[worse])
         uv[back], points[back] = piece.uv[back], piece.points[back]
     else:
         return piece
-    return replace(piece, uv=uv, points=points, faces=flip_to_delaunay(points, piece.faces, keep=piece.lines))
+    return replace(
+        piece, uv=uv, points=points, faces=flip_to_delaunay(points, piece.faces, piece.lines, near)
+    )
 
 
 def _least_angles(points: Floats, faces: Ints) -> Floats:
