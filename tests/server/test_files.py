@@ -24,8 +24,10 @@ from hexwrap_server.output import scene, text
 from hexwrap_server.output.dxf import object_coordinates
 from hexwrap_server.output.flat import lay_flat, pack
 from hexwrap_server.output.unrolled import Unrolled
+from hexwrap_server.output.wire import result_json
 from hexwrap_server.output.writers import WRITERS, Meta, NotMadeError, SheetError, write
 from hexwrap_solver.arrays import Ragged
+from hexwrap_solver.conformal.net import Net
 from hexwrap_solver.panels import make_components
 from hexwrap_solver.panels.types import ComponentSettings, Support
 from hexwrap_solver.pipeline import Solution
@@ -394,6 +396,24 @@ def test_domain_dxf_is_the_domain_in_its_own_units(solution: Solution) -> None:
     (corner,) = space.query('POINT[layer=="corners"]')
     vertex = solution.map.uv[solution.map.surface.loops[0][4]]
     assert corner.dxf.location.xyz == pytest.approx((vertex.real, vertex.imag, 0.0))
+
+
+def test_a_domain_that_overlaps_itself_is_drawn_apart(solution: Solution) -> None:
+    surface, corners = solution.map.surface, solution.map.corners()
+    middle = np.median(corners.imag)
+    below = np.where(corners.imag.mean(axis=1) > middle, -1j * middle, 0)  # the upper half over the lower one
+    folded = replace(solution.map, domain=Net.of_corners(corners + below[:, None], surface.twin))
+    twofold = replace(solution, map=folded)
+    assert b"drawn in 2 pieces" in write("domain.svg", twofold, ODD)
+    assert b"pieces" not in write("domain.svg", solution, ODD)
+    lines = read_dxf(write("domain.dxf", twofold, ODD)).modelspace()
+    ends = [np.array(lines.query(f'LWPOLYLINE[layer=="loop-{n}"]').first.get_points("xy")) for n in (0, 1)]
+    assert abs(ends[0].mean(axis=0) - ends[1].mean(axis=0)).max() > middle
+    told = json.loads(result_json(twofold))["map"]["apart"]
+    assert len(told["face"]) == len(surface.faces)
+    assert len(told["shift"]) == 2
+    assert len(told["cell"]) == len(labels_of(solution))
+    assert json.loads(result_json(solution))["map"]["apart"] is None
 
 
 def test_npz_holds_the_arrays_themselves(solution: Solution) -> None:

@@ -123,6 +123,7 @@ def report(result):
         ("gap, mean: %.4g", gap["mean"]),
         ("gap, greatest: %.4g", gap["max"]),
         ("planarity, worst: %.2g of the edge", quality["planarity"]["max"]),
+        ("convex: %.1f %%", percent(quality.get("convex"))),
         ("distance to the surface, greatest: %.4g", quality["surface_distance"]["max"]),
         ("largest over smallest scale: %.4g", quality["scale_ratio"]),
         ("distinct panels: %d", quality["distinct_panels"]),

@@ -9,7 +9,7 @@ import numpy as np
 from hexwrap_server.errors import DrawingError, UsageError
 from hexwrap_server.input.curves import refined
 from hexwrap_server.input.readers.drawing import Curve
-from hexwrap_server.output.unrolled import plane
+from hexwrap_server.output.unrolled import drawn, plane
 from hexwrap_solver.arrays import Complexes, Floats
 from hexwrap_solver.conformal.net import Net
 from hexwrap_solver.conformal.types import ConformalMap, Deck
@@ -32,12 +32,14 @@ class Carried:
 
 
 def lift_curves(cmap: ConformalMap, curves: list[Curve], step: float | None) -> Carried:
-    """Curves (k, 2) of the unrolled domain onto the surface; what lies outside is cut away.
+    """Curves (k, 2) of the unrolled domain onto the surface; what lies outside is cut away. Where the domain
+    overlaps itself, they are meant as ``domain.dxf`` and ``domain.svg`` draw it: in pieces beside each other.
 
     Raises DrawingError.
 
     step: how closely lines are followed, in units of the domain; None: a 400th of the circumference.
     """
+    cmap, _ = drawn(cmap)
     flat = [Curve(c.points[:, :2], c.closed) for c in curves]
     fine = _followed(flat, step or _once_around(cmap) / STEPS_AROUND)
     at = np.vstack([curve.points for curve in fine])
@@ -65,9 +67,11 @@ def _followed(curves: list[Curve], step: float) -> list[Curve]:
 
 
 def flatten_curves(cmap: ConformalMap, curves: list[Curve], step: float | None) -> Carried:
-    """Curves (k, 3) near the surface into the unrolled domain, each in one piece over several sheets."""
+    """Curves (k, 3) near the surface into the unrolled domain, each in one piece over several sheets. Where
+    the domain overlaps itself, as it is drawn; see ``lift_curves``."""
     if any(curve.points.shape[1] != 3 for curve in curves):
         raise UsageError("--flatten needs points in space: three numbers each.")
+    cmap, _ = drawn(cmap)
     fine = _followed(curves, step) if step else curves
     found = flatten(cmap, np.vstack([curve.points for curve in fine]))
     carried = []

@@ -6,14 +6,15 @@ import numpy as np
 
 from hexwrap_server.output.drawing import encode, grey_drawing
 from hexwrap_server.output.meta import Meta
-from hexwrap_server.output.unrolled import Unrolled, cells, plane
+from hexwrap_server.output.unrolled import Unrolled, cells, drawn, plane
 from hexwrap_server.output.viewpoint import corners
 from hexwrap_solver.pipeline import Solution
 
 
 def domain_dxf(solution: Solution, meta: Meta) -> bytes:
     """Boundary loops, the cut, corners (points) and the pattern's cells, each on a layer of its own."""
-    cmap, pattern = solution.map, solution.pattern
+    pattern = solution.pattern
+    cmap, pieces = drawn(solution.map)
     names = [f"loop-{number}" for number in range(len(cmap.surface.loops))]
     document = grey_drawing(meta, *names, "cut", "corners", "pattern")
     space = document.modelspace()
@@ -26,6 +27,6 @@ def domain_dxf(solution: Solution, meta: Meta) -> bytes:
         for place in plane(unrolled.start[sides[np.isin(loop, marked)]]).tolist():
             space.add_point(place, dxfattribs={"layer": "corners"})
     if pattern is not None:
-        for outline in cells(pattern).to_lists():
+        for outline in cells(pattern, pieces).to_lists():
             space.add_lwpolyline(outline, close=True, dxfattribs={"layer": "pattern"})
     return encode(document)

@@ -12,7 +12,7 @@ from hexwrap_server.output.colours import class_colours
 from hexwrap_server.output.layers import size_name
 from hexwrap_server.output.meta import Meta
 from hexwrap_server.output.text import angle, length, one_line
-from hexwrap_server.output.unrolled import Unrolled, cells, plane
+from hexwrap_server.output.unrolled import Unrolled, cells, drawn, plane
 from hexwrap_server.output.viewpoint import corners
 from hexwrap_solver.arrays import Complexes, Floats, Ragged
 from hexwrap_solver.conformal.types import ConformalMap
@@ -72,9 +72,10 @@ class Frame:
 
 def domain_svg(solution: Solution, meta: Meta) -> bytes:
     """SVG 1.1, complete in itself. Cells across the cut are drawn in one piece, in a sheet of their own."""
-    cmap, pattern = solution.map, solution.pattern
+    pattern = solution.pattern
+    cmap, pieces = drawn(solution.map)
     unrolled = Unrolled.of(cmap)
-    outlines = None if pattern is None else cells(pattern)
+    outlines = None if pattern is None else cells(pattern, pieces)
     points = [plane(unrolled.start)] if outlines is None else [plane(unrolled.start), outlines.values]
     frame = Frame.around(np.vstack([*points, *_apex(cmap)]))
     parts = []
@@ -88,10 +89,13 @@ def domain_svg(solution: Solution, meta: Meta) -> bytes:
     parts += _corner_marks(cmap, frame, unrolled)
     parts += _apex_mark(cmap, frame)
     parts += _cone_marks(cmap, frame)
-    return _page(frame, parts, solution, meta).encode()
+    caption = _caption(solution)
+    if pieces is not None:
+        caption += f"; overlaps itself, drawn in {len(pieces.shift)} pieces"
+    return _page(frame, parts, caption, meta).encode()
 
 
-def _page(frame: Frame, parts: list[str], solution: Solution, meta: Meta) -> str:
+def _page(frame: Frame, parts: list[str], caption: str, meta: Meta) -> str:
     head, foot = 74.0, 62.0
     width, height = max(frame.width, 620.0), frame.height + head + foot
     title = escape(one_line(meta.name))
@@ -106,7 +110,7 @@ def _page(frame: Frame, parts: list[str], solution: Solution, meta: Meta) -> str
 <g transform="translate({(width - frame.width) / 2:.2f} {head})">
 {inside}
 </g>
-<text class="note" x="{MARGIN}" y="{height - 34:.2f}">{escape(_caption(solution))}</text>
+<text class="note" x="{MARGIN}" y="{height - 34:.2f}">{escape(caption)}</text>
 </svg>
 """
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from hexwrap_solver.arrays import Complexes, Floats, Ints, Ragged
 from hexwrap_solver.conformal.types import ConformalMap
+from hexwrap_solver.domain.apart import Apart, apart
 from hexwrap_solver.pattern.types import Pattern
 
 #: Two places are one where they are nearer than this part of the domain's size.
@@ -72,9 +73,24 @@ def _chained(sides: Ints, tail: Ints, head: Ints, start: Complexes, end: Complex
     return np.array(list(ordered), dtype=np.int64)
 
 
-def cells(pattern: Pattern) -> Ragged:
-    """(·, 2) outlines of the cells, each in one piece."""
-    return Ragged(plane(pattern.corners), pattern.faces.offsets)
+def drawn(cmap: ConformalMap) -> tuple[ConformalMap, Apart | None]:
+    """The map on the domain as it is drawn: in pieces beside each other where it overlaps itself."""
+    pieces = apart(cmap)
+    return (cmap if pieces is None else pieces.moved(cmap)), pieces
+
+
+def cells(pattern: Pattern, pieces: Apart | None = None) -> Ragged:
+    """(·, 2) outlines of the cells, each whole and beside its first corner."""
+    corners = pattern.corners
+    if pieces is not None:
+        corners = corners + pieces.shift[piece_of_cells(pattern, pieces)][pattern.faces.row]
+    return Ragged(plane(corners), pattern.faces.offsets)
+
+
+def piece_of_cells(pattern: Pattern, pieces: Apart) -> Ints:
+    """(c,) the piece in which each cell is drawn."""
+    first = pattern.faces.values[pattern.faces.offsets[:-1]]
+    return np.asarray(pieces.piece[pattern.triangle[first]])
 
 
 def plane(z: Complexes) -> Floats:

@@ -11,9 +11,11 @@ import orjson
 from numpy.typing import NDArray
 
 from hexwrap_server.output.colours import class_colours
+from hexwrap_server.output.unrolled import piece_of_cells
 from hexwrap_solver.arrays import Complexes, Floats, Ragged
 from hexwrap_solver.conformal.net import Net
 from hexwrap_solver.conformal.types import ConformalMap
+from hexwrap_solver.domain.apart import apart
 from hexwrap_solver.panels.types import Components, Panels, Support, TradeOff
 from hexwrap_solver.pattern.types import Pattern
 from hexwrap_solver.pipeline import Solution
@@ -45,7 +47,7 @@ def part(solution: Solution, name: str, timings: dict[str, float]) -> Any:
         case "unit":
             return solution.map.surface.unit
         case "map":
-            return conformal(solution.map)
+            return conformal(solution.map) | {"apart": drawn_apart(solution)}
         case "pattern":
             return solution.pattern and pattern(solution.pattern)
         case "panels":
@@ -109,6 +111,18 @@ def conformal(cmap: ConformalMap) -> dict[str, Any]:
         "flips": int(cmap.flips),
         "inserted": int(cmap.inserted),
         "closing_error": float(cmap.closing_error),
+    }
+
+
+def drawn_apart(solution: Solution) -> dict[str, Any] | None:
+    """Of a domain that overlaps itself, the pieces to draw faces and cells in, and the shift of each."""
+    pieces, laid = apart(solution.map), solution.pattern
+    if pieces is None:
+        return None
+    return {
+        "face": flat(pieces.piece),
+        "cell": None if laid is None else flat(piece_of_cells(laid, pieces)),
+        "shift": plane(pieces.shift),
     }
 
 
@@ -199,6 +213,7 @@ def quality(solution: Solution) -> dict[str, Any]:
         "overlaps": None if made is None else int(measured.overlaps),
         "coverage": None if made is None else float(measured.coverage),
         "distinct_panels": 0 if measured.congruence is None else len(np.unique(measured.congruence)),
+        "convex": summary(measured.convex, "mean")["mean"],
         "not_convex": 0 if measured.convex is None else int(np.sum(~measured.convex)),
         "movement": float(measured.movement),
         "trade_off": trade_off(made.trade_off) if made and made.trade_off else None,

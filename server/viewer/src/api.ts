@@ -62,6 +62,8 @@ export interface Result {
     iterations: number;
     residual: number;
     flips: number;
+    /** Of a domain that overlaps itself: the pieces to draw it in, and by how much to move each. */
+    apart?: { face: number[]; cell: number[] | null; shift: Vec2[] } | null;
   };
   pattern?: {
     kind: string;

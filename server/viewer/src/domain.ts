@@ -60,13 +60,13 @@ export class DomainView {
 
   show(result: Result, keepView: boolean): void {
     this.clear();
-    const corners = faceCorners(result);
+    const corners = moved(faceCorners(result), result.map.apart?.face, result.map.apart?.shift);
     const middle = this.middleOf(result.mesh.faces.map((_, i) => corners(i)[0]));
     const local = ([x, y]: Vec2): Vec2 => [x - middle[0], y - middle[1]];
     const { pattern, panels } = result;
     this.box.makeEmpty();
     if (pattern) {
-      const flat = cellCorners(result);
+      const flat = moved(cellCorners(result), result.map.apart?.cell, result.map.apart?.shift);
       const cells = pattern.faces.map((_, f) => flat(f).map(local));
       this.layer = new PolygonLayer(pack(cells), false);
       for (const cell of cells) for (const p of cell) this.box.expandByPoint(new THREE.Vector2(...p));
@@ -120,7 +120,7 @@ export class DomainView {
     this.marks.add(new THREE.LineSegments(positions(lines), new THREE.LineBasicMaterial({ color: 0xc2410c })));
     if (dots.length) this.marks.add(new THREE.Points(positions(dots), new THREE.PointsMaterial({ color: 0xc2410c, size: 8, sizeAttenuation: false })));
     if (centres.length) this.marks.add(new THREE.Points(positions(centres), new THREE.PointsMaterial({ color: 0x6a3fa0, size: 8, sizeAttenuation: false })));
-    if (map.apex && this.box.clone().expandByScalar(0.3 * this.box.getSize(new THREE.Vector2()).length()).containsPoint(new THREE.Vector2(...local(map.apex))))
+    if (map.apex && !map.apart && this.box.clone().expandByScalar(0.3 * this.box.getSize(new THREE.Vector2()).length()).containsPoint(new THREE.Vector2(...local(map.apex))))
       this.marks.add(new THREE.Points(positions([...local(map.apex), 0.02]), new THREE.PointsMaterial({ color: 0x1f6f78, size: 7, sizeAttenuation: false })));
   }
 
@@ -162,6 +162,12 @@ export class DomainView {
     this.invalidate();
     return panel < 0 ? null : panel;
   }
+}
+
+/** The same outlines, moved with the piece of the domain that each belongs to. */
+function moved(outline: (i: number) => Vec2[], piece: number[] | null | undefined, shift: Vec2[] | undefined): (i: number) => Vec2[] {
+  if (!piece || !shift) return outline;
+  return (i) => outline(i).map(([x, y]): Vec2 => [x + shift[piece[i]][0], y + shift[piece[i]][1]]);
 }
 
 function positions(flat: number[]): THREE.BufferGeometry {

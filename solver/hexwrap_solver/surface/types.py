@@ -181,12 +181,14 @@ class Feature:
     """A line along which the surface folds, from a junction, a corner or the boundary to the next.
 
     vertices: (k,) of the mesh, neighbours joined by edges; a closed line ends where it begins. fold: mean
-    angle between the faces beside it, radians.
+    angle between the faces beside it, radians. given: of the exact surface, or drawn; not only seen on the
+    mesh.
     """
 
     vertices: Ints
     fold: float
     closed: bool
+    given: bool = False
 
 
 @dataclass(frozen=True)
