@@ -16,7 +16,7 @@ import shapely
 from hexwrap_solver.arrays import Floats, Ints
 from hexwrap_solver.geometry import angles_between, dot, normalize, quarter_turn
 from hexwrap_solver.surface.brep.curves import corners, curvature, evaluate_curve, places
-from hexwrap_solver.surface.brep.face import Outline, Piece, piece_of, polygon_of
+from hexwrap_solver.surface.brep.face import Outline, Piece, key_of, piece_of, polygon_of
 from hexwrap_solver.surface.brep.kinks import crossings, kink_lines, kinks_of
 from hexwrap_solver.surface.brep.pull import Patch, free, lifted, patch_of, pull
 from hexwrap_solver.surface.brep.sizes import Field, Sizes, field_of, meeting, sized
@@ -250,10 +250,11 @@ def _sewn(
     faces, names, uvs, around = [], [], [], []
     flanks: dict[int, list[Floats]] = {}
     creases, folds = [], []
+    taken = {key for d in divided.values() for key in key_of(d.id[:-1], d.id[1:]).tolist()}
     for name, side in enumerate(sides):
         outline, trims = _outline(side, divided, first, brep)
         outline = kink_lines(side.patch, side.kinks, side.field, outline, brep.tolerance)
-        piece = piece_of(side.patch, outline, side.field, sizes, most, name)
+        piece = piece_of(side.patch, outline, side.field, sizes, most, name, taken)
         label = np.concatenate([outline.id, np.full(len(piece.uv) - len(outline.id), -1)])
         fresh = label < 0
         label[fresh] = total + np.arange(int(fresh.sum()))
