@@ -213,6 +213,7 @@ def quality(solution: Solution) -> dict[str, Any]:
         "overlaps": None if made is None else int(measured.overlaps),
         "coverage": None if made is None else float(measured.coverage),
         "distinct_panels": 0 if measured.congruence is None else len(np.unique(measured.congruence)),
+        "convex": summary(measured.convex, "mean")["mean"],
         "not_convex": 0 if measured.convex is None else int(np.sum(~measured.convex)),
         "movement": float(measured.movement),
         "trade_off": trade_off(made.trade_off) if made and made.trade_off else None,

@@ -409,6 +409,7 @@ function drawQuality(): void {
       ["Panels", String(panels.face.length)], ["Planarity", number(q.planarity?.max, 2)], ["Overlaps", String(q.overlaps)],
       ["Coverage", `${number(100 * q.coverage)} %`], ["Gap (mean, max)", `${number(q.gap?.tangential?.mean, 3)}, ${number(q.gap?.tangential?.max, 3)}`],
       ["Distance (max)", number(q.surface_distance?.max, 3)], ["Distinct panels", String(q.distinct_panels)]);
+    if (q.movement > 0) rows.push(["Convex", `${number(100 * q.convex)} %`], ["Moved (max)", number(q.movement, 3)]);
   }
   $("quality").replaceChildren(...rows.flatMap(([name, value]) => [element("dt", {}, name), element("dd", {}, value)]));
 }

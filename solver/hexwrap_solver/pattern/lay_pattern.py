@@ -102,7 +102,7 @@ def _lay(cmap: ConformalMap, placing: Placing, settings: PatternSettings, progre
     if not nodes.n:
         raise _too_coarse(cmap, settings, placement)
     progress(0.3, f"{nodes.n} nodes")
-    edges = find_edges(layout, nodes)
+    edges, nodes = find_edges(layout, nodes)
     progress(0.6, "edges")
     whole = whole_cells(lattice, edges)
     boundary = boundary_of(cmap.surface, layout)
@@ -131,12 +131,12 @@ def _uncut(
     whole: WholeCells,
 ) -> Trimmed:
     """The whole cells alone."""
-    lattice, own = layout.lattice, nodes.own
-    side = sides_by_edge(lattice, edges, whole)[around_enclosed(layout, boundary, nodes, met)]
+    own = nodes.own
+    side = sides_by_edge(edges, whole)[around_enclosed(layout, boundary, nodes, edges, met)]
     keep = np.ones(whole.n, dtype=bool)
     keep[whole.corner.row[side[side >= 0]]] = False
-    cells = only_whole_cells(lattice, edges, whole).part(keep)
-    points = Points(nodes.face[own], lattice.position(nodes.point[own]), np.zeros(nodes.n, dtype=bool))
+    cells = only_whole_cells(edges, whole).part(keep)
+    points = Points(nodes.face[own], layout.lattice.stand(nodes.point[own]), np.zeros(nodes.n, dtype=bool))
     return Trimmed(cells, np.ones(cells.n, dtype=bool), points, holed=int((~keep).sum()))
 
 
@@ -153,9 +153,17 @@ def layout_of(cmap: ConformalMap, lattice: Lattice, placement: Placement) -> Lay
         placement.isometries,
         net.inverse,
         cmap.surface.twin,
+        _corner_of(cmap.surface.faces, cmap.cones.vertex),
         lattice,
         tolerance,
     )
+
+
+def _corner_of(faces: Ints, vertex: Ints) -> Ints:
+    """(k,) a corner 3·face + c at each vertex."""
+    corner = np.zeros(int(faces.max()) + 1, dtype=np.int64)
+    corner[faces.ravel()] = np.arange(faces.size)
+    return corner[vertex]
 
 
 def _check_count(cmap: ConformalMap, layout: Layout, settings: PatternSettings) -> None:
@@ -198,9 +206,7 @@ def _finish(
     if first is None:
         raise _too_coarse(cmap, settings, placement)
     ring = rows_from(neighbours, first)
-    if settings.kind == "triangle":
-        ring = ring // 2  # a row of triangles: those that stand and those that hang
-    lattice = layout.lattice
+    ring = ring // layout.lattice.counted  # a row of triangles: those that stand and those that hang
     return Pattern(
         kind=settings.kind,
         vertices=vertices,
@@ -208,7 +214,7 @@ def _finish(
         uv=uv,
         faces=faces,
         corners=_corners(cmap, layout, faces, cells.isometry, triangle, place, uv),
-        index=np.where(whole, lattice.sides - faces.lengths, 0),
+        index=cells.index,
         sheet=None if net else cells.isometry[:, 3],
         neighbours=neighbours,
         triangle=triangle,

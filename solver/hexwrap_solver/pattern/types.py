@@ -11,7 +11,17 @@ from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints, Ragged
 from hexwrap_solver.errors import SettingError
 from hexwrap_solver.setting import Setting
 
-Kind = Literal["hex", "triangle", "quad"]
+Kind = Literal[
+    "hex",
+    "triangle",
+    "quad",
+    "diamond",
+    "brick",
+    "trihexagonal",
+    "truncated-hexagonal",
+    "truncated-square",
+    "rhombitrihexagonal",
+]
 
 
 @dataclass(frozen=True)

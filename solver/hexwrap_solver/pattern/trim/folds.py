@@ -140,4 +140,4 @@ def sewn(lattice: Lattice, cells: Cells, seam: Seams) -> Cells:
     one, other = open_side[two[facing]].T
     twin = cells.twin.copy()
     twin[one], twin[other] = other, one
-    return Cells(Ragged(corner, cells.corner.offsets), isometry, twin)
+    return Cells(Ragged(corner, cells.corner.offsets), isometry, twin, cells.index)

@@ -99,7 +99,7 @@ def trim(
     Raises TooCoarse where a face goes around the surface.
     """
     lattice = layout.lattice
-    side_of_edge = sides_by_edge(lattice, edges, cells)
+    side_of_edge = sides_by_edge(edges, cells)
     used = side_of_edge >= 0
     points, half_edges, on = arrangement(layout, boundary, nodes, edges, used)
     seam = None
@@ -126,10 +126,10 @@ def trim(
     small = area < sliver
     lost = int((small & (area > nothing)).sum())
     kept = faces.part(~small)
-    together = _together(layout, cells, side_of_edge, kept, half_edges, edges)
+    together = _together(cells, side_of_edge, kept, half_edges, edges)
     whole = np.arange(together.n) < cells.n
     dropped = float(area[small & (area > 0)].sum() / lattice.cell_area)
-    holed = around_enclosed(layout, boundary, nodes, met_by_chords(met, layout, boundary))
+    holed = around_enclosed(layout, boundary, nodes, edges, met_by_chords(met, layout, boundary))
     keep = ~_left_of(holed, cells, side_of_edge, kept, half_edges)
     together = together.part(keep)
     if seam is not None:
@@ -261,7 +261,6 @@ def _slivers(
 
 
 def _together(
-    layout: Layout,
     whole: WholeCells,
     side_of_edge: Ints,
     cut: _Faces,
@@ -269,14 +268,14 @@ def _together(
     edges: PatternEdges,
 ) -> Cells:
     """Whole and cut cells in one; twins are found by half-edges, or by the pattern edges they run along."""
-    lattice, size = layout.lattice, len(whole.direction)
+    size = len(whole.slot)
     half_edge = cut.half_edge.values
     side_of_half = np.full(len(half_edges.tail), -1, dtype=np.int64)
     side_of_half[half_edge] = size + np.arange(len(half_edge))
     side_of_edge = side_of_edge.copy()
     name = half_edges.name[half_edge]
     side_of_edge[name[name >= 0]] = side_of_half[half_edge[name >= 0]]
-    reverse = edges.reverse(lattice, whole.corner.values.astype(np.int64), whole.direction)
+    reverse = edges.back[whole.corner.values, whole.slot]
     twin_cut = side_of_half[half_edges.twin[half_edge]]
     twin_name = half_edges.name[half_edges.twin[half_edge]]
     twin_cut = np.where((twin_cut < 0) & (twin_name >= 0), side_of_edge[twin_name], twin_cut)
@@ -288,4 +287,5 @@ def _together(
         ),
         np.concatenate([whole.isometry, cut.isometry]),
         np.concatenate([side_of_edge[reverse], twin_cut]),
+        np.concatenate([whole.index, np.zeros(cut.half_edge.n_rows, dtype=np.int64)]),
     )
