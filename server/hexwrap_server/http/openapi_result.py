@@ -56,6 +56,8 @@ _PATTERN = _all(
     rings=_COUNT,
     around=_COUNT,
     distortion=NUMBER,
+    features=listed(listed(_INDEX)),
+    along=listed(_all(straight=_TRUTH, cut=_COUNT, width=NUMBER, distortion=nullable(NUMBER), fold=NUMBER)),
 )
 _PANELS = _all(
     mode={"enum": ["split", "watertight"]},

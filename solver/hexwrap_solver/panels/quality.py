@@ -27,6 +27,7 @@ from hexwrap_solver.panels.types import Panels, Quality
 from hexwrap_solver.pattern.lattice import LATTICES
 from hexwrap_solver.pattern.types import Pattern
 from hexwrap_solver.surface.types import Surface
+from hexwrap_solver.tolerances import TINY
 
 #: A smaller share of the surface without cells is not worth a note.
 BARE = 0.03
@@ -147,4 +148,4 @@ def stretch_ratio(cmap: ConformalMap) -> tuple[Floats, Floats]:
     dx = w1 / x
     dy = (w2 - a * dx) / h
     conformal, anti = np.abs(dx - 1j * dy) / 2, np.abs(dx + 1j * dy) / 2
-    return (conformal + anti) / np.maximum(np.abs(conformal - anti), 1e-300), double_area / 2
+    return (conformal + anti) / np.maximum(np.abs(conformal - anti), TINY), double_area / 2

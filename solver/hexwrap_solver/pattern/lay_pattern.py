@@ -15,6 +15,7 @@ from hexwrap_solver.domain.interpolate import surface_weights
 from hexwrap_solver.domain.lift import points_at
 from hexwrap_solver.domain.locate import barycentric
 from hexwrap_solver.errors import PatternError
+from hexwrap_solver.pattern.along import on_features, told
 from hexwrap_solver.pattern.lattice import LATTICES, Lattice
 from hexwrap_solver.pattern.lay.cells import (
     Cells,
@@ -69,9 +70,10 @@ def lay_pattern(cmap: ConformalMap, settings: PatternSettings, progress: Progres
     placing = Placing.of(cmap, lattice, settings)
     pattern = _lay(cmap, placing, settings, progress)
     if settings.around is not None and pattern.around != settings.around and cmap.fitted is None:
-        notes.append(
-            f"{pattern.around} cells around instead of {settings.around}: the nearest that closes up."
-        )
+        why = "the nearest that closes up"
+        if any(feature.straight for feature in pattern.features):
+            why = "lines of the pattern follow the folds with less distortion"
+        notes.append(f"{pattern.around} cells around instead of {settings.around}: {why}.")
     wanted = settings.edge_length
     if wanted is not None and abs(pattern.edge_length / wanted - 1) > CLOSE:
         corrected = replace(settings, edge_length=wanted**2 / pattern.edge_length)
@@ -119,7 +121,7 @@ def _lay(cmap: ConformalMap, placing: Placing, settings: PatternSettings, progre
     else:
         cut = _uncut(layout, boundary, met, nodes, edges, whole)
     progress(0.8, f"{cut.cells.n} cells")
-    return _finish(cmap, settings, placement, layout, cut)
+    return _finish(cmap, settings, placing, placement, layout, cut)
 
 
 def _uncut(
@@ -182,7 +184,12 @@ def _check_count(cmap: ConformalMap, layout: Layout, settings: PatternSettings) 
 
 
 def _finish(
-    cmap: ConformalMap, settings: PatternSettings, placement: Placement, layout: Layout, cut: Trimmed
+    cmap: ConformalMap,
+    settings: PatternSettings,
+    placing: Placing,
+    placement: Placement,
+    layout: Layout,
+    cut: Trimmed,
 ) -> Pattern:
     keep, narrow = _usable(cut.cells, placement.narrows or cut.seams is not None)
     if not keep.any():
@@ -207,6 +214,7 @@ def _finish(
         raise _too_coarse(cmap, settings, placement)
     ring = rows_from(neighbours, first)
     ring = ring // layout.lattice.counted  # a row of triangles: those that stand and those that hang
+    features = on_features(cmap, placing, placement, cut.seams, cells, corner, whole)
     return Pattern(
         kind=settings.kind,
         vertices=vertices,
@@ -227,7 +235,12 @@ def _finish(
         rotation=placement.rotation,
         edge_length=mean_edge(vertices, faces),
         distortion=placement.distortion,
-        notes=(*placement.notes, *_told(cut, narrow, int(np.count_nonzero(~keep)) - narrow)),
+        notes=(
+            *placement.notes,
+            *told(features),
+            *_told(cut, narrow, int(np.count_nonzero(~keep)) - narrow),
+        ),
+        features=features,
     )
 
 
@@ -297,7 +310,7 @@ def _told(cut: Trimmed, narrow: int, apart: int) -> list[str]:
             f"{narrow} cells at the narrow end were left out: so few go around it there that they touch "
             "themselves."
             if cut.seams is None
-            else f"{narrow} cells that touch themselves were left out."
+            else f"Cells that touch themselves were left out: {narrow}."
         )
     if cut.holed:
         notes.append(

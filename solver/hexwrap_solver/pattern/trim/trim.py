@@ -40,7 +40,7 @@ from hexwrap_solver.pattern.place.glued import Glued
 from hexwrap_solver.pattern.trim.arrangement import HalfEdges, Points, arrangement
 from hexwrap_solver.pattern.trim.boundary import Boundary, met_by_chords
 from hexwrap_solver.pattern.trim.enclosed import around_enclosed
-from hexwrap_solver.pattern.trim.folds import Seams, seams, sewn
+from hexwrap_solver.pattern.trim.folds import Seams, seams, sewn, without_ends
 from hexwrap_solver.surface.features import FeatureEdges
 
 #: Pieces smaller than this part of a cell are joined to a cut neighbour, or dropped where there is none.
@@ -133,7 +133,11 @@ def trim(
     keep = ~_left_of(holed, cells, side_of_edge, kept, half_edges)
     together = together.part(keep)
     if seam is not None:
-        together = sewn(lattice, together, seam)
+        together, had = without_ends(lattice, sewn(lattice, together, seam))
+        # What only a fold's end had reached into is whole again.
+        on_node = np.add.reduceat(together.corner.values < nodes.n, together.corner.offsets[:-1])
+        full = (on_node == lattice.sides) & (together.corner.lengths == lattice.sides)
+        whole[keep] |= had & full
     return Trimmed(
         together, whole[keep], points, dropped, max(joined - lost, 0), lost, int((~keep).sum()), seam
     )

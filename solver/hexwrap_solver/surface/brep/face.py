@@ -20,6 +20,7 @@ from hexwrap_solver.surface.mesh_sizes import ROW, cumulated
 from hexwrap_solver.surface.nurbs import evaluate_points, tangents
 from hexwrap_solver.surface.projection import project
 from hexwrap_solver.surface.topology import edge_lengths, half_edges, sum_rows, twins
+from hexwrap_solver.tolerances import TINY
 
 #: Points inside keep away from the boundary by this part of its edges' lengths, which are looked at in so
 #: many places each.
@@ -242,7 +243,7 @@ def _unevenness(rise: Floats, inside: Bools) -> float:
     weight = np.where(inside, 1.0, 1e-3)
     mean = (rise * weight).sum(axis=1) / weight.sum(axis=1)
     spread = (np.abs(rise - mean[:, None]) * weight).sum(axis=1) / weight.sum(axis=1)
-    return float((spread / np.maximum(mean, 1e-300)).mean())
+    return float((spread / np.maximum(mean, TINY)).mean())
 
 
 def _inner(patch: Patch, chart: Chart, outline: Outline) -> Floats:
@@ -305,7 +306,7 @@ def _smoothed(patch: Patch, piece: Piece, fresh: Bools | None = None) -> Piece:
     at, du, dv = tangents(patch.opened, piece.uv[move])
     away = middle[move] - at
     e, f, g, p, q = (dot(a, b) for a, b in ((du, du), (du, dv), (dv, dv), (away, du), (away, dv)))
-    determinant = np.maximum(e * g - f * f, 1e-12 * np.maximum(e * g, 1e-300))
+    determinant = np.maximum(e * g - f * f, 1e-12 * np.maximum(e * g, TINY))
     step = np.stack([g * p - f * q, e * q - f * p], axis=1) / determinant[:, None]
     uv, points = piece.uv.copy(), piece.points.copy()
     uv[move] += step
@@ -330,7 +331,7 @@ def _least_angles(points: Floats, faces: Ints) -> Floats:
     """(m,) the smallest angle of each triangle, radians, between its longer sides."""
     length = np.sort(edge_lengths(points, faces), axis=1)
     area = np.linalg.norm(face_normals(points, faces), axis=1)
-    sine = area / np.maximum(length[:, 1] * length[:, 2], 1e-300)
+    sine = area / np.maximum(length[:, 1] * length[:, 2], TINY)
     return np.asarray(np.arcsin(np.clip(sine, 0.0, 1.0)))
 
 

@@ -26,6 +26,7 @@ from hexwrap_solver.surface.mesh_sizes import GRADE, ROW, check_settings
 from hexwrap_solver.surface.nurbs import evaluate
 from hexwrap_solver.surface.topology import sum_rows
 from hexwrap_solver.surface.types import MeshSettings
+from hexwrap_solver.tolerances import TINY
 
 #: Normals of two faces that differ by more than this along their edge make a crease, radians.
 CREASE = np.deg2rad(5.0)
@@ -225,7 +226,7 @@ def _refined(edge: Edge, t: Floats, sizes: Sizes) -> Floats:
         chord = np.diff(point, axis=0)
         length = np.linalg.norm(chord, axis=1)
         offset = evaluate_curve(edge.curve, middle)[0] - (point[1:] + point[:-1]) / 2
-        along = dot(offset, chord) / np.maximum(length, 1e-300) ** 2
+        along = dot(offset, chord) / np.maximum(length, TINY) ** 2
         height = np.linalg.norm(offset - along[:, None] * chord, axis=1)
         bad = (length > sizes.longest) | (height > sizes.height)
         if not bad.any():
