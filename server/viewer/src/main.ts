@@ -4,6 +4,7 @@ import { api, FILES, ProblemError, UnreachableError, type BoundaryAngle, type Fi
 import { flatOutline, histogram, singularityCurve, tradeOff } from "./charts";
 import { colour, MODES, number, RAMP_CSS, type Legend, type Mode } from "./colors";
 import { DomainView } from "./domain";
+import { Explorer } from "./explore";
 import { element, Form, type Json, type Schema, type Settings } from "./form";
 import { View3D } from "./view3d";
 
@@ -30,6 +31,20 @@ const state: State = {
 };
 const space = new View3D($("view3d"));
 const domain = new DomainView($("domain"));
+
+/** Variants of the surface that is worked on, with what of the settings does not vary. */
+const explorer = new Explorer($("variants"), () => {
+  if (!state.surface) {
+    note("Choose a sample or drop a file first.", true);
+    return null;
+  }
+  const { name, surface, pattern, panels } = currentRequest();
+  const split = panels && (panels as Settings).mode === "split" ? { panels } : {};
+  return { name, surface, ...(pattern ? { pattern: { ...pattern, around: null, edge_length: null } } : {}), ...split };
+}, (request) => {
+  adopt(request);
+  void solve();
+});
 
 // ---------------------------------------------------------------- settings and submission
 
@@ -205,6 +220,7 @@ async function takeFile(file: File, object?: string): Promise<void> {
   const turn = ++state.turn;
   if (object === undefined) drawObjects(file, []);
   state.surface = null;
+  explorer.clear();
   setEntries([]);
   drawAngles();
   state.name = file.name.replace(/\.[^.]*$/, "");
@@ -260,6 +276,7 @@ async function takeSample(name: string): Promise<void> {
   try {
     const request = await api.sample(name);
     if (turn !== state.turn) return;
+    explorer.clear();
     adopt({ ...request, name: request.name ?? name });
     await solve();
   } catch (error) {
@@ -272,6 +289,7 @@ async function openJob(id: string): Promise<void> {
   try {
     const [job, request] = await Promise.all([api.job(id), api.request(id)]);
     if (turn !== state.turn) return;
+    if (job.kind === "explore") return await explorer.follow(job);
     state.request = request;
     adopt(request);
     await follow(job, turn, false);
