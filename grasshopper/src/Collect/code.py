@@ -144,15 +144,7 @@ RESULTS = [
 
 
 def solve():
-    slot = slot_of(component)
-    if not Job:
-        stop(slot)
-        component.Message = "no job yet"
-    else:
-        in_background(component, slot, TEXT(Job), lambda token, url=TEXT(Job): collect(token, url))
-        state_message(component, slot, "collected")
-    found = slot["result"] or {}
-    return [found.get(name) for name in RESULTS]
+    return made_of_job(component, Job, collect, "collected", RESULTS)
 
 
 component = ghenv.Component

@@ -12,7 +12,6 @@ from hexwrap_server import logs
 from hexwrap_server.input import form
 from hexwrap_server.input.requests import CacheSettings, Exploration, Order, Outcome, Wanted
 from hexwrap_server.input.schemas import parse_request
-from hexwrap_server.jobs import codec
 from hexwrap_server.jobs.cache import CachingRunner
 from hexwrap_server.jobs.disk import write_whole
 from hexwrap_server.jobs.work import sent_surface_of, solution_at, stages, take_in
@@ -96,9 +95,8 @@ def tell(report: Report, path: str, order: Order) -> Json:
 def finish(report: Report, order: Order, documents: list[Json], refused: list[str]) -> Outcome:
     """The result, its front and what is proposed. documents: of all variants, those that were solved with
     what was measured, or the problem. refused: why others cannot be made."""
-    text = explored.result_json(explored.summary(documents, _asked(order).limits, refused))
-    result = igzip.compress(text)
-    kept = codec.encode({"explored": text.decode()})
+    document = explored.summary(documents, _asked(order).limits, refused)
+    result, kept = igzip.compress(explored.result_json(document)), explored.packed(document)
     if order.files is None:
         return Outcome(result, kept, len(result) + len(kept), {}, {})
     write_whole(Path(order.files[0]), [result])

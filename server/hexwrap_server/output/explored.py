@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import orjson
 
+from hexwrap_server.jobs import codec
 from hexwrap_solver.explore.front import best_of, front_of, within
 from hexwrap_solver.explore.types import Figures, Limits
 
@@ -60,6 +61,17 @@ def _excess(found: Figures, document: Json, limits: Limits) -> float:
     return sum(max(has / max(most, 1e-12) - 1, 0.0) for has, most in pairs if has and most is not None)
 
 
+def packed(document: Json) -> bytes:
+    """The result as a file of the store."""
+    return codec.encode({"explored": result_json(document).decode()})
+
+
+def kept(data: bytes) -> Json:
+    """What ``packed`` has written. Raises CodecError."""
+    found: Json = orjson.loads(codec.decode(data)["explored"])
+    return found
+
+
 def result_json(document: Json) -> bytes:
     return orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY)
 
@@ -75,7 +87,7 @@ def explore_csv(document: Json) -> bytes:
         writer.writerow(
             [
                 i,
-                *_choices(one["request"]),
+                *choices(one["request"]),
                 *(predicted.get(name, "") for name in FORESEEN),
                 *("" if measured.get(name) is None else measured[name] for name in MEASURED),
                 int(one["front"]),
@@ -86,7 +98,8 @@ def explore_csv(document: Json) -> bytes:
     return text.getvalue().encode()
 
 
-def _choices(request: Json) -> list[Any]:
+def choices(request: Json) -> list[Any]:
+    """As ``CHOICES`` names them; empty text where nothing is asked."""
     pattern, panels = request["pattern"], request["panels"]
     asked = request["singularities"] or {}
     row = [request["boundary"]["mode"], len(asked.get("at", ())), pattern["kind"], pattern["rotation"]]

@@ -145,6 +145,17 @@ def pattern(laid: Pattern) -> dict[str, Any]:
         "rotation": float(laid.rotation),
         "edge_length": float(laid.edge_length),
         "distortion": float(laid.distortion),
+        "features": [flat(feature.vertices) for feature in laid.features],
+        "along": [
+            {
+                "straight": feature.straight,
+                "cut": feature.cut,
+                "width": feature.width,
+                "distortion": feature.distortion,
+                "fold": feature.fold,
+            }
+            for feature in laid.features
+        ],
     }
 
 

@@ -33,10 +33,13 @@ class Vary:
             "instead: edge length of the cells, from … to; neither: about the default", gt=0, unit="length"
         ),
     ] = None
-    kind: Annotated[tuple[Kind, ...], Setting("kinds of cells to try", most=3)] = ("hex",)
+    kind: Annotated[
+        tuple[Kind, ...] | None, Setting("kinds of cells to try; null: that of the pattern", most=3)
+    ] = None
     rotation: Annotated[
-        tuple[Literal["edge", "vertex"], ...], Setting("rotations of the pattern to try", most=2)
-    ] = ("edge",)
+        tuple[Literal["edge", "vertex"], ...] | None,
+        Setting("rotations to try; null: that of the pattern", most=2),
+    ] = None
     sizes: Annotated[tuple[int, int], Setting("number of edge lengths, from … to", ge=1, le=1000)] = (1, 12)
     joint: Annotated[
         tuple[float, float] | None,
@@ -51,7 +54,7 @@ class Vary:
             if given is not None and given[0] > given[1]:
                 raise SettingError(f"'{name}' must be [low, high] with low ≤ high")
         for name in ("boundary", "singularities", "kind", "rotation"):
-            if not getattr(self, name):
+            if getattr(self, name) == ():
                 raise SettingError(f"'{name}' must list at least one choice")
 
 

@@ -54,7 +54,8 @@ def variants(settings: ExploreSettings, edge: float) -> list[Variant]:
     joints = _between(*(vary.joint or (panels.joint, panels.joint)), JOINTS)
     sizes = range(vary.sizes[0], vary.sizes[1] + 1)
     shapes = _shapes(settings, edge)
-    choices = (vary.boundary, vary.singularities, vary.kind, shapes, vary.rotation, sizes, joints)
+    kinds, rotations = vary.kind or (settings.pattern.kind,), vary.rotation or (settings.pattern.rotation,)
+    choices = (vary.boundary, vary.singularities, kinds, shapes, rotations, sizes, joints)
     usual = panels.sizes if isinstance(panels.sizes, int) else vary.sizes[1]
     found = {Variant(Frame(BoundaryCondition(), settings.pattern), 0, usual, panels.joint): None}
     for point in _halton(PATIENCE * settings.variants, settings.seed):
@@ -63,15 +64,13 @@ def variants(settings: ExploreSettings, edge: float) -> list[Variant]:
         boundary, count, kind, shape, rotation, number, joint = (
             options[int(x * len(options))] for options, x in zip(choices, point, strict=True)
         )
-        pattern = replace(shape, kind=kind, rotation=rotation if len(vary.rotation) > 1 else shape.rotation)
+        pattern = replace(shape, kind=kind, rotation=rotation)
         found[Variant(Frame(BoundaryCondition(boundary), pattern), count, number, joint)] = None
     return list(found)
 
 
 def _shapes(settings: ExploreSettings, edge: float) -> list[PatternSettings]:
     vary, pattern = settings.vary, settings.pattern
-    if vary.rotation != ("edge",):
-        pattern = replace(pattern, rotation=vary.rotation[0])
     if vary.around is not None:
         steps = dict.fromkeys(round(n) for n in _between(*vary.around, STEPS))
         return [replace(pattern, around=n, edge_length=None) for n in steps]

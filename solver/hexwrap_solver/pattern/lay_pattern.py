@@ -15,6 +15,7 @@ from hexwrap_solver.domain.interpolate import surface_weights
 from hexwrap_solver.domain.lift import points_at
 from hexwrap_solver.domain.locate import barycentric
 from hexwrap_solver.errors import PatternError
+from hexwrap_solver.pattern.along import on_features, told
 from hexwrap_solver.pattern.lattice import LATTICES, Lattice
 from hexwrap_solver.pattern.lay.cells import (
     Cells,
@@ -69,9 +70,10 @@ def lay_pattern(cmap: ConformalMap, settings: PatternSettings, progress: Progres
     placing = Placing.of(cmap, lattice, settings)
     pattern = _lay(cmap, placing, settings, progress)
     if settings.around is not None and pattern.around != settings.around and cmap.fitted is None:
-        notes.append(
-            f"{pattern.around} cells around instead of {settings.around}: the nearest that closes up."
-        )
+        why = "the nearest that closes up"
+        if any(feature.straight for feature in pattern.features):
+            why = "lines of the pattern follow the folds with less distortion"
+        notes.append(f"{pattern.around} cells around instead of {settings.around}: {why}.")
     wanted = settings.edge_length
     if wanted is not None and abs(pattern.edge_length / wanted - 1) > CLOSE:
         corrected = replace(settings, edge_length=wanted**2 / pattern.edge_length)
@@ -102,7 +104,7 @@ def _lay(cmap: ConformalMap, placing: Placing, settings: PatternSettings, progre
     if not nodes.n:
         raise _too_coarse(cmap, settings, placement)
     progress(0.3, f"{nodes.n} nodes")
-    edges = find_edges(layout, nodes)
+    edges, nodes = find_edges(layout, nodes)
     progress(0.6, "edges")
     whole = whole_cells(lattice, edges)
     boundary = boundary_of(cmap.surface, layout)
@@ -119,7 +121,7 @@ def _lay(cmap: ConformalMap, placing: Placing, settings: PatternSettings, progre
     else:
         cut = _uncut(layout, boundary, met, nodes, edges, whole)
     progress(0.8, f"{cut.cells.n} cells")
-    return _finish(cmap, settings, placement, layout, cut)
+    return _finish(cmap, settings, placing, placement, layout, cut)
 
 
 def _uncut(
@@ -131,12 +133,12 @@ def _uncut(
     whole: WholeCells,
 ) -> Trimmed:
     """The whole cells alone."""
-    lattice, own = layout.lattice, nodes.own
-    side = sides_by_edge(lattice, edges, whole)[around_enclosed(layout, boundary, nodes, met)]
+    own = nodes.own
+    side = sides_by_edge(edges, whole)[around_enclosed(layout, boundary, nodes, edges, met)]
     keep = np.ones(whole.n, dtype=bool)
     keep[whole.corner.row[side[side >= 0]]] = False
-    cells = only_whole_cells(lattice, edges, whole).part(keep)
-    points = Points(nodes.face[own], lattice.position(nodes.point[own]), np.zeros(nodes.n, dtype=bool))
+    cells = only_whole_cells(edges, whole).part(keep)
+    points = Points(nodes.face[own], layout.lattice.stand(nodes.point[own]), np.zeros(nodes.n, dtype=bool))
     return Trimmed(cells, np.ones(cells.n, dtype=bool), points, holed=int((~keep).sum()))
 
 
@@ -153,9 +155,17 @@ def layout_of(cmap: ConformalMap, lattice: Lattice, placement: Placement) -> Lay
         placement.isometries,
         net.inverse,
         cmap.surface.twin,
+        _corner_of(cmap.surface.faces, cmap.cones.vertex),
         lattice,
         tolerance,
     )
+
+
+def _corner_of(faces: Ints, vertex: Ints) -> Ints:
+    """(k,) a corner 3·face + c at each vertex."""
+    corner = np.zeros(int(faces.max()) + 1, dtype=np.int64)
+    corner[faces.ravel()] = np.arange(faces.size)
+    return corner[vertex]
 
 
 def _check_count(cmap: ConformalMap, layout: Layout, settings: PatternSettings) -> None:
@@ -174,7 +184,12 @@ def _check_count(cmap: ConformalMap, layout: Layout, settings: PatternSettings) 
 
 
 def _finish(
-    cmap: ConformalMap, settings: PatternSettings, placement: Placement, layout: Layout, cut: Trimmed
+    cmap: ConformalMap,
+    settings: PatternSettings,
+    placing: Placing,
+    placement: Placement,
+    layout: Layout,
+    cut: Trimmed,
 ) -> Pattern:
     keep, narrow = _usable(cut.cells, placement.narrows or cut.seams is not None)
     if not keep.any():
@@ -198,9 +213,8 @@ def _finish(
     if first is None:
         raise _too_coarse(cmap, settings, placement)
     ring = rows_from(neighbours, first)
-    if settings.kind == "triangle":
-        ring = ring // 2  # a row of triangles: those that stand and those that hang
-    lattice = layout.lattice
+    ring = ring // layout.lattice.counted  # a row of triangles: those that stand and those that hang
+    features = on_features(cmap, placing, placement, cut.seams, cells, corner, whole)
     return Pattern(
         kind=settings.kind,
         vertices=vertices,
@@ -208,7 +222,7 @@ def _finish(
         uv=uv,
         faces=faces,
         corners=_corners(cmap, layout, faces, cells.isometry, triangle, place, uv),
-        index=np.where(whole, lattice.sides - faces.lengths, 0),
+        index=cells.index,
         sheet=None if net else cells.isometry[:, 3],
         neighbours=neighbours,
         triangle=triangle,
@@ -221,7 +235,12 @@ def _finish(
         rotation=placement.rotation,
         edge_length=mean_edge(vertices, faces),
         distortion=placement.distortion,
-        notes=(*placement.notes, *_told(cut, narrow, int(np.count_nonzero(~keep)) - narrow)),
+        notes=(
+            *placement.notes,
+            *told(features),
+            *_told(cut, narrow, int(np.count_nonzero(~keep)) - narrow),
+        ),
+        features=features,
     )
 
 
@@ -291,7 +310,7 @@ def _told(cut: Trimmed, narrow: int, apart: int) -> list[str]:
             f"{narrow} cells at the narrow end were left out: so few go around it there that they touch "
             "themselves."
             if cut.seams is None
-            else f"{narrow} cells that touch themselves were left out."
+            else f"Cells that touch themselves were left out: {narrow}."
         )
     if cut.holed:
         notes.append(

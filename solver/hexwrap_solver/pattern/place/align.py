@@ -60,6 +60,9 @@ COST_OF_SIZE, COST_OF_CORNERS = 0.002, 0.004
 #: tip goes before the two corners beside it.
 COST_OF_LOPSIDED = 3.0
 
+#: Parallel lines of a lattice are of this many kinds at most, up to translations.
+MOST_LINES = 3
+
 #: So many placements with the least mean strain are compared by their sharp one, and so many of these, in
 #: order, are deformed, until one of them distorts by less than ENOUGH.
 COMPARED, DEFORMED, ENOUGH = 12, 3, 0.03
@@ -238,7 +241,7 @@ def _frame(
 ) -> tuple[_Frame, FeatureLines | None]:
     angle = edge_angle(lattice, settings)
     sides = sides_of(cmap, lattice, loops)
-    zero = complex(lattice.position(lattice.steps[0])) / lattice.edge * np.exp(-1j * angle)
+    zero = complex(lattice.forward * np.exp(-1j * angle))
     turn = _turns(cmap, lattice, sides, zero)
     unit = _common(cmap, lattice, turn, zero, chains)
     # Directions are exact up to rounding of the boundary angles; from here on they are exact.
@@ -324,8 +327,8 @@ def _turns(cmap: ConformalMap, lattice: Lattice, sides: Sides, zero: complex) ->
     before: complex | None = None
     for loop in np.unique(loops):
         on = loops == loop
-        mean = complex((sides.length[on] * sides.direction[on] ** lattice.order).sum())
-        unit = zero / complex(np.exp(1j * np.angle(mean) / lattice.order))
+        mean = complex((sides.length[on] * sides.direction[on] ** lattice.fold).sum())
+        unit = zero / complex(np.exp(1j * np.angle(mean) / lattice.fold))
         if before is not None:
             steps = round(float(np.angle(before / unit)) / lattice.quantum)
             unit *= complex(np.exp(1j * lattice.quantum * steps))
@@ -366,7 +369,7 @@ def _origins(frame: _Frame, scale: complex) -> list[tuple[Isometry, complex]]:
         return [(motion, complex(normal[0] * (first[0] - depth[0] + 1j * place))) for place in places]
     p, q = normal[0], normal[across[0]]
     d = first[0] - depth[0]
-    lines = first[across[0]] + frame.period[across[0]] * np.arange(lattice.cosets) - depth[across[0]]
+    lines = first[across[0]] + frame.period[across[0]] * np.arange(MOST_LINES) - depth[across[0]]
     return [(motion, complex(origin)) for origin in meeting(p, d, q, lines)]
 
 
@@ -389,7 +392,7 @@ def _translation(frame: _Frame, wanted: complex) -> Ints:
 def symmetry_centres(lattice: Lattice, turns: int) -> list[tuple[Isometry, complex]]:
     """Motions p ↦ ζ^turns·p + τ that differ by more than a translation of the lattice, with their fixed
     points: centres of 6-, 4-, 3- or 2-fold symmetry, the highest first."""
-    zeta = np.exp(1j * lattice.quantum * turns)
+    zeta = np.exp(1j * lattice.step_angle * turns)
     e1 = complex(lattice.position(lattice.basis[0]))
     found: list[tuple[Isometry, complex]] = []
     reach = range(-2, 3)
@@ -413,7 +416,7 @@ def _misplaced_corners(frame: _Frame, motion: Isometry, line: Floats) -> float:
     following, sheet = frame.following
     shift = lattice.position(motion.apply(np.zeros((len(sheet), 2), dtype=np.int64), sheet))
     p, d = frame.normal[: len(sheet)], line[: len(sheet)]
-    q = p[following] * np.exp(1j * lattice.quantum * motion.rotation(sheet))
+    q = p[following] * np.exp(1j * lattice.step_angle * motion.rotation(sheet))
     e = d[following] + (q.conj() * shift).real
     area = (p.conj() * q).imag
     inner = abs(area) > 1e-6

@@ -73,7 +73,7 @@ class Placing:
         features: frozenset[int] = frozenset()
         if cmap.surface.features:
             every = cls(cmap, lattice, settings, turns, loops, features, notes)
-            cell = every._cell * mean_stretch(cmap)
+            cell = every.cell * mean_stretch(cmap)
             features, told = worth_following(cmap.surface, cmap.surface.features, cell)
             notes = [*notes, *told]
         return cls(cmap, lattice, settings, turns, loops, features, notes)
@@ -147,7 +147,7 @@ class Placing:
         return None, told
 
     def _wide_note(self, chain: Chain) -> str:
-        cells = chain.width / self._cell
+        cells = chain.width / self.cell
         return (
             f"The fold {self._ends(chain)} strays from a straight line of the domain by "
             f"{chain.width / self.cmap.circumference:.1%} of the circumference, {cells:.1f} cells: "
@@ -185,7 +185,7 @@ class Placing:
         return f"through {first}" if chain.closed else f"from {first} to {last}"
 
     @cached_property
-    def _cell(self) -> float:
+    def cell(self) -> float:
         """Width of a cell in the domain, the root of its area."""
         angle = edge_angle(self.lattice, self.shape)
         edge = wanted_edge(self.cmap, self.lattice, self.shape, angle) / self.lattice.edge

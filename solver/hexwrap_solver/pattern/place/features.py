@@ -190,7 +190,7 @@ def _entries(chains: list[Chain], rotation: Isometry, own: Complexes) -> tuple[I
     none = np.zeros(0, dtype=np.int64)
     vertex = np.concatenate([none, *(chain.vertex for chain in chains)])
     sheet = np.concatenate([none, *(chain.sheet for chain in chains)])
-    turned = own[which] / np.exp(1j * rotation.lattice.quantum * rotation.rotation(sheet))
+    turned = own[which] / np.exp(1j * rotation.lattice.step_angle * rotation.rotation(sheet))
     return vertex, which, turned, sheet
 
 
@@ -199,7 +199,7 @@ def _meet(chains: list[Chain], rotation: Isometry, own: Complexes, sides: Sides,
     runs along a side. The shortest give way."""
     taken = np.ones(len(chains), dtype=bool)
     vertex, which, turned, _ = _entries(chains, rotation, own)
-    at_side = normal[sides.side] / np.exp(1j * rotation.lattice.quantum * rotation.rotation(sides.sheet))
+    at_side = normal[sides.side] / np.exp(1j * rotation.lattice.step_angle * rotation.rotation(sides.sheet))
     length = np.array([chain.length for chain in chains])
     for _ in range(len(chains)):
         on = taken[which]

@@ -138,14 +138,14 @@ class Lines:
         of their loop."""
         zero = np.zeros((*self.sheet.shape, 2), dtype=np.int64)
         shift = motion.lattice.position(motion.apply(zero, self.sheet))
-        turn = np.exp(1j * motion.lattice.quantum * motion.rotation(self.sheet))
+        turn = np.exp(1j * motion.lattice.step_angle * motion.rotation(self.sheet))
         own = depth[self.side] - ((self.normal * turn).conj() * shift).real
         return np.asarray(np.where(self.side >= 0, own, 0.0))
 
 
 def lines_of(n: int, sides: Sides, normal: Complexes, motion: Isometry) -> Lines:
     """normal: (s,) of the sides in the frame of their loop. motion: any with the right rotation."""
-    own = normal[sides.side] / np.exp(1j * motion.lattice.quantum * motion.rotation(sides.sheet))
+    own = normal[sides.side] / np.exp(1j * motion.lattice.step_angle * motion.rotation(sides.sheet))
     # Of the lines listed for a vertex each once: a closed one comes twice, one of several features again.
     order = np.argsort(sides.vertex, kind="stable")
     vertex = sides.vertex[order]

@@ -170,7 +170,7 @@ def corners_of_boundary(layout: Layout, boundary: Boundary) -> Bools:
     """(b,) whether the boundary turns at the tail of each boundary edge."""
     along = boundary.head - boundary.tail
     turned = along[boundary.following] * np.exp(
-        1j * layout.lattice.quantum * boundary.step[:, 0]
+        1j * layout.lattice.step_angle * boundary.step[:, 0]
     )  # the next edge in this one's coordinates
     bend = np.zeros(len(along), dtype=bool)
     bend[boundary.following] = abs(np.angle(turned / along)) > STRAIGHT
@@ -179,11 +179,11 @@ def corners_of_boundary(layout: Layout, boundary: Boundary) -> Bools:
 
 @dataclass(frozen=True)
 class Exits:
-    """Edges of the pattern that leave the domain: from a node in a direction to a place (edge, t) on the
+    """Edges of the pattern that leave the domain: from a node by a slot to a place (edge, t) on the
     boundary. isometry: (k, 4) from the coordinates of the face there to the node's own."""
 
     node: Ints
-    direction: Ints
+    slot: Ints
     edge: Ints
     t: Floats
     isometry: Ints
@@ -192,17 +192,18 @@ class Exits:
 def exits_of(layout: Layout, nodes: Nodes, edges: PatternEdges, boundary: Boundary) -> Exits:
     """Where edges that start at a node inside meet the boundary."""
     lattice = layout.lattice
-    node, direction = np.nonzero((edges.exits >= 0) & (edges.head < 0))
-    exits, isometry = edges.exits[node, direction], edges.isometry(node, direction)
+    node, slot = np.nonzero((edges.exits >= 0) & (edges.head < 0))
+    exits, isometry = edges.exits[node, slot], edges.isometry(node, slot)
     edge = boundary.number[exits // 3, exits % 3]
     own, into = nodes.point[nodes.own[node]], lattice.invert(isometry)
-    start = lattice.position(lattice.apply(into, own))
-    heading = lattice.position(lattice.apply(into, own + lattice.steps[direction])) - start
+    start = lattice.stand(lattice.apply(into, own))
+    way = edges.way[node, slot] - isometry[:, 0] * lattice.steps_per_turn
+    heading = lattice.edge * lattice.headings[way % lattice.directions]
     t = _meeting(boundary, edge, start, heading)
     away = abs(boundary.tail[edge] + t * (boundary.head - boundary.tail)[edge] - start)
     kept = (edge >= 0) & (away > 16 * layout.tolerance)
     place = snap(layout, boundary, edge[kept], t[kept], isometry[kept], 4 * layout.tolerance)
-    return Exits(node[kept], direction[kept], *place)
+    return Exits(node[kept], slot[kept], *place)
 
 
 def _meeting(boundary: Boundary, edge: Ints, start: Complexes, heading: Complexes) -> Floats:
@@ -232,16 +233,16 @@ def chords(layout: Layout, boundary: Boundary) -> Chords:
     """Pattern edges that come in through the boundary and go out again without reaching a node."""
     lattice, tolerance = layout.lattice, layout.tolerance
     edge, start, direction = _edges_across(layout, boundary)
-    found = trace(layout, boundary.face[edge], lattice.position(start), start + lattice.steps[direction])
+    found = trace(layout, boundary.face[edge], lattice.stand(start), start + lattice.steps[direction])
     out = found.exit >= 0
     edge, start, direction = edge[out], start[out], direction[out]
     isometry = found.isometry[out]
     end_edge = boundary.number[found.face[out], found.exit[out]]
-    here, way = lattice.position(start), lattice.position(lattice.steps[direction])
+    here, way = lattice.stand(start), lattice.edge * lattice.headings[direction]
     t = _meeting(boundary, edge, here, way)
     into = lattice.invert(isometry)
-    there = lattice.position(lattice.apply(into, start))
-    way_there = lattice.position(lattice.apply(into, start + lattice.steps[direction])) - there
+    there = lattice.stand(lattice.apply(into, start))
+    way_there = way * lattice.turns[into[:, 0]]
     end_t = _meeting(boundary, end_edge, there, way_there)
     came = abs(boundary.tail[edge] + t * (boundary.head - boundary.tail)[edge] - here)
     went = abs(boundary.tail[end_edge] + end_t * (boundary.head - boundary.tail)[end_edge] - there)
@@ -275,17 +276,19 @@ def _edges_across(layout: Layout, boundary: Boundary) -> tuple[Ints, Ints, Ints]
     start = low[edge] + np.stack([step % wide[edge, 0], step // wide[edge, 0]], axis=1)
     along = (boundary.head - boundary.tail)[edge]
     along = along / abs(along)
-    depth = ((lattice.position(start) - boundary.tail[edge]) * along.conj()).imag
+    depth = ((lattice.stand(start) - boundary.tail[edge]) * along.conj()).imag
     near = lattice.is_node(start) & (depth < -layout.tolerance) & (depth > -lattice.edge - layout.tolerance)
     edge, start, depth = edge[near], start[near], depth[near]
-    direction = np.tile(np.arange(lattice.order), len(edge))
-    edge, start, depth = (np.repeat(x, lattice.order, axis=0) for x in (edge, start, depth))
-    heading = lattice.position(lattice.steps[direction])
+    ways = lattice.ways[lattice.residue(start)]
+    node, slot = np.nonzero(ways >= 0)
+    direction = ways[node, slot]
+    edge, start, depth = edge[node], start[node], depth[node]
+    heading = lattice.edge * lattice.headings[direction]
     along = (boundary.head - boundary.tail)[edge]
     length = abs(along)
     rise = (heading * along.conj()).imag / length
-    crosses = lattice.has_edge(start, direction) & (depth + rise > layout.tolerance)
-    foot = ((lattice.position(start) - boundary.tail[edge]) * along.conj()).real / length
+    crosses = depth + rise > layout.tolerance
+    foot = ((lattice.stand(start) - boundary.tail[edge]) * along.conj()).real / length
     at = foot - depth * (heading * along.conj()).real / length / np.where(rise == 0, 1.0, rise)
     crosses &= (at > -4 * layout.tolerance) & (at < length + 4 * layout.tolerance)
     return edge[crosses], start[crosses], direction[crosses]

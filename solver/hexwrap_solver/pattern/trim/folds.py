@@ -140,4 +140,28 @@ def sewn(lattice: Lattice, cells: Cells, seam: Seams) -> Cells:
     one, other = open_side[two[facing]].T
     twin = cells.twin.copy()
     twin[one], twin[other] = other, one
-    return Cells(Ragged(corner, cells.corner.offsets), isometry, twin)
+    return Cells(Ragged(corner, cells.corner.offsets), isometry, twin, cells.index)
+
+
+def without_ends(lattice: Lattice, cells: Cells) -> tuple[Cells, Bools]:
+    """Cells without the pieces of folds that only reach into them and end there, and (c,) those that had
+    some.
+
+    Such a piece is walked to its tip and straight back: two successive sides that are twins.
+    """
+    had = np.zeros(cells.n, dtype=bool)
+    while True:
+        following = cells.corner.next()
+        tip = cells.twin == following
+        if not tip.any():
+            return cells, had
+        had[cells.corner.row[tip]] = True
+        keep = ~tip
+        keep[following[tip]] = False
+        renumber = np.where(keep, np.cumsum(keep) - 1, -1)
+        row, twin, isometry = cells.corner.row[keep], cells.twin[keep], cells.isometry[keep]
+        offsets = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=cells.n))]).astype(np.int64)
+        frame = lattice.invert(isometry[offsets[row]])  # the first corner may have gone
+        corner = Ragged(cells.corner.values[keep], offsets)
+        twin = np.where(twin >= 0, renumber[twin], -1)
+        cells = Cells(corner, lattice.compose(frame, isometry), twin, cells.index)

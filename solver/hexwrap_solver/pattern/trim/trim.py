@@ -40,7 +40,7 @@ from hexwrap_solver.pattern.place.glued import Glued
 from hexwrap_solver.pattern.trim.arrangement import HalfEdges, Points, arrangement
 from hexwrap_solver.pattern.trim.boundary import Boundary, met_by_chords
 from hexwrap_solver.pattern.trim.enclosed import around_enclosed
-from hexwrap_solver.pattern.trim.folds import Seams, seams, sewn
+from hexwrap_solver.pattern.trim.folds import Seams, seams, sewn, without_ends
 from hexwrap_solver.surface.features import FeatureEdges
 
 #: Pieces smaller than this part of a cell are joined to a cut neighbour, or dropped where there is none.
@@ -99,7 +99,7 @@ def trim(
     Raises TooCoarse where a face goes around the surface.
     """
     lattice = layout.lattice
-    side_of_edge = sides_by_edge(lattice, edges, cells)
+    side_of_edge = sides_by_edge(edges, cells)
     used = side_of_edge >= 0
     points, half_edges, on = arrangement(layout, boundary, nodes, edges, used)
     seam = None
@@ -126,14 +126,18 @@ def trim(
     small = area < sliver
     lost = int((small & (area > nothing)).sum())
     kept = faces.part(~small)
-    together = _together(layout, cells, side_of_edge, kept, half_edges, edges)
+    together = _together(cells, side_of_edge, kept, half_edges, edges)
     whole = np.arange(together.n) < cells.n
     dropped = float(area[small & (area > 0)].sum() / lattice.cell_area)
-    holed = around_enclosed(layout, boundary, nodes, met_by_chords(met, layout, boundary))
+    holed = around_enclosed(layout, boundary, nodes, edges, met_by_chords(met, layout, boundary))
     keep = ~_left_of(holed, cells, side_of_edge, kept, half_edges)
     together = together.part(keep)
     if seam is not None:
-        together = sewn(lattice, together, seam)
+        together, had = without_ends(lattice, sewn(lattice, together, seam))
+        # What only a fold's end had reached into is whole again.
+        on_node = np.add.reduceat(together.corner.values < nodes.n, together.corner.offsets[:-1])
+        full = (on_node == lattice.sides) & (together.corner.lengths == lattice.sides)
+        whole[keep] |= had & full
     return Trimmed(
         together, whole[keep], points, dropped, max(joined - lost, 0), lost, int((~keep).sum()), seam
     )
@@ -261,7 +265,6 @@ def _slivers(
 
 
 def _together(
-    layout: Layout,
     whole: WholeCells,
     side_of_edge: Ints,
     cut: _Faces,
@@ -269,14 +272,14 @@ def _together(
     edges: PatternEdges,
 ) -> Cells:
     """Whole and cut cells in one; twins are found by half-edges, or by the pattern edges they run along."""
-    lattice, size = layout.lattice, len(whole.direction)
+    size = len(whole.slot)
     half_edge = cut.half_edge.values
     side_of_half = np.full(len(half_edges.tail), -1, dtype=np.int64)
     side_of_half[half_edge] = size + np.arange(len(half_edge))
     side_of_edge = side_of_edge.copy()
     name = half_edges.name[half_edge]
     side_of_edge[name[name >= 0]] = side_of_half[half_edge[name >= 0]]
-    reverse = edges.reverse(lattice, whole.corner.values.astype(np.int64), whole.direction)
+    reverse = edges.back[whole.corner.values, whole.slot]
     twin_cut = side_of_half[half_edges.twin[half_edge]]
     twin_name = half_edges.name[half_edges.twin[half_edge]]
     twin_cut = np.where((twin_cut < 0) & (twin_name >= 0), side_of_edge[twin_name], twin_cut)
@@ -288,4 +291,5 @@ def _together(
         ),
         np.concatenate([whole.isometry, cut.isometry]),
         np.concatenate([side_of_edge[reverse], twin_cut]),
+        np.concatenate([whole.index, np.zeros(cut.half_edge.n_rows, dtype=np.int64)]),
     )
