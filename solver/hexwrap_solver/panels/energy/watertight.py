@@ -35,12 +35,12 @@ from hexwrap_solver.pattern.types import Pattern
 from hexwrap_solver.surface.types import Surface
 
 #: Weights of the plane distances, stage by stage; the surface weighs 1.
-FLATNESS = (10.0, 1e3)
+FLATNESS = (1.0, 1e2, 1e4)
 
 #: Most Gauss–Newton steps in a stage, and the fraction of its energy that a step takes away if another one is
 #: to follow. What a stage leaves undone, the next does along with its own work; nothing comes after the last,
 #: nor after the only one where nothing is to become flat.
-STEPS, LAST_STEPS, ONLY_STEPS = (1, 1.0), (3, 0.3), (15, 1e-4)
+STEPS, LAST_STEPS, ONLY_STEPS = (1, 1.0), (3, 0.2), (15, 1e-4)
 
 #: Weight of the planes in Newton's method at the end, so large that the rest only chooses among flat meshes.
 DECISIVE = 1e9
