@@ -36,6 +36,8 @@ CASES = {
     "openings": "a door and windows",
     "dome": "a dome",
     "roof": "a roof along its four sides",
+    "box": "the pattern folds at the corners",
+    "patches": "three patches, two creases",
 }
 
 

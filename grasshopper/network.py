@@ -37,7 +37,17 @@ class Example:
     guide: str
     around: int = 24
     sizes: int = 11
-    kinds: tuple[str, ...] = ("hex", "triangle", "quad")
+    kinds: tuple[str, ...] = (
+        "hex",
+        "triangle",
+        "quad",
+        "diamond",
+        "brick",
+        "trihexagonal",
+        "truncated-hexagonal",
+        "truncated-square",
+        "rhombitrihexagonal",
+    )
     rims: tuple[str, ...] = ("whole", "trim")
     corners: str = ""
     angles: str = "240"

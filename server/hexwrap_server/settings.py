@@ -63,6 +63,7 @@ class Settings:
     read_mib: float = _setting(2048.0, "most memory of a process that reads, in MiB")
     max_queue: int = _setting(100, "most jobs that wait; more are answered 503")
     job_seconds: float = _setting(900.0, "longest run of a job, in seconds")
+    explore_seconds: float = _setting(3600.0, "longest run of an exploration, in seconds")
     job_mib: float = _setting(8192.0, "most memory of a worker process, in MiB")
     results_days: float = _setting(30.0, "finished jobs are forgotten after this many days")
     results_mib: float = _setting(4096.0, "disk space for results in MiB; the oldest go first")

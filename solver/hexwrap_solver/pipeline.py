@@ -105,9 +105,7 @@ def _solve(
     take_in: Callable[[], Surface], settings: SolveSettings, run: StageRunner, source: Any
 ) -> Solution:
     pattern, panels = settings.pattern, settings.panels
-    boundary = settings.boundary.adapted(pattern.kind if pattern else None)
-    surface = run("surface", source, lambda progress: take_in())
-    cmap, choices = _map(surface, settings, boundary, run)
+    cmap, choices = mapped(take_in, settings, run, source=source)
     if pattern is None:
         return Solution(
             cmap,
@@ -128,6 +126,15 @@ def _solve(
         depth = wanted.depth if wanted is not None else 0.0
         frame = run("support", depth, lambda progress: support(laid, depth, progress))
     return Solution(cmap, quality, laid, made, parts, frame)
+
+
+def mapped(
+    take_in: Callable[[], Surface], settings: SolveSettings, run: StageRunner, *, source: Any = None
+) -> tuple[ConformalMap, Choices | None]:
+    """The first stages alone, as ``solve`` runs them. Raises HexwrapError."""
+    pattern = settings.pattern
+    surface = run("surface", source, lambda progress: take_in())
+    return _map(surface, settings, settings.boundary.adapted(pattern.kind if pattern else None), run)
 
 
 def _measured(
@@ -165,7 +172,8 @@ def _map(
         boundary = replace(boundary, mode="isometric")
     wanted = asked
     sizes = settings.panels.sizes if settings.panels is not None else None
-    classes = sizes if isinstance(sizes, int) else None
+    # where they stand is not chosen for the sizes then: variants with other sizes share the map
+    classes = sizes if isinstance(sizes, int) and not asked.at else None
     shape = None if pattern is None else replace(pattern, phase=(0.0, 0.0), max_cells=0)
     seats = run(
         "singularities",

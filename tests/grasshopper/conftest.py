@@ -7,13 +7,13 @@ import shutil
 import socket
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
 from grasshopper import archive, components
+from tests.server.patience import PATIENCE, until
 
 ROOT = Path(__file__).resolve().parents[2]
 HEADLESS = Path(__file__).parent / "headless"
@@ -80,15 +80,16 @@ def server_port(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]:
             stderr=said,
         )
     try:
-        deadline = time.monotonic() + 60
-        while not is_ready(port):
+
+        def ready() -> bool:
             assert process.poll() is None, f"the server did not start:\n{log.read_text()}"
-            assert time.monotonic() < deadline, "the server did not come up"
-            time.sleep(0.1)
+            return is_ready(port)
+
+        until(ready, "the server")
         yield port
     finally:
         process.terminate()
-        process.wait(20)
+        process.wait(PATIENCE)
 
 
 def is_ready(port: int) -> bool:
@@ -132,7 +133,7 @@ def run_scenarios(request: pytest.FixtureRequest, unpacked: Path) -> Runner:
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
-            timeout=300,
+            timeout=4 * PATIENCE,
             check=False,
         )
         assert done.returncode == 0, f"\n{done.stdout}"

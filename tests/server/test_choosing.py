@@ -13,6 +13,7 @@ import rhino3dm
 from hexwrap_server.cli.main import main
 from hexwrap_server.input.choose import Chosen, choose
 from hexwrap_server.input.readers.errors import NoObjectError, SeveralObjectsError, UnreadableFileError
+from hexwrap_server.input.readers.rhino_brep import control_net
 from hexwrap_server.input.surface_files import read_file, sent_surface
 from hexwrap_server.jobs.work import take_in
 from hexwrap_solver.surface import NurbsSurface, SentMesh, surface_from_mesh
@@ -444,3 +445,9 @@ SHOWN = {
 def test_files_shown_are_taken_in(name: str) -> None:
     read = sent_surface((CASES / f"{name}.3dm").read_bytes(), "a.3dm", SurfaceSettings())
     assert len(take_in(read.sent).loops) == SHOWN[name]
+
+
+def test_rhino3dm_meshes_a_subd_as_it_is_called() -> None:
+    """Its arguments have changed between versions; SubDs themselves cannot be made without Rhino."""
+    mesh = control_net(rhino3dm.SubD())
+    assert mesh is None or len(mesh.Faces) == 0

@@ -338,3 +338,40 @@ def test_repairs_are_told(tube: Path, tmp_path: Path, capsys: pytest.CaptureFixt
     tube.write_text("\n".join(lines))
     assert main(["solve", str(tube), "--around", "12", "-o", str(tmp_path / "x.obj")]) == 0
     assert "• 1 face was turned over" in capsys.readouterr().out
+
+
+def test_explore_writes_the_front(tube: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    outs = [tmp_path / f"front.{ending}" for ending in ("csv", "png", "json")]
+    wanted = [
+        "--variants",
+        "4",
+        "--around",
+        "10",
+        "12",
+        "--singularities",
+        "0",
+        "--sizes",
+        "2",
+        "3",
+        "--per-type",
+        "9",
+    ]
+    assert main(["explore", str(tube), *wanted, *(f"-o{out}" for out in outs)]) == 0
+    rows = outs[0].read_text().splitlines()
+    result = json.loads(outs[2].read_text())
+    assert len(rows) == 1 + len(result["variants"]) > 2
+    assert outs[1].read_bytes().startswith(b"\x89PNG")
+    told = capsys.readouterr().out
+    assert "proposed" in told
+    assert all(note in told for note in result["notes"])
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [(["-o", "x.obj"], ".csv, .json, .png"), (["-o", "x.csv", "--variants", "0"], "variants")],
+)
+def test_explore_refuses(
+    tube: Path, capsys: pytest.CaptureFixture[str], options: list[str], words: str
+) -> None:
+    assert main(["explore", str(tube), *options]) in (1, 2)
+    assert words in capsys.readouterr().err

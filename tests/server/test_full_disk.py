@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import errno
 import sqlite3
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,7 @@ from hexwrap_server.jobs.engine import ProcessEngine
 from hexwrap_server.jobs.store import Store
 from tests.server.bodies import request, tube
 from tests.server.live import Live, finished, running, until_at
-from tests.server.patience import PATIENCE
+from tests.server.patience import until
 
 Fill = Callable[[bool], None]
 
@@ -95,10 +94,7 @@ def test_job_that_ends_on_a_full_disk_fails_and_is_written_later(
     assert client.get("/health").json()["running"] == 0
     assert status_on_disk(client, id) == "running"
     disk.is_full = False
-    deadline = time.monotonic() + PATIENCE
-    while status_on_disk(client, id) != "failed":
-        assert time.monotonic() < deadline
-        time.sleep(0.05)
+    until(lambda: status_on_disk(client, id) == "failed", "the end on disk")
     assert client.post("/v1/solve", json=request()).status_code == 200
 
 

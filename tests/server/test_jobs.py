@@ -208,9 +208,13 @@ def test_job_over_a_limit_fails(tmp_path: Path, settings: dict[str, Any], slug: 
 @pytest.mark.parametrize(("job_mib", "cached"), [(400.0, 50), (8192.0, 256)])
 def test_what_is_remembered_leaves_room_for_the_next_job(tmp_path: Path, job_mib: float, cached: int) -> None:
     store = Store(tmp_path)
-    manager = JobManager(store, ProcessEngine(1), Settings(job_mib=job_mib), Metrics())
+    manager = JobManager(store, ProcessEngine(1), Settings(job_mib=job_mib), Metrics(), nothing_short)
     assert manager.caching.memory_bytes == cached * MIB
     store.close()
+
+
+async def nothing_short(function: str, *arguments: Any) -> Any:
+    raise AssertionError("nothing short is asked for")
 
 
 class Still(ProcessEngine):
@@ -231,7 +235,7 @@ class Still(ProcessEngine):
 async def managed(folder: Path) -> AsyncIterator[tuple[JobManager, Still, list[Job]]]:
     """A manager in this event loop, three jobs, of which one runs."""
     store, engine = Store(folder), Still()
-    manager = JobManager(store, engine, Settings(), Metrics())
+    manager = JobManager(store, engine, Settings(), Metrics(), nothing_short)
     await manager.start()
     try:
         jobs = []
@@ -441,6 +445,7 @@ def test_solve_that_the_server_ends_says_where_the_job_is(tmp_path: Path) -> Non
     assert int(answer.headers["retry-after"]) > 0
 
 
+@pytest.mark.usefixtures("fresh_workers")
 def test_workers_know_for_whom_they_work(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     surface = fresh()
     with running(tmp_path, workers=1) as client:

@@ -12,12 +12,14 @@ from hexwrap_server import samples
 from hexwrap_server.input.surface_files import read_surface
 from hexwrap_server.samples import make
 from hexwrap_solver.surface import NurbsSurface, surface_from_mesh, surface_from_nurbs
+from hexwrap_solver.surface.brep.surface import surface_from_brep
+from hexwrap_solver.surface.brep.types import Brep
 from hexwrap_solver.surface.nurbs import domain, evaluate, evaluate_points
 from hexwrap_solver.surface.types import SentMesh
 
 #: NURBS surfaces, and meshes.
 FIGURES = ["cone", "diagrid", "entrance", "facade", "isometric", "ring", "singular", "tower", "waist"]
-MESHES = ["dome", "openings", "roof"]
+MESHES = ["box", "dome", "openings", "patches", "roof"]
 
 
 def surface_of(name: str) -> NurbsSurface:
@@ -88,6 +90,20 @@ def test_the_rhino_file_holds_the_same_mesh(name: str, loops: int) -> None:
     assert read.faces.to_lists() == sent["faces"]
     surface = surface_from_mesh(read)
     assert (len(surface.loops), surface.repairs) == (loops, ())
+
+
+@pytest.mark.parametrize(("name", "creases"), [("box", 4), ("patches", 2)])
+def test_folded_samples_are_several_surfaces_that_join_to_one_with_creases(name: str, creases: int) -> None:
+    path = samples.path_3dm(name)
+    brep = read_surface(path.read_bytes(), path.name).geometry
+    assert isinstance(brep, Brep)
+    surface = surface_from_brep(brep)
+    assert len(surface.loops) == 2
+    assert [feature.closed for feature in surface.features] == creases * [name == "patches"]
+    sent = samples.load(name)["surface"]
+    low, high = np.min(sent["vertices"], axis=0), np.max(sent["vertices"], axis=0)
+    np.testing.assert_allclose(surface.vertices.min(axis=0), low, atol=0.05)
+    np.testing.assert_allclose(surface.vertices.max(axis=0), high, atol=0.05)
 
 
 @pytest.mark.parametrize("name", FIGURES)

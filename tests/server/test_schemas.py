@@ -45,7 +45,7 @@ def refused(body: dict[str, Any]) -> dict[str, str]:
         ({"panels": {"weights": {"surfaces": 1}}}, "/panels/weights/surfaces", "did you mean 'surface'?"),
         ({"panels": {"sizes": 0}}, "/panels/sizes", "greater than or equal to 1, or 'fewest', not 0"),
         ({"panels": {"sizes": 1.5}}, "/panels/sizes", "not 1.5"),
-        ({"pattern": {"kind": "pentagon"}}, "/pattern/kind", "'hex', 'triangle' or 'quad', not \"pentagon\""),
+        ({"pattern": {"kind": "pentagon"}}, "/pattern/kind", "or 'rhombitrihexagonal', not \"pentagon\""),
         ({"panels": {"joint": None}}, "/panels/joint", "not null"),
         ({"panels": {"weights": {"edge": True}}}, "/panels/weights/edge", "not true"),
     ],

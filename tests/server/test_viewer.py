@@ -8,7 +8,6 @@ import shutil
 import socket
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,8 +18,11 @@ import numpy as np
 import pytest
 
 from hexwrap_server.input.form import Body, leaves
+from tests.server.patience import PATIENCE, until
 
 ROOT = Path(__file__).resolve().parents[2]
+#: Milliseconds that the browser waits for what must come.
+MOMENT = int(1000 * PATIENCE)
 VIEWER = ROOT / "server" / "viewer"
 STATIC = ROOT / "server" / "hexwrap_server" / "static"
 
@@ -80,17 +82,17 @@ class Server:
         self.process = subprocess.Popen(
             [sys.executable, "-c", program], env=env, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
         )
-        for _ in range(300):
-            try:
-                if httpx.get(f"{self.url}/health", timeout=1, trust_env=False).status_code == 200:
-                    return
-            except httpx.TransportError:
-                time.sleep(0.1)
-        raise RuntimeError("the server did not come up")
+        until(self.answers, "the server")
+
+    def answers(self) -> bool:
+        try:
+            return httpx.get(f"{self.url}/health", timeout=PATIENCE, trust_env=False).status_code == 200
+        except httpx.TransportError:
+            return False
 
     def stop(self) -> None:
         self.process.terminate()
-        self.process.wait(20)
+        self.process.wait(PATIENCE)
 
 
 @pytest.fixture(scope="module")
@@ -132,7 +134,18 @@ def opened(browser, server: Server, path: str = "/") -> Iterator[Page]:
         page.close()
 
 
-def shown(page: Page, before: str | None = None, timeout: int = 60_000) -> str:
+#: Looks from outside, horizontally, at a point of a model that stands about the vertical axis.
+TURNED_TO = """([x, y, z]) => {
+    const { space } = window.hexwrapViewer;
+    const reach = space.camera.position.distanceTo(space.controls.target), far = Math.hypot(x, y);
+    const target = space.controls.target;
+    space.camera.position.set(target.x + reach * x / far, target.y + reach * y / far, target.z + 0.2);
+    space.controls.update();
+    space.render();
+}"""
+
+
+def shown(page: Page, before: str | None = None, timeout: int = MOMENT) -> str:
     """Waits until another result than ``before`` is on the screen; its job."""
     page.wait_for_function(
         "old => (document.documentElement.dataset.shown || null) !== old", arg=before, timeout=timeout
@@ -260,6 +273,38 @@ def test_choosing_a_number_of_sizes_on_the_curve_recomputes(browser, server: Ser
         assert page.complaints == []
 
 
+def test_singularities_are_chosen_on_their_curve_and_dragged(browser, server: Server) -> None:
+    with opened(browser, server) as page:
+        page.select_option("#sample", "singular")
+        before = shown(page)
+        assert page.locator("#singular-curve .spot.current").get_attribute("data-k") == "3"
+        page.locator("#singular-curve .spot[data-k='1']").focus()
+        page.keyboard.press("Enter")
+        job = shown(page, before)
+        one = fetched(server, f"/v1/jobs/{job}/result?include=map,quality,mesh")
+        assert len(one["map"]["cones"]) == 1
+        curve = one["quality"]["singularity_curve"]
+        assert curve["number"][curve["taken"]] == 1
+        page.evaluate(TURNED_TO, one["mesh"]["vertices"][one["map"]["cones"][0]["vertex"]])
+        x, y = on_screen(page, "mesh.vertices", one["map"]["cones"][0]["vertex"])
+        page.mouse.move(x, y)
+        page.mouse.down()
+        page.mouse.move(x + 10, y + 15)
+        page.mouse.move(x + 12, y + 40)
+        page.mouse.up()
+        job2 = shown(page, job)
+        moved = fetched(server, f"/v1/jobs/{job2}/result?include=map,mesh,pattern")
+        cones = moved["map"]["cones"]
+        assert [cone["index"] for cone in cones] == [one["map"]["cones"][0]["index"]]
+        was, there = (np.array(r["mesh"]["vertices"][r["map"]["cones"][0]["vertex"]]) for r in (one, moved))
+        assert np.linalg.norm(there - was) > 2 * moved["pattern"]["edge_length"]
+        assert sum(k != 0 for k in moved["pattern"]["index"]) == 1
+        page.locator("#singular-auto").click()
+        again = fetched(server, f"/v1/jobs/{shown(page, job2)}/result?include=map")
+        assert len(again["map"]["cones"]) == 3
+        assert page.complaints == []
+
+
 def test_a_dropped_file_is_solved(browser, server: Server, tmp_path: Path) -> None:
     path = tmp_path / "tube.obj"
     path.write_text(tube())
@@ -276,7 +321,7 @@ def test_faults_are_shown_in_red_where_they_are(browser, server: Server, tmp_pat
     path.write_text(torus())
     with opened(browser, server) as page:
         page.set_input_files("#file", str(path))
-        page.wait_for_function("() => document.documentElement.dataset.shown === 'faults'", timeout=60_000)
+        page.wait_for_function("() => document.documentElement.dataset.shown === 'faults'", timeout=MOMENT)
         assert "handle" in page.locator("#banner").inner_text()
         red = page.evaluate(
             """() => {
@@ -343,7 +388,7 @@ WATERTIGHT: dict[str, Any] = {
 @pytest.mark.parametrize("asked", [EVERYTHING, WATERTIGHT], ids=["split", "watertight"])
 def test_no_setting_is_lost_when_one_is_changed(browser, server: Server, asked: dict[str, Any]) -> None:
     surface = obj_surface(tube())
-    with httpx.Client(base_url=server.url, trust_env=False, timeout=60) as client:
+    with httpx.Client(base_url=server.url, trust_env=False, timeout=PATIENCE) as client:
         id = client.post("/v1/jobs", json={"name": "all", "surface": surface} | asked).json()["id"]
         assert client.get(f"/v1/jobs/{id}?wait=60").json()["status"] == "done"
         adopted = client.get(f"/v1/jobs/{id}/request").json()
@@ -384,7 +429,7 @@ def test_corners_are_found_at_vertices_that_were_welded_away(browser, server: Se
     ]
     angles = [{"vertex": seam, "angle": 200}, {"vertex": 12, "angle": 160}]
     body = {"surface": surface, "boundary": {"mode": "angles", "angle_unit": "deg", "angles": angles}}
-    with httpx.Client(base_url=server.url, trust_env=False, timeout=60) as client:
+    with httpx.Client(base_url=server.url, trust_env=False, timeout=PATIENCE) as client:
         id = client.post("/v1/jobs", json=body | {"pattern": None}).json()["id"]
         assert client.get(f"/v1/jobs/{id}?wait=60").json()["status"] == "done"
     with opened(browser, server, f"/#job/{id}") as page:
@@ -400,16 +445,15 @@ def test_cancel_stops_the_job(browser, server: Server, tmp_path: Path) -> None:
     path.write_text(tube(900, 300))
     with opened(browser, server) as page:
         page.set_input_files("#file", str(path))
-        page.wait_for_selector("#cancel:not([hidden])", timeout=60_000)
+        page.wait_for_selector("#cancel:not([hidden])", timeout=MOMENT)
         page.click("#cancel")
         page.wait_for_selector("#cancel", state="hidden")
-        deadline = time.monotonic() + 10
-        while time.monotonic() < deadline:
+
+        def is_idle() -> bool:
             health = fetched(server, "/health")
-            if health["running"] == health["queued"] == 0:
-                break
-            time.sleep(0.2)
-        assert (health["running"], health["queued"]) == (0, 0)
+            return bool(health["running"] == health["queued"] == 0)
+
+        until(is_idle, "the end of the job")
 
 
 def test_the_page_outlives_a_restart_of_the_server(browser, server: Server) -> None:
@@ -417,9 +461,9 @@ def test_the_page_outlives_a_restart_of_the_server(browser, server: Server) -> N
         page.select_option("#sample", "tower")
         before = shown(page)
         server.stop()
-        page.wait_for_selector("#banner:not([hidden])", timeout=15_000)
+        page.wait_for_selector("#banner:not([hidden])", timeout=MOMENT)
         server.start()
-        page.wait_for_selector("#banner", state="hidden", timeout=15_000)
+        page.wait_for_selector("#banner", state="hidden", timeout=MOMENT)
         page.fill("[name='panels.sizes']", "4")
         job = shown(page, before)
         assert len(fetched(server, f"/v1/jobs/{job}/result?include=sizes")["sizes"]) == 4
@@ -451,7 +495,7 @@ def test_copied_curl_request_is_the_request(browser, server: Server) -> None:
 def test_a_failed_job_is_never_shown_on_another_surface(browser, server: Server) -> None:
     corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1]]
     fan = {"vertices": corners, "faces": [[0, 1, 2], [1, 0, 3], [0, 1, 4]]}  # three faces at an edge
-    with httpx.Client(base_url=server.url, trust_env=False, timeout=60) as client:
+    with httpx.Client(base_url=server.url, trust_env=False, timeout=PATIENCE) as client:
         failed = client.post("/v1/jobs", json={"surface": fan, "name": "fan"}).json()["id"]
         assert client.get(f"/v1/jobs/{failed}?wait=30").json()["status"] == "failed"
     with opened(browser, server) as page:
@@ -465,7 +509,7 @@ def test_a_failed_job_is_never_shown_on_another_surface(browser, server: Server)
 
 
 def test_work_that_stops_early_is_shown_without_complaint(browser, server: Server) -> None:
-    with httpx.Client(base_url=server.url, trust_env=False, timeout=60) as client:
+    with httpx.Client(base_url=server.url, trust_env=False, timeout=PATIENCE) as client:
         tower = client.get("/v1/samples/tower").json()
         for early in ({"panels": None}, {"panels": None, "pattern": None}):
             id = client.post("/v1/jobs", json=tower | early).json()["id"]
@@ -511,11 +555,13 @@ def test_the_bundle_is_what_the_source_builds(tmp_path: Path) -> None:
     copy = tmp_path / "server" / "viewer"
     shutil.copytree(VIEWER, copy, ignore=shutil.ignore_patterns("node_modules"))
     npm = shutil.which("npm")
-    done = subprocess.run([npm, "install", "--silent"], cwd=copy, capture_output=True, text=True, timeout=300)
+    done = subprocess.run(
+        [npm, "install", "--silent"], cwd=copy, capture_output=True, text=True, timeout=PATIENCE
+    )
     if done.returncode:
         pytest.skip(f"npm could not install the build's packages: {done.stderr.strip()[-200:]}")
-    subprocess.run([npm, "run", "check"], cwd=copy, check=True, capture_output=True, timeout=300)
-    subprocess.run([npm, "run", "build"], cwd=copy, check=True, capture_output=True, timeout=300)
+    subprocess.run([npm, "run", "check"], cwd=copy, check=True, capture_output=True, timeout=PATIENCE)
+    subprocess.run([npm, "run", "build"], cwd=copy, check=True, capture_output=True, timeout=PATIENCE)
     built = tmp_path / "server" / "hexwrap_server" / "static"
     for name in sorted(p.name for p in STATIC.iterdir()):
         assert (built / name).read_bytes() == (STATIC / name).read_bytes(), (

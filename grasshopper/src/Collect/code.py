@@ -123,6 +123,7 @@ def report(result):
         ("gap, mean: %.4g", gap["mean"]),
         ("gap, greatest: %.4g", gap["max"]),
         ("planarity, worst: %.2g of the edge", quality["planarity"]["max"]),
+        ("convex: %.1f %%", percent(quality.get("convex"))),
         ("distance to the surface, greatest: %.4g", quality["surface_distance"]["max"]),
         ("largest over smallest scale: %.4g", quality["scale_ratio"]),
         ("distinct panels: %d", quality["distinct_panels"]),
@@ -143,15 +144,7 @@ RESULTS = [
 
 
 def solve():
-    slot = slot_of(component)
-    if not Job:
-        stop(slot)
-        component.Message = "no job yet"
-    else:
-        in_background(component, slot, TEXT(Job), lambda token, url=TEXT(Job): collect(token, url))
-        state_message(component, slot, "collected")
-    found = slot["result"] or {}
-    return [found.get(name) for name in RESULTS]
+    return made_of_job(component, Job, collect, "collected", RESULTS)
 
 
 component = ghenv.Component

@@ -168,15 +168,7 @@ def summary(unrolled):
 
 
 def solve():
-    slot = slot_of(component)
-    if not Job:
-        stop(slot)
-        component.Message = "no job yet"
-    else:
-        in_background(component, slot, TEXT(Job), lambda token, url=TEXT(Job): domain(token, url))
-        state_message(component, slot, "unrolled")
-    found = slot["result"] or {}
-    return [found.get(name) for name in ("boundary", "cut", "corners", "angles", "pattern", "summary")]
+    return made_of_job(component, Job, domain, "unrolled", ("boundary", "cut", "corners", "angles", "pattern", "summary"))
 
 
 component = ghenv.Component

@@ -2,7 +2,17 @@
 
 # include: wire canvas choices
 
-KINDS = ["hex", "triangle", "quad"]
+KINDS = [
+    "hex",
+    "triangle",
+    "quad",
+    "diamond",
+    "brick",
+    "trihexagonal",
+    "truncated-hexagonal",
+    "truncated-square",
+    "rhombitrihexagonal",
+]
 ALIGN = ["none", "first", "both"]
 EDGES = ["whole", "trim"]
 TURNS = ["edge", "vertex", "u", "v"]

@@ -22,15 +22,7 @@ def support(token, url):
 
 
 def solve():
-    slot = slot_of(component)
-    if not Job:
-        stop(slot)
-        component.Message = "no job yet"
-    else:
-        in_background(component, slot, TEXT(Job), lambda token, url=TEXT(Job): support(token, url))
-        state_message(component, slot, "collected")
-    found = slot["result"] or {}
-    return [found.get(name) for name in ("nodes", "axes", "beams", "lines", "torsion", "tilt")]
+    return made_of_job(component, Job, support, "collected", ("nodes", "axes", "beams", "lines", "torsion", "tilt"))
 
 
 component = ghenv.Component

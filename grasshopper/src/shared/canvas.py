@@ -130,6 +130,22 @@ def in_background(component, slot, wanted, work, finish=None):
     thread.start()
 
 
+def made_of_job(component, job, work, idle, names):
+    """What work(token, url) makes of a job, in the order of names; None for all of them until it is there.
+
+    idle is the word below the component when nothing is to be done.
+    """
+    slot = slot_of(component)
+    if not job:
+        stop(slot)
+        component.Message = "no job yet"
+    else:
+        in_background(component, slot, TEXT(job), lambda token, url=TEXT(job): work(token, url))
+        state_message(component, slot, idle)
+    found = slot["result"] or {}
+    return [found.get(name) for name in names]
+
+
 def as_refusal(fault):
     """Any exception as one sentence for the balloon."""
     if isinstance(fault, Refusal):

@@ -1,4 +1,4 @@
-"""The one program, ``hexwrap``: serve, solve, inspect, lift, demo.
+"""The one program, ``hexwrap``: serve, solve, explore, inspect, lift, demo.
 
 Exit status 0; 1 where the surface or the request cannot be solved (the problem's detail on stderr); 2 usage.
 """
@@ -20,6 +20,9 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from hexwrap_server import __version__, samples
 from hexwrap_server.cli.demo import ALL, DemoError, run_demo
+from hexwrap_server.cli.explore import WRITERS as FRONT_WRITERS
+from hexwrap_server.cli.explore import add_explore_options, check_outputs, explore_here, print_front
+from hexwrap_server.cli.explore import asked as asked_exploration
 from hexwrap_server.cli.inspect import print_content
 from hexwrap_server.cli.local import Task, only_map, solve_here, task
 from hexwrap_server.cli.options import add_request_options, as_options, is_option_at_fault
@@ -119,6 +122,18 @@ def make_parser() -> argparse.ArgumentParser:
     solve.add_argument("-q", "--quiet", action="store_true", help="print nothing but errors")
     add_request_options(solve)
     solve.set_defaults(command=_solve)
+    explore = commands.add_parser(
+        "explore", help="try many choices for a surface and write the front of the best"
+    )
+    explore.add_argument("input", metavar="INPUT", help=INPUT)
+    explore.add_argument(
+        "-o", "--output", dest="outputs", metavar="OUT", action="append", required=True,
+        help="file to write, any number of times: a table (.csv), a picture (.png) or everything (.json)",
+    )  # fmt: skip
+    explore.add_argument("-q", "--quiet", action="store_true", help="print nothing but errors")
+    add_explore_options(explore)
+    add_request_options(explore, "surface")
+    explore.set_defaults(command=_explore)
     inspect = commands.add_parser("inspect", help="print what a file holds and what would be done with it")
     inspect.add_argument(
         "input", metavar="FILE", help="a mesh (OBJ, PLY, STL, OFF, NPZ) or a Rhino file (3DM)"
@@ -206,6 +221,20 @@ def _solve(asked: argparse.Namespace) -> int:
     print_summary(console, meta.name, {name: wire.part(solution, name, timings) for name in parts})
     for out, kind in kinds.items():
         save(out, write(kind, solution, meta))
+        console.print(f"wrote {out}", highlight=False)
+    return 0
+
+
+def _explore(asked: argparse.Namespace) -> int:
+    check_outputs(asked.outputs)
+    _check_folders(asked.outputs)
+    name, sent, wanted = asked_exploration(asked)
+    with _progress(asked.quiet) as report:
+        found = explore_here(name, sent, wanted, report)
+    console = Console(quiet=asked.quiet, soft_wrap=True)
+    print_front(console, name, found)
+    for out in asked.outputs:
+        save(out, FRONT_WRITERS[Path(out).suffix.lower()](found))
         console.print(f"wrote {out}", highlight=False)
     return 0
 

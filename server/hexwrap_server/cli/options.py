@@ -77,13 +77,13 @@ def _options() -> Iterator[Option]:
 OPTIONS = tuple(_options())
 
 
-def add_request_options(parser: argparse.ArgumentParser) -> None:
-    """All of them, with choices and defaults in the help.
+def add_request_options(parser: argparse.ArgumentParser, section: str = "") -> None:
+    """All of them, or those of one section, with choices and defaults in the help.
 
     What is not given leaves no attribute, because ``--sizes none`` is not the same as silence.
     """
     group = parser.add_argument_group("request (defaults as of the service, or what the request file says)")
-    for option in OPTIONS:
+    for option in (one for one in OPTIONS if section in ("", one.path[0])):
         common: dict[str, Any] = {"dest": option.name, "default": argparse.SUPPRESS, "help": option.help}
         if option.leaf.is_list:
             group.add_argument(

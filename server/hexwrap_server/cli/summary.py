@@ -101,6 +101,11 @@ def _quality(result: dict[str, Any]) -> Rows:
     if found["gap"]["over"] is not None:
         yield "wider than wanted", f"{found['gap']['over']} panels"
     yield "off the surface", f"at most {_length(found['surface_distance']['max'])}"
+    if result["panels"]["mode"] == "watertight":
+        yield "moved", f"at most {_length(found['movement'])}"
+        yield "convex", f"{found['convex']:.1%}"
+        if found["kink"]["max"] is not None:
+            yield "kinks", f"at most {angle(found['kink']['max'])}"
 
 
 def _trade_off(curve: dict[str, Any], taken: int) -> Table:

@@ -6,7 +6,7 @@ from typing import Any
 
 from hexwrap_server.http.openapi_result import RESULT as _RESULT
 from hexwrap_server.http.schema_words import NUMBER, PLANE, POINT, listed, nullable, record
-from hexwrap_server.input.form import Body, schema
+from hexwrap_server.input.form import Body, ExploreBody, schema
 from hexwrap_solver.surface.types import SurfaceSettings
 
 _SETTINGS = schema(SurfaceSettings)["properties"]
@@ -48,6 +48,7 @@ _JOB = record(
     found={"type": "object", "additionalProperties": {"type": "string"}},
     problem=nullable({"type": "object"}),
     queue_position=nullable({"type": "integer"}),
+    kind={"enum": ["solve", "explore"]},
 )
 _PROBLEM = record(
     ("type", "title", "status", "detail", "errors"),
@@ -75,9 +76,9 @@ def _route(answers: dict[str, Any], body: dict[str, Any] | None = None) -> dict[
     return {"responses": answers} | content
 
 
-def _request_schema() -> dict[str, Any]:
+def _request_schema(body: type = Body) -> dict[str, Any]:
     """The request with its definitions inside, so that it can stand anywhere in the document."""
-    rest = schema(Body)
+    rest = schema(body)
     return rest | {"properties": {"surface": _SURFACE} | rest["properties"], "required": ["surface"]}
 
 
@@ -95,6 +96,7 @@ EVENTS = _route(_answers({"text/event-stream": {"schema": {"type": "string"}}}, 
 RESULT = _route(_answers(_json(_RESULT), 200, 404, 409, 410, 500, 503))
 DELETE_JOB = _route(_answers({}, 204, 404))
 POST_JOB = _route(_answers(_json(_JOB), 202, *_BODY_FAULTS, 503), _json(_request_schema()))
+POST_EXPLORE = _route(_answers(_json(_JOB), 202, *_BODY_FAULTS, 503), _json(_request_schema(ExploreBody)))
 SOLVE = _route(_answers(_json(_RESULT), 200, *_BODY_FAULTS, 409, 410, 500, 503), _json(_request_schema()))
 SURFACES = _route(
     _answers(_json(record(("id", "vertices", "faces", "loops", "repairs"))), 201, *_BODY_FAULTS, 500, 503),

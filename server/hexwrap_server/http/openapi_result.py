@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from hexwrap_server.http.schema_words import NUMBER, PLANE, POINT, listed, nullable, record
+from hexwrap_solver.pattern.lattice import LATTICES
 
 _INDEX = {"type": "integer", "minimum": 0}
 _COUNT = _INDEX
@@ -12,7 +13,7 @@ _INTEGER = {"type": "integer"}
 _TEXT = {"type": "string"}
 _TRUTH = {"type": "boolean"}
 _MEASURE = nullable(NUMBER)  # null where nothing was measured
-_KIND = {"enum": ["hex", "triangle", "quad"]}
+_KIND = {"enum": list(LATTICES)}
 
 
 def _all(**properties: Any) -> dict[str, Any]:
@@ -55,6 +56,8 @@ _PATTERN = _all(
     rings=_COUNT,
     around=_COUNT,
     distortion=NUMBER,
+    features=listed(listed(_INDEX)),
+    along=listed(_all(straight=_TRUTH, cut=_COUNT, width=NUMBER, distortion=nullable(NUMBER), fold=NUMBER)),
 )
 _PANELS = _all(
     mode={"enum": ["split", "watertight"]},
@@ -95,6 +98,9 @@ _QUALITY = _all(
         normal=_all(mean=_MEASURE, max=_MEASURE),
         over=nullable(_COUNT),
     ),
+    kink=_all(mean=_MEASURE, max=_MEASURE),
+    convex=_MEASURE,
+    movement=NUMBER,
     overlaps=nullable(_COUNT),
     coverage=_MEASURE,
     distinct_panels=_COUNT,

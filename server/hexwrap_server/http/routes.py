@@ -43,6 +43,8 @@ FILES = {
     "result.json": JSON,
     "result.npz": "application/octet-stream",
 }
+#: Those of an exploration.
+EXPLORED = {"explore.csv": "text/csv; charset=utf-8", "result.json": JSON}
 
 router = APIRouter()
 JobId = Annotated[str, Path(description="a job's id", max_length=64)]
@@ -85,6 +87,14 @@ async def post_job(request: Request) -> Response:
     """Have a surface panelized."""
     manager = manager_of(request)
     job = await manager.submit(await _read(request))
+    return json_response(manager.document(job), 202, {"Location": f"/v1/jobs/{job.id}"})
+
+
+@router.post("/v1/explore", status_code=202, openapi_extra=openapi.POST_EXPLORE)
+async def post_explore(request: Request) -> Response:
+    """Have variants of a surface looked at, and the promising ones solved."""
+    manager = manager_of(request)
+    job = await manager.submit(await _read(request, "exploration"))
     return json_response(manager.document(job), 202, {"Location": f"/v1/jobs/{job.id}"})
 
 
@@ -219,14 +229,21 @@ async def get_file(
     ] = None,
 ) -> Response:
     """The finished work as a file."""
-    if name not in FILES:
-        raise not_found("file", f"Unknown file '{name[:64]}'; choose one of {', '.join(FILES)}.")
+    if name not in FILES and name not in EXPLORED:
+        raise not_found("file", f"Unknown file '{name[:64]}'; choose one of {', '.join(FILES | EXPLORED)}.")
     service = service_of(request)
     size = None if sheet is None else _sheet(sheet)
     job = service.manager.get(id)
+    files = EXPLORED if job.kind == "explore" else FILES
+    if name not in files:
+        what = "An exploration" if job.kind == "explore" else "A solved job"
+        raise not_found("file", f"{what} has no file '{name}'; choose one of {', '.join(files)}.")
     _finished(job)
     if name == "result.json":
         data = await asyncio.to_thread(igzip.decompress, await service.manager.result(job))
+    elif job.kind == "explore":
+        path = str(service.store.solution_path(job.identity))
+        data = await service.errand("hexwrap_server.jobs.explore:write_table", path)
     else:
         path = str(service.store.solution_path(job.identity))
         options = {"sheet": size, "group": group, "storey": storey}
@@ -234,25 +251,27 @@ async def get_file(
             "hexwrap_server.jobs.work:write_file", path, name, job.name, job.timings, options
         )
     headers = {"Content-Disposition": f'attachment; filename="{name}"'}
-    return Response(data, 200, headers, FILES[name])
+    return Response(data, 200, headers, files[name])
 
 
-async def _read(request: Request) -> ParsedRequest:
+async def _read(request: Request, kind: str = "request") -> ParsedRequest:
     """The request of a body; the same bytes again are not read again."""
     service = service_of(request)
     async with sent_body(request) as body:
-        known = service.known_body(body.mark)
+        mark = f"{kind} {body.mark}"
+        known = service.known_body(mark)
         if known is not None:
             return known
         parsed = await service.read(
-            "hexwrap_server.jobs.reading:read_request", body, str(service.store.surfaces)
+            f"hexwrap_server.jobs.reading:read_{kind}", body, str(service.store.surfaces)
         )
-        return service.remember_body(body.mark, parsed)
+        return service.remember_body(mark, parsed)
 
 
 async def _carry(request: Request, id: str, what: str) -> Response:
     service = service_of(request)
     job = service.manager.get(id)
+    _is_solved(job)
     async with sent_body(request) as body:
         _finished(job)
         path = str(service.store.solution_path(job.identity))
@@ -269,6 +288,7 @@ async def _result(request: Request, job: Job, include: list[str] | None) -> Resp
     headers |= _timing(job)
     service = service_of(request)
     if include is not None:
+        _is_solved(job)
         return Response(await service.manager.parts(job, include, service.errand), 200, headers, JSON)
     packed = await service.manager.result(job)
     if takes_gzip(request.headers):
@@ -291,6 +311,18 @@ def _finished(job: Job) -> None:
             "The job is not finished",
             f"The job is {job.status}; wait with GET …?wait=60.",
             {"Retry-After": "1"},
+        )
+
+
+def _is_solved(job: Job) -> None:
+    """Raises HttpError for an exploration, which has variants and no map of its own."""
+    if job.kind == "explore":
+        raise HttpError(
+            409,
+            "exploration",
+            "The job is an exploration",
+            "An exploration has no map and no panels of its own: send the request of one of its variants to "
+            "/v1/jobs, and ask that job.",
         )
 
 
@@ -332,9 +364,18 @@ def _timing(job: Job) -> dict[str, str]:
 
 
 async def _events(manager: JobManager, id: str) -> AsyncIterator[bytes]:
+    """The job as it changes; of an exploration, each variant when it is foreseen, and when it is measured."""
+    found, sent = manager.found(id), 0
     async for job in manager.changes(id, HEARTBEAT):
+        while sent < len(found):
+            index, variant = found[sent]
+            sent += 1
+            yield _event("variant", {"index": index, "variant": variant})
         if job is None:
             yield b": still here\n\n"
         else:
-            name = job.status if job.is_over else "progress"
-            yield b"event: %s\ndata: %s\n\n" % (name.encode(), dumped(manager.document(job)))
+            yield _event(job.status if job.is_over else "progress", manager.document(job))
+
+
+def _event(name: str, data: object) -> bytes:
+    return b"event: %s\ndata: %s\n\n" % (name.encode(), dumped(data))

@@ -45,7 +45,7 @@ class Service:
         self.readers = ProcessEngine(settings.readers, ERRANDS_PRELOAD, warm=0)
         #: Bytes of request bodies in memory.
         self.body_bytes = 0
-        self.manager = JobManager(self.store, self.engine, settings, self.metrics)
+        self.manager = JobManager(self.store, self.engine, settings, self.metrics, self.errand)
         self._known_bodies: OrderedDict[str, ParsedRequest] = OrderedDict()
         self._since = time.time()
 

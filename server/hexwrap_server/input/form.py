@@ -19,7 +19,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fin
 
 from hexwrap_server.errors import FormError
 from hexwrap_server.input.faults import Path, faults, pointer
-from hexwrap_server.input.requests import Wanted
+from hexwrap_server.input.requests import Exploration, Wanted
 from hexwrap_solver.conformal.types import ANGLE_UNITS
 from hexwrap_solver.setting import Setting
 from hexwrap_solver.surface.checks import LARGEST, SMALLEST
@@ -32,6 +32,13 @@ class Body(Wanted):
     """Everything of a request but the arrays of its surface."""
 
     name: Annotated[str, Setting("name of the job, the title of pictures and drawings", most=200)] = ""
+
+
+@dataclass(frozen=True)
+class ExploreBody(Exploration):
+    """The same of an exploration."""
+
+    name: Annotated[str, Setting("name of the job", most=200)] = ""
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Annotated, Any
 
+from hexwrap_solver.explore.types import ExploreSettings
 from hexwrap_solver.pipeline import SolveSettings
 from hexwrap_solver.setting import Setting
 from hexwrap_solver.surface.brep import Brep
@@ -39,12 +40,23 @@ class Wanted(SolveSettings):
 
 
 @dataclass(frozen=True)
+class Exploration(ExploreSettings):
+    """Which choices for a surface are to be explored. max_panels, max_vertices: of each of them."""
+
+    surface: Annotated[
+        SurfaceSettings | None, Setting("how the surface is taken in; null: as it was sent", rare=True)
+    ] = None
+    max_panels: Annotated[int, Setting("most panels of a variant", limit=True)] = 1_000_000
+    max_vertices: Annotated[int, Setting("most vertices of its mesh", limit=True)] = 1_000_000
+
+
+@dataclass(frozen=True)
 class ParsedRequest:
     """A request that was read; its surface is kept under that id."""
 
     name: str
     surface_id: str
-    wanted: Wanted
+    wanted: Wanted | Exploration
 
 
 @dataclass(frozen=True)
@@ -65,7 +77,7 @@ class Order:
 
     surface_id: str
     surface: bytes | str
-    wanted: Wanted
+    wanted: Wanted | Exploration
     files: tuple[str, str] | None
     job: str = ""
 

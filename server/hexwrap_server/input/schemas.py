@@ -14,8 +14,8 @@ import numpy as np
 from hexwrap_server.errors import FormError
 from hexwrap_server.input.arrays import Fault, faces, numbers, table
 from hexwrap_server.input.faults import escaped
-from hexwrap_server.input.form import Body, read, values
-from hexwrap_server.input.requests import SentSurface, Wanted
+from hexwrap_server.input.form import Body, ExploreBody, read, values
+from hexwrap_server.input.requests import Exploration, SentSurface, Wanted
 from hexwrap_solver.conformal.types import BoundaryCondition
 from hexwrap_solver.setting import Setting
 from hexwrap_solver.surface.nurbs_checks import HIGHEST_DEGREE
@@ -36,16 +36,12 @@ class Request:
 
     name: str
     surface: SentSurface | str
-    wanted: Wanted
+    wanted: Wanted | Exploration
 
 
 def parse_request(body: object, max_vertices: int, max_panels: int) -> Request:
     """Raises FormError with a JSON pointer for each fault."""
-    if not isinstance(body, dict):
-        raise FormError.at("", 'the body must be a JSON object such as {"surface": …}')
-    if "surface" not in body:
-        raise FormError.at("/surface", "'surface' is missing; it is the one field without a default")
-    arrays, beside = _divided(body["surface"], "/surface", allow_id=True)
+    body, arrays, beside = _opened(body)
     asked = read(Body, body | {"surface": beside or None})
     surface = _id(arrays["id"]) if "id" in arrays else _sent(arrays, max_vertices, "/surface")
     if isinstance(surface, SentSurface) and surface.mesh is not None:
@@ -56,6 +52,28 @@ def parse_request(body: object, max_vertices: int, max_panels: int) -> Request:
     if wanted.pattern is not None:
         wanted = replace(wanted, pattern=replace(wanted.pattern, max_cells=max_panels))
     return Request(asked.name, surface, wanted)
+
+
+def parse_exploration(body: object, max_vertices: int, max_panels: int) -> Request:
+    """The body of ``POST /v1/explore``. Raises FormError with a JSON pointer for each fault."""
+    body, arrays, beside = _opened(body)
+    asked = read(ExploreBody, body | {"surface": beside or None})
+    surface = _id(arrays["id"]) if "id" in arrays else _sent(arrays, max_vertices, "/surface")
+    wanted = Exploration(**{f.name: getattr(asked, f.name) for f in fields(Exploration)})
+    if wanted.surface is not None or "nurbs" in arrays:
+        wanted = replace(wanted, surface=_limited(wanted.surface or SurfaceSettings(), max_vertices))
+    pattern = replace(wanted.pattern, max_cells=max_panels)
+    limits = {"max_panels": max_panels, "max_vertices": max_vertices}
+    return Request(asked.name, surface, replace(wanted, pattern=pattern, **limits))
+
+
+def _opened(body: object) -> tuple[dict[str, Any], dict[str, Any], dict[str, object]]:
+    """The body, and its surface divided. Raises FormError."""
+    if not isinstance(body, dict):
+        raise FormError.at("", 'the body must be a JSON object such as {"surface": …}')
+    if "surface" not in body:
+        raise FormError.at("/surface", "'surface' is missing; it is the one field without a default")
+    return body, *_divided(body["surface"], "/surface", allow_id=True)
 
 
 def parse_surface(surface: object, max_vertices: int) -> SentSurface:

@@ -96,5 +96,5 @@ def _guarded(data: bytes, filename: str, read: Callable[[str], T]) -> T:
     except (Exception, MemoryError) as error:  # foreign readers fail in every way on broken files
         raise UnreadableFileError(
             f"The file {PurePath(filename).name} cannot be read as {suffix[1:].upper()} "
-            f"({type(error).__name__}: {str(error)[:200]}): export it again."
+            f"({type(error).__name__}: {' '.join(str(error).split())[:200]}): export it again."
         ) from error

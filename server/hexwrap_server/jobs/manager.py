@@ -21,15 +21,17 @@ from hexwrap_server.errors import (
     InternalError,
     ShuttingDownError,
     StorageError,
+    TimeLimitError,
     WorkerDiedError,
     not_found,
 )
 from hexwrap_server.http.metrics import Metrics
-from hexwrap_server.input.requests import CacheSettings, Order, Outcome, ParsedRequest
+from hexwrap_server.input.requests import CacheSettings, Exploration, Order, Outcome, ParsedRequest, Wanted
 from hexwrap_server.jobs.codec import digest
 from hexwrap_server.jobs.endings import Ledger
-from hexwrap_server.jobs.engine import Engine
-from hexwrap_server.jobs.store import Job, Store, Work
+from hexwrap_server.jobs.engine import Engine, nobody
+from hexwrap_server.jobs.exploring import explore
+from hexwrap_server.jobs.store import Job, Kind, Store, Work
 from hexwrap_server.problems import plain, problem
 from hexwrap_server.settings import MIB, Settings
 from hexwrap_server.version import service_version
@@ -43,6 +45,8 @@ PRUNE_INTERVAL = 600.0
 CATCH_UP_INTERVAL = 2.0
 #: Seconds that a job waits for the database while another program holds it, and between two attempts.
 PATIENCE, BUSY_INTERVAL = 10.0, 0.1
+#: Explorations that run at once; they take no worker themselves.
+EXPLORERS = 2
 #: Results kept in memory as they go over the wire.
 HOT_RESULT_BYTES = 64 * MIB
 log = logging.getLogger("hexwrap.jobs")
@@ -50,18 +54,50 @@ log = logging.getLogger("hexwrap.jobs")
 
 @dataclass(eq=False)
 class _Item:
-    """A work that waits or runs, and the jobs that want it."""
+    """A work that waits or runs, and the jobs and explorations that want it.
+
+    found: of an exploration, numbers and documents of variants, in the order in which they became known.
+    """
 
     work: Work
     jobs: dict[str, Job] = field(default_factory=dict)
     task: asyncio.Task[None] | None = None
+    waiting: list[asyncio.Future[None]] = field(default_factory=list)
+    found: list[tuple[int, dict[str, Any]]] = field(default_factory=list)
+
+    @property
+    def explores(self) -> bool:
+        return isinstance(self.work.wanted, Exploration)
+
+    @property
+    def is_wanted(self) -> bool:
+        return bool(self.jobs or self.waiting)
+
+    def tell(self, error: Exception | None = None) -> None:
+        """Those that wait for it."""
+        for waiting in self.waiting:
+            if waiting.done():
+                continue
+            if error is None:
+                waiting.set_result(None)
+            else:
+                waiting.set_exception(error)
 
 
 class JobManager:
     """Belongs to one event loop."""
 
-    def __init__(self, store: Store, engine: Engine, settings: Settings, metrics: Metrics) -> None:
+    def __init__(
+        self,
+        store: Store,
+        engine: Engine,
+        settings: Settings,
+        metrics: Metrics,
+        errand: Callable[..., Awaitable[Any]],
+    ) -> None:
+        """errand: has short work done beside the jobs, on this machine."""
         self.store = store
+        self.errand = errand
         self._ledger = Ledger(store)
         self._engine = engine
         self._settings = settings
@@ -130,7 +166,8 @@ class JobManager:
 
     def _submit(self, parsed: ParsedRequest) -> Job:
         identity = digest(service_version(), parsed.surface_id, parsed.wanted)
-        job = Job(uuid.uuid4().hex, identity, parsed.name, created=time.time())
+        kind: Kind = "explore" if isinstance(parsed.wanted, Exploration) else "solve"
+        job = Job(uuid.uuid4().hex, identity, parsed.name, created=time.time(), kind=kind)
         finished = self.store.finished_work(identity)
         if finished is not None:
             job = _reused(job, finished)
@@ -140,7 +177,7 @@ class JobManager:
         if not self.store.use_surface(parsed.surface_id):
             raise FormError.at("/surface/id", "no such surface is kept here; send it to /v1/surfaces again")
         item = self._items.get(identity)
-        if item is None and len(self._queue) >= self._settings.max_queue:
+        if item is None and sum(bool(one.jobs) for one in self._queue.values()) >= self._settings.max_queue:
             raise HttpError(
                 503,
                 "queue-full",
@@ -204,6 +241,11 @@ class JobManager:
                 except TimeoutError:
                     yield None
 
+    def found(self, id: str) -> list[tuple[int, dict[str, Any]]]:
+        """Of an exploration that waits or runs, the variants that are known; the list grows."""
+        item = self._live.get(id)
+        return item.found if item else []
+
     async def delete(self, id: str) -> None:
         """Stop a job that waits or runs, forget one that is over."""
         job = self.get(id)
@@ -212,7 +254,11 @@ class JobManager:
             return
         item = self._live[id]
         self._end([replace(job, status="cancelled", finished=time.time())])
-        if item.jobs:
+        await self._give_up(item)
+
+    async def _give_up(self, item: _Item) -> None:
+        """Stop a work that nobody wants any more."""
+        if item.is_wanted:
             return
         self._queue.pop(item.work.identity, None)
         if self._items.get(item.work.identity) is item:
@@ -272,8 +318,13 @@ class JobManager:
             self._log(job, "taken up again")
 
     def _pump(self) -> None:
-        while self._queue and len(self._running) < self._engine.capacity and not self._closing.is_set():
-            _, item = self._queue.popitem(last=False)
+        while not self._closing.is_set():
+            exploring = sum(item.explores for item in self._running)
+            places = {True: EXPLORERS - exploring, False: self.at_once - (len(self._running) - exploring)}
+            item = next((item for item in self._queue.values() if places[item.explores] > 0), None)
+            if item is None:
+                break
+            del self._queue[item.work.identity]
             self._take(item)
         self._metrics.queued.set(len(self._queue))
         self._metrics.running.set(len(self._running))
@@ -297,11 +348,12 @@ class JobManager:
             await _patiently(
                 lambda: self._change(item, written=True, status="running", stage="", started=now)
             )
-            outcome = await self._compute(item)
+            outcome = await (self._explore(item) if item.explores else self._compute(item))
             packed = await asyncio.to_thread(self.store.keep_outcome, identity, outcome)
             await _patiently(lambda: self.store.finish_work(identity, outcome))
             self._heat(identity, packed)
             self._end([_done(job, outcome) for job in item.jobs.values()])
+            item.tell()
         except asyncio.CancelledError:
             self._take_back(item, begun)
             raise
@@ -309,6 +361,7 @@ class JobManager:
             told_to_end = isinstance(error, (WorkerDiedError, ShuttingDownError)) and self._closing.is_set()
             if told_to_end:  # as this server was; the next one goes on with the job
                 self._take_back(item, begun)
+                item.tell(ShuttingDownError())
             else:
                 self._fail(item, error)
         except Exception as error:
@@ -334,6 +387,7 @@ class JobManager:
 
     def _fail(self, item: _Item, error: HexwrapError) -> None:
         self._settle(item.work.identity)
+        item.tell(error)
         try:
             ended = [_failed(job, error) for job in item.jobs.values()]
         except Exception:  # a problem that cannot be written must not keep the jobs from ending
@@ -361,6 +415,71 @@ class JobManager:
             mib=self._settings.job_mib,
         )
         return outcome
+
+    async def _explore(self, item: _Item) -> Outcome:
+        jobs, work = item.jobs, item.work
+        order = await self._order(work, next(iter(jobs), ""))
+        start, begun = time.monotonic(), {}
+
+        def told(stage: str, fraction: float) -> None:
+            begun.setdefault(stage, time.monotonic() - start)
+            self._change(item, stage=stage, progress=round(fraction, 4))
+
+        def found(i: int, document: dict[str, Any]) -> None:
+            item.found.append((i, document))
+            for id in jobs:
+                self._tell(id)
+
+        def identify(wanted: Wanted) -> Work:
+            return Work(digest(service_version(), work.surface, wanted), work.surface, wanted)
+
+        name = next((job.name for job in jobs.values()), "")
+        seconds = self._settings.explore_seconds
+        try:
+            async with asyncio.timeout(seconds):
+                outcome = await explore(self, order, name, identify, told, found)
+        except TimeoutError:
+            raise TimeLimitError(
+                f"The exploration was stopped after {seconds:g} s, the limit of this server; ask for fewer "
+                "variants, or start the server with a larger --explore-seconds."
+            ) from None
+        ends = [*list(begun.values())[1:], time.monotonic() - start]
+        timings = {stage: end - begin for (stage, begin), end in zip(begun.items(), ends, strict=True)}
+        return replace(outcome, timings=timings)
+
+    # what an exploration needs (see ``Hands``)
+
+    @property
+    def at_once(self) -> int:
+        return self._engine.capacity
+
+    async def call(self, function: str, *arguments: Any) -> Any:
+        """In a worker, beside the works that are counted."""
+        return await self._engine.run(
+            function,
+            *arguments,
+            report=nobody,
+            seconds=self._settings.job_seconds,
+            mib=self._settings.job_mib,
+        )
+
+    async def solved(self, work: Work) -> str:
+        """The path of a work's solution, when it is finished. Raises what it ended with."""
+        identity = work.identity
+        if self.store.finished_work(identity) is None:
+            await _patiently(lambda: self.store.add_work(work))
+            item = self._items.get(identity)
+            if item is None:
+                item = self._items[identity] = self._queue[identity] = _Item(work)
+            waiting = asyncio.get_running_loop().create_future()
+            item.waiting.append(waiting)
+            self._pump()
+            try:
+                await waiting
+            finally:
+                item.waiting.remove(waiting)
+                await self._give_up(item)
+        return str(self.store.solution_path(identity))
 
     async def _order(self, work: Work, job: str) -> Order:
         """Workers on this machine read and write the files themselves."""

@@ -10,7 +10,7 @@ import orjson
 from hexwrap_server.input.bodies import Body
 from hexwrap_server.input.json_text import loads
 from hexwrap_server.input.requests import CacheSettings, Intake, ParsedRequest, SentSurface
-from hexwrap_server.input.schemas import Request, parse_request, parse_surface
+from hexwrap_server.input.schemas import Request, parse_exploration, parse_request, parse_surface
 from hexwrap_server.input.surface_files import FromFile
 from hexwrap_server.input.uploads import sent_file
 from hexwrap_server.jobs import codec
@@ -26,6 +26,12 @@ def read_request(report: Report, body: Body, settings: Settings, folder: str) ->
     """JSON → request. folder: where its surface is kept. Raises FormError, HttpError, StorageError."""
     document = loads(body.plain(settings.max_body_mib))
     return kept(parse_request(document, settings.max_vertices, settings.max_panels), folder)
+
+
+def read_exploration(report: Report, body: Body, settings: Settings, folder: str) -> ParsedRequest:
+    """JSON → what to explore. As ``read_request``."""
+    document = loads(body.plain(settings.max_body_mib))
+    return kept(parse_exploration(document, settings.max_vertices, settings.max_panels), folder)
 
 
 def kept(request: Request, folder: str) -> ParsedRequest:

@@ -23,11 +23,12 @@ from pathlib import Path
 from typing import Any, Literal
 
 from hexwrap_server.errors import CodecError, DamagedError, FolderInUseError, StorageError
-from hexwrap_server.input.requests import Outcome, Wanted
+from hexwrap_server.input.requests import Exploration, Outcome, Wanted
 from hexwrap_server.jobs import codec
 from hexwrap_server.jobs.disk import keep_file, make_private, prune, read_whole, surface_file, write_whole
 
 Status = Literal["queued", "running", "done", "failed", "cancelled"]
+Kind = Literal["solve", "explore"]
 log = logging.getLogger("hexwrap.store")
 #: Bytes of the write-ahead log at which it is brought into the database beside the work, and those at which
 #: whoever writes has to do it, and every answer waits for the disk.
@@ -48,12 +49,17 @@ CREATE TABLE IF NOT EXISTS jobs (
     number INTEGER PRIMARY KEY AUTOINCREMENT, id TEXT UNIQUE NOT NULL, identity TEXT NOT NULL,
     name TEXT NOT NULL, status TEXT NOT NULL, stage TEXT NOT NULL,
     progress REAL NOT NULL, created REAL NOT NULL, started REAL,
-    finished REAL, timings TEXT NOT NULL, found TEXT NOT NULL, problem TEXT
+    finished REAL, timings TEXT NOT NULL, found TEXT NOT NULL, problem TEXT,
+    kind TEXT NOT NULL DEFAULT 'solve'
 );
 CREATE INDEX IF NOT EXISTS jobs_by_work ON jobs (identity);
 CREATE INDEX IF NOT EXISTS jobs_by_status ON jobs (status);
 """
-_COLUMNS = "id, identity, name, status, stage, progress, created, started, finished, timings, found, problem"
+#: Of versions before there were explorations.
+_ADD_KIND = "ALTER TABLE jobs ADD COLUMN kind TEXT NOT NULL DEFAULT 'solve'"
+_COLUMNS = (
+    "kind, id, identity, name, status, stage, progress, created, started, finished, timings, found, problem"
+)
 
 
 @dataclass(frozen=True)
@@ -72,6 +78,7 @@ class Job:
     timings: dict[str, float] = field(default_factory=dict)
     found: dict[str, str] = field(default_factory=dict)
     problem: dict[str, Any] | None = None
+    kind: Kind = "solve"
 
     @property
     def is_over(self) -> bool:
@@ -91,7 +98,7 @@ class Work:
 
     identity: str
     surface: str
-    wanted: Wanted
+    wanted: Wanted | Exploration
     attempts: int = 0
     size: int = 0
     timings: dict[str, float] = field(default_factory=dict)
@@ -139,6 +146,8 @@ class Store:
             self._db.execute("PRAGMA synchronous = NORMAL")
             self._db.execute(f"PRAGMA wal_autocheckpoint = {LATEST_CHECKPOINT // PAGE}")
             self._db.executescript(_SCHEMA)
+            if "kind" not in [row[1] for row in self._db.execute("PRAGMA table_info(jobs)")]:
+                self._db.execute(_ADD_KIND)
             self._db.execute(f"PRAGMA busy_timeout = {PATIENCE}")
         except sqlite3.DatabaseError as error:
             self._lock.close()
@@ -246,13 +255,21 @@ class Store:
 
     def add(self, job: Job, work: Work) -> None:
         with self._transaction():
-            self._db.execute(
-                "INSERT INTO works (identity, surface, wanted, used) VALUES (?, ?, ?, ?) "
-                "ON CONFLICT (identity) DO UPDATE SET used = excluded.used",
-                (work.identity, work.surface, codec.encode(work.wanted), time.time()),
-            )
+            self._put(work)
             marks = ", ".join("?" * len(_COLUMNS.split(",")))
             self._db.execute(f"INSERT INTO jobs ({_COLUMNS}) VALUES ({marks})", _row(job))
+
+    def add_work(self, work: Work) -> None:
+        """A work that another one wants, and no job."""
+        with self._transaction():
+            self._put(work)
+
+    def _put(self, work: Work) -> None:
+        self._db.execute(
+            "INSERT INTO works (identity, surface, wanted, used) VALUES (?, ?, ?, ?) "
+            "ON CONFLICT (identity) DO UPDATE SET used = excluded.used",
+            (work.identity, work.surface, codec.encode(work.wanted), time.time()),
+        )
 
     def start_work(self, identity: str) -> None:
         self._write("UPDATE works SET attempts = attempts + 1, size = 0 WHERE identity = ?", identity)
@@ -437,6 +454,7 @@ def _unusable(path: Path, error: sqlite3.DatabaseError) -> DamagedError:
 
 def _row(job: Job) -> tuple[Any, ...]:
     return (
+        job.kind,
         job.id,
         job.identity,
         job.name,

@@ -37,7 +37,8 @@ def solve(report: Report, order: Order, caching: CacheSettings) -> Outcome:
     logs.at_work_for(order.job)
     cache = stages(caching)
     runner = CachingRunner(cache, report)
-    solution = _staged(order.surface_id, lambda: _sent(order), order.wanted, runner)
+    assert isinstance(order.wanted, Wanted)
+    solution = _staged(order.surface_id, lambda: sent_surface_of(order), order.wanted, runner)
     kept = codec.pieces(solution)
     result = igzip.compress(wire.result_json(solution, runner.timings), GZIP_LEVEL)
     cache.weigh()
@@ -49,7 +50,7 @@ def solve(report: Report, order: Order, caching: CacheSettings) -> Outcome:
     return Outcome(None, None, size, runner.timings, runner.found)
 
 
-def _sent(order: Order) -> SentSurface:
+def sent_surface_of(order: Order) -> SentSurface:
     """Raises FormError where the surface is gone or damaged, and then it is forgotten."""
     data = order.surface
     if isinstance(data, str):

@@ -145,6 +145,17 @@ def pattern(laid: Pattern) -> dict[str, Any]:
         "rotation": float(laid.rotation),
         "edge_length": float(laid.edge_length),
         "distortion": float(laid.distortion),
+        "features": [flat(feature.vertices) for feature in laid.features],
+        "along": [
+            {
+                "straight": feature.straight,
+                "cut": feature.cut,
+                "width": feature.width,
+                "distortion": feature.distortion,
+                "fold": feature.fold,
+            }
+            for feature in laid.features
+        ],
     }
 
 
@@ -213,6 +224,7 @@ def quality(solution: Solution) -> dict[str, Any]:
         "overlaps": None if made is None else int(measured.overlaps),
         "coverage": None if made is None else float(measured.coverage),
         "distinct_panels": 0 if measured.congruence is None else len(np.unique(measured.congruence)),
+        "convex": summary(measured.convex, "mean")["mean"],
         "not_convex": 0 if measured.convex is None else int(np.sum(~measured.convex)),
         "movement": float(measured.movement),
         "trade_off": trade_off(made.trade_off) if made and made.trade_off else None,

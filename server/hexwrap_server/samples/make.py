@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -218,10 +219,80 @@ def house() -> Facets:
     return Facets(points[used].round(DIGITS), faces.reshape(-1, 4))
 
 
-def requests() -> list[tuple[NurbsSurface | Facets, dict[str, Any]]]:
+@dataclass(frozen=True)
+class Patches:
+    """A tube of several surfaces that meet at creases, and its mesh."""
+
+    surfaces: tuple[NurbsSurface, ...]
+    mesh: Facets
+
+
+def _flat(corners: Floats) -> NurbsSurface:
+    """The bilinear surface of (2, 2, 3) corners."""
+    net = np.concatenate([corners, np.ones((2, 2, 1))], axis=2)
+    knots = np.array([0.0, 0.0, 1.0, 1.0])
+    return NurbsSurface((1, 1), (knots, knots), net, (False, False))
+
+
+def _between(rings: Floats) -> Facets:
+    """Quads between closed rings (rows, around, 3)."""
+    rows, around, _ = rings.shape
+    i, j = (k.ravel() for k in np.meshgrid(np.arange(around), np.arange(rows - 1)))
+    a, b = i + around * j, (i + 1) % around + around * j
+    faces = np.stack([a, b, b + around, a + around], axis=1)
+    return Facets(rings.reshape(-1, 3).round(DIGITS), faces)
+
+
+def box() -> Patches:
+    """A tower of 30 m × 20 m × 60 m, its four walls flat."""
+    plan = np.array([[0.0, 0.0], [30.0, 0.0], [30.0, 20.0], [0.0, 20.0]])
+    walls, ring = [], []
+    for a, b in zip(plan, np.roll(plan, -1, axis=0), strict=True):
+        low = np.column_stack([[a, b], [0.0, 0.0]])
+        walls.append(_flat(np.stack([low, low + np.array([0.0, 0.0, 60.0])], axis=1)))
+        pieces = round(float(np.linalg.norm(b - a)) / 1.25)
+        ring.append(a + np.arange(pieces)[:, None] / pieces * (b - a))
+    around = np.concatenate(ring)
+    height = np.linspace(0, 60, 49)
+    rings = np.stack([np.column_stack([around, np.full(len(around), z)]) for z in height])
+    return Patches(tuple(walls), _between(rings))
+
+
+def patches() -> Patches:
+    """A pavilion of 32 m × 28 m in three rings: upright, then leaning out from a level crease on, and in
+    again from one that rises and falls by 5 m."""
+    a = _angles(12)
+    wave = 2.5 * np.cos(2 * a)
+    size = [(11.0, 0.0 * wave), (11.0, 9.0 + 0.0 * wave), (16.0, 17.0 + wave), (7.5, 27.0 + 0.6 * wave)]
+    rings = [np.stack([1.15 * r * np.cos(a), r * np.sin(a), z], axis=1) for r, z in size]
+    surfaces = tuple(
+        loft(np.stack([low + t * (high - low) for t in (0, 1 / 3, 2 / 3, 1)]))
+        for low, high in pairwise(rings)
+    )
+    rows = [np.zeros((0, 96, 3))]
+    for k, surface in enumerate(surfaces):
+        (u0, u1), (v0, v1) = domain(surface, 0), domain(surface, 1)
+        u, v = u0 + (u1 - u0) * np.arange(96) / 96, np.linspace(v0, v1, 13)[(k > 0) :]
+        grid = np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2)
+        rows.append(evaluate_points(surface, grid).reshape(len(v), 96, 3))
+    return Patches(surfaces, _between(np.concatenate(rows)))
+
+
+def requests() -> list[tuple[NurbsSurface | Facets | Patches, dict[str, Any]]]:
     """Every sample: its surface and its request body."""
     tubes = [_tower(), _facade(), _waist(), _cone(), _isometric(), _entrance(), _diagrid(), _ring()]
-    return [*tubes, _singular(), _roof(), _dome(), _openings()]
+    return [*tubes, _singular(), _roof(), _dome(), _openings(), *_folded()]
+
+
+def _folded() -> list[tuple[Patches, dict[str, Any]]]:
+    """The pattern folds where the building does."""
+    made = []
+    for name, shape, around in (("box", box(), 60), ("patches", patches(), 54)):
+        pattern = {"kind": "hex", "around": around, "boundary": "trim"}
+        _, request = _of_mesh(name, shape.mesh, pattern=pattern)
+        request["surface"]["features"] = {"angle": 20.0}
+        made.append((shape, request))
+    return made
 
 
 def _of_mesh(name: str, mesh: Facets, **request: Any) -> tuple[Facets, dict[str, Any]]:
@@ -355,22 +426,23 @@ def _singular() -> tuple[NurbsSurface, dict[str, Any]]:
     )
 
 
-def rhino_model(name: str, surface: NurbsSurface) -> rhino3dm.File3dm:
-    """The surface as Rhino keeps it: no first and last knot, control points times their weights."""
-    n, m = surface.control_points.shape[:2]
-    rational = bool(np.ptp(surface.control_points[..., 3]) > 0)
-    out = rhino3dm.NurbsSurface.Create(3, rational, surface.degree[0] + 1, surface.degree[1] + 1, n, m)
-    for knots, place in zip(surface.knots, (out.KnotsU, out.KnotsV), strict=True):
-        for i, knot in enumerate(knots[1:-1].tolist()):
-            place[i] = knot
-    for i, row in enumerate(surface.control_points.tolist()):
-        for j, (x, y, z, w) in enumerate(row):
-            out.Points[i, j] = rhino3dm.Point4d(x * w, y * w, z * w, w)
+def rhino_model(name: str, *surfaces: NurbsSurface) -> rhino3dm.File3dm:
+    """The surfaces as Rhino keeps them: no first and last knot, control points times their weights."""
     model = rhino3dm.File3dm()
     model.Settings.ModelUnitSystem = rhino3dm.UnitSystem.Meters
     attributes = rhino3dm.ObjectAttributes()
     attributes.Name = name
-    model.Objects.Add(out, attributes)
+    for surface in surfaces:
+        n, m = surface.control_points.shape[:2]
+        rational = bool(np.ptp(surface.control_points[..., 3]) > 0)
+        out = rhino3dm.NurbsSurface.Create(3, rational, surface.degree[0] + 1, surface.degree[1] + 1, n, m)
+        for knots, place in zip(surface.knots, (out.KnotsU, out.KnotsV), strict=True):
+            for i, knot in enumerate(knots[1:-1].tolist()):
+                place[i] = knot
+        for i, row in enumerate(surface.control_points.tolist()):
+            for j, (x, y, z, w) in enumerate(row):
+                out.Points[i, j] = rhino3dm.Point4d(x * w, y * w, z * w, w)
+        model.Objects.Add(out, attributes)
     return model
 
 
@@ -395,7 +467,10 @@ def make(folder: Path) -> None:
         name = request["name"]
         text = json.dumps(request, separators=(",", ":")) + "\n"
         (folder / f"{name}.json").write_text(text, encoding="utf-8", newline="\n")
-        model = mesh_model(name, surface) if isinstance(surface, Facets) else rhino_model(name, surface)
+        if isinstance(surface, Facets):
+            model = mesh_model(name, surface)
+        else:
+            model = rhino_model(name, *(surface.surfaces if isinstance(surface, Patches) else (surface,)))
         model.Write(str(folder / f"{name}.3dm"), 7)
 
 

@@ -10,9 +10,9 @@ export interface Corner {
   angle: number;
 }
 
-/** Choices that fit a pattern: multiples of 60° for hexagons and triangles, of 90° for quads. */
+/** Choices that fit a pattern: multiples of 60°, of 90° for patterns of squares, of 180° for bricks. */
 export function choices(kind: string): { value: number; label: string }[] {
-  const parts = kind === "quad" ? 2 : 3;
+  const parts = kind === "brick" ? 1 : ["quad", "diamond", "truncated-square"].includes(kind) ? 2 : 3;
   const list = [];
   for (let k = 1; k <= 2 * parts + 1; k++) if (k !== parts) list.push({ value: k / parts, label: `${(180 * k) / parts}°` });
   return list;

@@ -44,6 +44,17 @@ export interface TradeOff {
   worst_gap: number[];
 }
 
+/** What numbers of singularities leave uncovered; at: where they would stand. */
+export interface SingularityCurve {
+  sizes: number;
+  taken: number;
+  coarse: boolean;
+  number: number[];
+  uncovered: number[];
+  scale_ratio: number[];
+  at: { point: Vec3; index: number }[][];
+}
+
 export interface Result {
   mesh: { vertices: Vec3[]; faces: number[][]; input_vertex: number[]; vertex_of_input: number[]; loops: number[][]; repairs: string[] };
   map: {
@@ -96,7 +107,7 @@ export interface Result {
   } | null;
   sizes?: { size: number; edge_length: number; count: number; color: string }[] | null;
   support?: { nodes: Vec3[]; axes: Vec3[]; edges: [number, number][]; strips: Vec3[][] } | null;
-  quality: Record<string, any> & { trade_off?: TradeOff | null };
+  quality: Record<string, any> & { trade_off?: TradeOff | null; singularity_curve?: SingularityCurve | null };
   timings?: Record<string, number>;
 }
 

@@ -15,6 +15,7 @@ from typing import Generic, Protocol, TypeVar
 import numpy as np
 
 from hexwrap_solver.arrays import Bools, Floats, Ints, Progress
+from hexwrap_solver.tolerances import TINY
 
 #: Angle sums resolve this much, radians, or the rounding of the largest target (that of an unknown shared by
 #: a loop is a sum over all of it). Stopping earlier would show: layout errors are the residual times the
@@ -225,7 +226,7 @@ def _line_search(energy: Convex[P], point: P, direction: Floats, leap: float) ->
     slope = float(point.gradient @ direction)
     if not slope < 0:
         return None
-    t = min(1.0, leap / max(energy.change(direction), 1e-300))
+    t = min(1.0, leap / max(energy.change(direction), TINY))
     for _ in range(MAX_TRIALS):
         trial = energy.at(point.x + t * direction)
         new_slope = float(trial.gradient @ direction)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from hexwrap_solver.arrays import Floats
 from hexwrap_solver.conformal.types import Cones
 from hexwrap_solver.errors import ConvergenceError
 from hexwrap_solver.surface.types import Surface
+from hexwrap_solver.tolerances import is_whole_turn
 
 #: The largest difference of u that a layout in double precision can show where places have no centre: e^36
 #: is 4e15.
@@ -39,7 +38,7 @@ def largest_span(cone_angle: float | None) -> float:
     """The largest difference of u that a domain of this cone angle can show."""
     if cone_angle is None:
         return MAX_SPAN
-    return 2 * MAX_REACH if abs(math.remainder(cone_angle, 2 * math.pi)) > CLEAR else MAX_SPAN
+    return MAX_SPAN if is_whole_turn(cone_angle, CLEAR) else 2 * MAX_REACH
 
 
 def check_span(u: Floats, cone_angle: float | None) -> None:

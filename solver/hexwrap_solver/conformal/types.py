@@ -19,10 +19,20 @@ from hexwrap_solver.tolerances import is_whole_turn, is_zero
 AngleUnit = Literal["rad", "deg", "pi"]
 #: Radians of one unit.
 ANGLE_UNITS: dict[AngleUnit, float] = {"rad": 1.0, "deg": np.pi / 180, "pi": np.pi}
-Quantum = Literal["auto", "hex", "triangle", "quad", "none"]
-#: Names of the quanta (π/3 and π/2) that the cone angle of a pattern must be a multiple of.
-QUANTUM_OF: dict[str, Quantum] = {"hex": "hex", "triangle": "hex", "quad": "quad"}
-QUANTA: dict[Quantum, float] = {"hex": np.pi / 3, "triangle": np.pi / 3, "quad": np.pi / 2}
+Quantum = Literal["auto", "hex", "triangle", "quad", "brick", "none"]
+#: Names of the quanta (π/3, π/2, π) that the cone angle of a pattern must be a multiple of.
+QUANTUM_OF: dict[str, Quantum] = {
+    "hex": "hex",
+    "triangle": "hex",
+    "quad": "quad",
+    "diamond": "quad",
+    "brick": "brick",
+    "trihexagonal": "hex",
+    "truncated-hexagonal": "hex",
+    "truncated-square": "quad",
+    "rhombitrihexagonal": "hex",
+}
+QUANTA: dict[Quantum, float] = {"hex": np.pi / 3, "triangle": np.pi / 3, "quad": np.pi / 2, "brick": np.pi}
 
 
 @dataclass(frozen=True)
@@ -76,7 +86,7 @@ class BoundaryCondition:
     ``isometric``: boundary lengths kept up to scale, each loop's curvature rounded to a multiple of quantum.
     Openings (loops from the third on) on which no angle is listed are isometric in every mode: they cannot
     be straight, for they turn by −2π.
-    quantum: π/3, π/2 or none, by the pattern that is meant; ``auto``: that of the pattern that is laid.
+    quantum: π/3, π/2, π or none, by the pattern that is meant; ``auto``: that of the pattern that is laid.
     spread: how ``isometric`` distributes the rounding: ``even`` (the paper) or ``optimal`` (u constant on
     each loop). angle_unit: in which error messages give angles; it does not change the condition.
     """

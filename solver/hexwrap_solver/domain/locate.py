@@ -8,6 +8,7 @@ import numpy as np
 
 from hexwrap_solver.arrays import Complexes, Floats, Ints
 from hexwrap_solver.conformal.types import ConformalMap
+from hexwrap_solver.tolerances import TINY
 
 #: A place this far outside of a triangle, in barycentric coordinates, still counts as on its edge.
 ON_EDGE = 1e-9
@@ -24,7 +25,7 @@ def barycentric(corners: Complexes, place: Complexes) -> Floats:
     a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     p = place - corners[:, 0]
     area = a.real * b.imag - a.imag * b.real
-    area = np.where(area == 0, 1e-300, area)
+    area = np.where(area == 0, TINY, area)
     second = (p.real * b.imag - p.imag * b.real) / area
     third = (a.real * p.imag - a.imag * p.real) / area
     return np.stack([1 - second - third, second, third], axis=1)

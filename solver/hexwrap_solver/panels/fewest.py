@@ -31,13 +31,13 @@ class Joints:
     """Joints between panels that may still change their lengths, and others.
 
     left, right: (k,) the panels, −1 where a panel has a given shape. width: measures all joints, (k,), for
-    given lengths (r,). shrink: by how much a joint widens per length that either panel loses.
+    given lengths (r,). shrink: (r,) by how much a joint widens per length that a panel loses.
     """
 
     left: Ints
     right: Ints
     width: Callable[[Floats], Floats]
-    shrink: float
+    shrink: Floats
 
 
 @dataclass(frozen=True)
@@ -50,28 +50,34 @@ class Fewest:
     width: Floats
 
 
-def fewest_lengths(limit: Floats, joints: Joints, max_gap: float) -> Fewest:
+def fewest_lengths(limit: Floats, joints: Joints, max_gap: float, kind: Ints) -> Fewest:
     """limit: (r,) greatest length of each panel, which its class may not exceed. max_gap: greatest width of a
-    joint, in the unit of the limits. Joints that are wider even at the limits count as no wider than that."""
+    joint, in the unit of the limits. kind: (r,) panels of different kinds share no class. Joints that are
+    wider even at the limits count as no wider than that."""
     own = joints.width(limit)
     allowed = np.full(len(own), max_gap * (1 + SLACK))
     over = own > allowed
     bound = np.where(over, np.inf, allowed)
-    length = _stab_fairly(limit, joints, own, bound)
-    return Fewest(_merge_classes(limit, length, joints, bound), over, own)
+    length = _stab_fairly(limit, joints, own, bound, kind)
+    for one in np.unique(kind):
+        length = _merge_classes(limit, length, joints, bound, kind == one)
+    return Fewest(length, over, own)
 
 
-def _stab_fairly(limit: Floats, joints: Joints, own: Floats, bound: Floats) -> Floats:
+def _stab_fairly(limit: Floats, joints: Joints, own: Floats, bound: Floats, kind: Ints) -> Floats:
     """Lengths by stabbing, the room in each joint divided between its panels.
 
     How a joint widens is linear in the lengths only where the edges are parallel. Where the measured widths
     still exceed the bound, the room that is given away there shrinks, at last to nothing.
     """
-    room = np.where(np.isfinite(bound), (bound - own) / joints.shrink, np.inf)
+    room = np.where(np.isfinite(bound), bound - own, np.inf)
     share = np.ones(len(own))
     length = limit
     for _ in range(ROUNDS):
-        length = stab(limit, limit - _least_per_panel(joints, share * room / 2, len(limit)))
+        low = limit - _least_per_panel(joints, share * room / 2, len(limit)) / joints.shrink
+        length = np.zeros_like(limit)
+        for one in np.unique(kind):
+            length[kind == one] = stab(limit[kind == one], low[kind == one])
         wide = joints.width(length) > bound
         if not wide.any():
             return length
@@ -108,21 +114,23 @@ def stab(high: Floats, low: Floats) -> Floats:
     return value
 
 
-def _merge_classes(limit: Floats, length: Floats, joints: Joints, bound: Floats) -> Floats:
-    """Takes classes away, the cheapest in area first, while the joints stay narrow enough."""
-    sizes = np.unique(length)
+def _merge_classes(limit: Floats, length: Floats, joints: Joints, bound: Floats, chosen: Bools) -> Floats:
+    """Takes classes of the chosen panels away, the cheapest in area first, while the joints stay narrow
+    enough."""
+    sizes = np.unique(length[chosen])
     if len(sizes) > MANY:
         return length
     tried: set[float] = set()
     while len(sizes) > 1:
-        counts = np.bincount(np.searchsorted(sizes, length), minlength=len(sizes))
+        counts = np.bincount(np.searchsorted(sizes, length[chosen]), minlength=len(sizes))
         cost = np.append(np.inf, counts[1:] * np.diff(sizes**2))
         cost[np.isin(sizes, list(tried))] = np.inf
         least = int(cost.argmin())
         if not np.isfinite(cost[least]):
             break
         fewer = np.delete(sizes, least)
-        shorter = fewer[np.searchsorted(fewer, limit, side="right") - 1]
+        shorter = length.copy()
+        shorter[chosen] = fewer[np.searchsorted(fewer, limit[chosen], side="right") - 1]
         if (joints.width(shorter) <= bound).all():
             sizes, length = fewer, shorter
         else:

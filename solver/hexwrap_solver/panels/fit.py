@@ -10,22 +10,31 @@ from hexwrap_solver.arrays import Bools, Floats, Ints, Progress, Ragged, no_prog
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.errors import ConvergenceError, PanelsError
 from hexwrap_solver.panels import limits
-from hexwrap_solver.panels.best import jointly_largest
-from hexwrap_solver.panels.energy import minimise_watertight
+from hexwrap_solver.panels.best import Bound, jointly_largest
+from hexwrap_solver.panels.energy import NEAREST, functionals, minimise_watertight
 from hexwrap_solver.panels.facing import facing_edges
 from hexwrap_solver.panels.halfedges import HalfEdges, half_edges
 from hexwrap_solver.panels.planar import crossing_themselves
-from hexwrap_solver.panels.polygons import edge_lengths, fan_areas, mean_edges, means, row_minima, take_rows
+from hexwrap_solver.panels.polygons import (
+    best_plane_distances,
+    convex,
+    edge_lengths,
+    fan_areas,
+    mean_edges,
+    means,
+    row_maxima,
+    row_minima,
+    take_rows,
+)
 from hexwrap_solver.panels.poses import fit_poses, target_lengths
-from hexwrap_solver.panels.regular import Poses
+from hexwrap_solver.panels.regular import Poses, outline_areas
 from hexwrap_solver.panels.separation import Separation, separating_planes
 from hexwrap_solver.panels.trimmed import flatten_and_clear, plane_normals
 from hexwrap_solver.panels.types import FittedPanels, PanelSettings, Weights
+from hexwrap_solver.pattern.lattice import LATTICES
 from hexwrap_solver.pattern.types import Pattern
+from hexwrap_solver.surface.curvature import saddle_share
 from hexwrap_solver.surface.types import Surface
-
-#: Corners of a whole cell of each kind.
-CORNERS = {"hex": 6, "quad": 4, "triangle": 3}
 
 #: A trimmed cell of whose size (root of the area) less than this fraction is left gets no panel.
 LEAST_TRIMMED = 0.05
@@ -64,9 +73,16 @@ class FitKey:
 
 
 WATERTIGHT_NOTES = (
-    "Watertight panels share their corners: joint, orientation and size classes do not apply, and method is"
-    " always energy.",
+    "Watertight panels share their corners: joint, orientation and size classes do not apply.",
 )
+WEIGHTS_NOTE = ("Weights were given, so that the energies were minimised, as with method energy.",)
+
+#: Corners farther from their panel's plane than this fraction of its mean edge: it did not become flat.
+FLAT = 1e-9
+
+#: Patterns in which four panels meet at each node. Where only three meet, flat convex panels follow no
+#: saddle: their angles would have to sum up to more than 2π (Li, Liu and Wang 2015).
+FOUR_AT_A_NODE = ("quad", "diamond", "trihexagonal", "rhombitrihexagonal")
 
 #: An energy above this that no step lowers is worth a note.
 MINIMAL = 1e-12
@@ -92,82 +108,121 @@ def fit_panels(
     return _fit_split(cmap.surface, pattern, settings, progress)
 
 
-def _fit_split(
-    surface: Surface, pattern: Pattern, settings: PanelSettings, progress: Progress
-) -> FittedPanels:
-    cells = pattern.cells
-    p = CORNERS[pattern.kind]
-    regular: Bools = pattern.whole & (pattern.faces.lengths == p)
-    points = _table(cells, regular, p)
-    poses, energy, notes = fit_poses(surface, points, settings, progress)
-    special: Bools = pattern.whole & (pattern.index != 0)
-    others = [
-        _Special.of(surface, cells, special & (pattern.faces.lengths == sides), settings)
-        for sides in np.unique(pattern.faces.lengths[special])
-    ]
-    edges = half_edges(pattern)
-    normal = plane_normals(cells)
-    normal[regular] = poses.normal
-    for group in others:
-        normal[group.face] = group.poses.normal
-    planes = separating_planes(pattern, edges, normal, settings.joint)
-    progress(0.4, "limiting sizes")
-    length, center, said = _limits(poses, points, planes, regular, pattern, edges, settings, progress)
-    notes += said
-    roomy = length > 0
-    kept = np.zeros(pattern.n_cells, dtype=bool)
-    kept[regular] = roomy
-    notes += _room_note(np.flatnonzero(regular & ~kept), int(kept.sum()), settings.joint)
-    parts = [_trimmed(cells, normal, planes, edges, ~regular & ~special)]
-    parts += [group.inscribed(pattern, planes) for group in others]
-    shapes, shape_center, cut = _joined(parts)
-    face = np.flatnonzero(kept | cut)
-    spare = _spare(poses, planes, regular, pattern, settings)
-    return FittedPanels(
-        mode="split",
-        face=face,
-        regular=kept[face],
-        spokes=poses.spokes(p)[roomy],
-        shapes=shapes,
-        center=_merge(kept, center[roomy], cut, shape_center)[face],
-        normal=normal[face],
-        limit=_merge(kept, length[roomy], cut, mean_edges(shapes))[face],
-        whole=pattern.whole[face],
-        cell_area=fan_areas(cells)[face],
-        energy=energy,
-        notes=notes + _joint_note(settings) + _dropped_note(int((~regular & ~cut).sum()), settings.joint),
-        spare_limit=spare and _merge(kept, spare[0][roomy], cut, mean_edges(shapes))[face],
-        spare_center=spare and _merge(kept, spare[1][roomy], cut, shape_center)[face],
-        facing=facing_edges(edges, pattern.faces.offsets[:-1], face),
-        special=special[face],
-    )
-
-
 @dataclass(frozen=True)
-class _Special:
-    """Regular panels of cells with another number of sides, all with the same one. face: (k,) cells."""
+class _Group:
+    """Cells with the same number of sides, and the panels nearest to them. face: (k,) cells. at: (k, sides)
+    their half-edges. regular: whether they are a kind of the pattern, not around singularities."""
 
     face: Ints
-    sides: int
+    at: Ints
+    points: Floats
     poses: Poses
-    cells: int
+    regular: bool
 
-    @classmethod
-    def of(cls, surface: Surface, cells: Ragged, chosen: Bools, settings: PanelSettings) -> _Special:
-        face = np.flatnonzero(chosen)
-        sides = int(cells.lengths[face[0]])
-        points = _table(cells, chosen, sides)
-        poses, _, _ = fit_poses(surface, points, replace(settings, method="exact"), no_progress)
-        return cls(face, sides, poses, len(chosen))
+    @property
+    def sides(self) -> int:
+        return self.at.shape[1]
 
-    def inscribed(self, pattern: Pattern, planes: Separation) -> tuple[Ragged, Floats, Bools]:
-        """As ``_trimmed``: the largest that fit for any target, since they belong to no size class."""
-        at = pattern.faces.offsets[:-1][self.face][:, None] + np.arange(self.sides)
-        length, center = limits.inscribed(self.poses, planes.direction[at], planes.offset[at])
-        kept = np.zeros(self.cells, dtype=bool)
+    @property
+    def spokes(self) -> Ragged:
+        return Ragged.from_table(self.poses.spokes(self.sides))
+
+    def inscribed(self, planes: Separation) -> tuple[Floats, Floats]:
+        return limits.inscribed(self.poses, planes.direction[self.at], planes.offset[self.at])
+
+    def finished(self, planes: Separation, cells: int) -> tuple[Ragged, Floats, Bools]:
+        """As ``_trimmed``: the largest that fit, for any target, since they belong to no size class."""
+        length, center = self.inscribed(planes)
+        kept = np.zeros(cells, dtype=bool)
         kept[self.face[length > 0]] = True
         corner = center[:, None] + length[:, None, None] * self.poses.spokes(self.sides)
         return Ragged.from_table(corner[length > 0]), center[length > 0], kept
+
+
+def _groups(
+    surface: Surface, pattern: Pattern, settings: PanelSettings, progress: Progress
+) -> tuple[list[_Group], Floats | None, tuple[str, ...]]:
+    """Whole cells by kind, those of the pattern first, the largest kind before the others; the curve of
+    energy, summed over the kinds, and notes."""
+    cells, lattice = pattern.cells, LATTICES[pattern.kind]
+    groups, curves, notes = [], [], []
+    for regular in (True, False):
+        chosen = pattern.whole & ((pattern.index == 0) == regular)
+        for sides in np.unique(cells.lengths[chosen])[::-1].tolist():
+            face = np.flatnonzero(chosen & (cells.lengths == sides))
+            at = cells.offsets[face][:, None] + np.arange(sides)
+            points = np.asarray(cells.values[at], dtype=np.float64)
+            outline = lattice.uneven_outline(sides) if regular else None
+            how = settings if regular else replace(settings, method="exact")
+            poses, energy, said = fit_poses(surface, points, how, progress, outline)
+            groups.append(_Group(face, at, points, poses, regular))
+            curves += [] if energy is None else [energy]
+            notes += [one for one in said if one not in notes]
+    return groups, _summed(curves), tuple(notes)
+
+
+def _summed(curves: list[Floats]) -> Floats | None:
+    """Curves of different lengths keep their last value."""
+    if not curves:
+        return None
+    most = max(len(curve) for curve in curves)
+    return np.asarray(sum(np.pad(curve, (0, most - len(curve)), mode="edge") for curve in curves))
+
+
+def _fit_split(
+    surface: Surface, pattern: Pattern, settings: PanelSettings, progress: Progress
+) -> FittedPanels:
+    cells, n = pattern.cells, pattern.n_cells
+    groups, energy, notes = _groups(surface, pattern, settings, progress)
+    kinds, others = [g for g in groups if g.regular], [g for g in groups if not g.regular]
+    edges = half_edges(pattern)
+    normal = plane_normals(cells)
+    for group in groups:
+        normal[group.face] = group.poses.normal
+    planes = separating_planes(pattern, edges, normal, settings.joint)
+    progress(0.4, "limiting sizes")
+    face = np.concatenate([np.zeros(0, dtype=np.int64), *(group.face for group in kinds)])
+    spokes = _chained([group.spokes for group in kinds])
+    length, center, said = _limits(kinds, planes, edges, settings, progress)
+    notes += said
+    regular = np.zeros(n, dtype=bool)
+    regular[face] = True
+    kept = np.zeros(n, dtype=bool)
+    kept[face] = length > 0
+    notes += _room_note(np.flatnonzero(regular & ~kept), int(kept.sum()), settings.joint)
+    special: Bools = pattern.whole & (pattern.index != 0)
+    parts = [_trimmed(cells, normal, planes, edges, ~regular & ~special)]
+    parts += [group.finished(planes, n) for group in others]
+    shapes, shape_center, cut = _joined(parts)
+    order = np.argsort(face, kind="stable")
+    order = order[(length > 0)[order]]  # the regular panels that are kept, by cell
+    made = np.flatnonzero(kept | cut)
+    spare = _spare(kinds, planes, settings)
+    return FittedPanels(
+        mode="split",
+        face=made,
+        regular=kept[made],
+        spokes=take_rows(spokes, order)[0],
+        shapes=shapes,
+        center=_merge(kept, center[order], cut, shape_center)[made],
+        normal=normal[made],
+        limit=_merge(kept, length[order], cut, mean_edges(shapes))[made],
+        whole=pattern.whole[made],
+        cell_area=fan_areas(cells)[made],
+        energy=energy,
+        notes=notes + _joint_note(settings) + _dropped_note(int((~regular & ~cut).sum()), settings.joint),
+        spare_limit=spare and _merge(kept, spare[0][order], cut, mean_edges(shapes))[made],
+        spare_center=spare and _merge(kept, spare[1][order], cut, shape_center)[made],
+        facing=facing_edges(edges, pattern.faces.offsets[:-1], made),
+        special=special[made],
+    )
+
+
+def _chained(tables: list[Ragged]) -> Ragged:
+    """(·, 3) values, one table after the other."""
+    count = np.concatenate([np.zeros(0, dtype=np.int64), *(table.lengths for table in tables)])
+    values = np.concatenate([np.zeros((0, 3)), *(table.values.reshape(-1, 3) for table in tables)])
+    return Ragged(values, np.concatenate([[0], np.cumsum(count)]).astype(np.int64))
 
 
 def _joined(parts: list[tuple[Ragged, Floats, Bools]]) -> tuple[Ragged, Floats, Bools]:
@@ -175,37 +230,39 @@ def _joined(parts: list[tuple[Ragged, Floats, Bools]]) -> tuple[Ragged, Floats, 
     if len(parts) == 1:
         return parts[0]
     order = np.argsort(np.concatenate([np.flatnonzero(kept) for _, _, kept in parts]), kind="stable")
-    count = np.concatenate([shapes.lengths for shapes, _, _ in parts])
-    values = np.concatenate([shapes.values.reshape(-1, 3) for shapes, _, _ in parts])
-    whole = Ragged(values, np.concatenate([[0], np.cumsum(count)]).astype(np.int64))
     center = np.concatenate([center for _, center, _ in parts])[order]
-    return take_rows(whole, order)[0], center, np.logical_or.reduce([kept for _, _, kept in parts])
+    shapes = take_rows(_chained([shapes for shapes, _, _ in parts]), order)[0]
+    return shapes, center, np.logical_or.reduce([kept for _, _, kept in parts])
 
 
 def _fit_watertight(
     surface: Surface, pattern: Pattern, settings: PanelSettings, progress: Progress
 ) -> FittedPanels:
     """All cells, trimmed ones too, as polygons over shared corners."""
-    target = target_lengths(pattern.cells, settings)
-    tree = surface.tree if settings.weights.surface > 0 else None
-    moved, energy = minimise_watertight(pattern, target, settings.weights, tree, progress)
+    energies = settings.method == "energy" or settings.weights != Weights()
+    aims = functionals(settings.weights) if energies else NEAREST
+    moved, energy = minimise_watertight(
+        pattern, target_lengths(pattern.cells, settings), aims, surface, progress
+    )
     shapes = Ragged(moved[pattern.faces.values.astype(np.int64)], pattern.faces.offsets)
-    unmoved = 2 if settings.weights.planarity > 0 else 1  # energies: the beginning, and the end made flat
-    stuck = len(energy) <= unmoved and energy[0] > MINIMAL
+    unmoved = 2 if aims.flat else 1  # energies: the beginning, and the end made flat
+    stuck = energies and len(energy) <= unmoved and energy[0] > MINIMAL
     center, normal = means(shapes), plane_normals(shapes)
+    away = surface.tree.nearest(moved).distance / mean_edges(shapes).mean()
     notes = (
+        *(WEIGHTS_NOTE if energies and settings.method == "exact" else ()),
         *(STUCK_NOTE if stuck else ()),
+        *(_bent_note(shapes) if aims.flat else ()),
         *collapsed_note(shapes),
-        *_crossing_note(crossing_themselves(shapes, center, normal), settings.weights, pattern.kind),
-        *_far_note(
-            surface.tree.nearest(moved).distance / mean_edges(shapes).mean(), settings.weights, pattern.kind
-        ),
+        *_crossing_note(crossing_themselves(shapes, center, normal)),
+        *_convex_note(shapes, normal, pattern, surface),
+        *(_pulled_note if energies else _far_note)(away, settings.weights),
     )
     return FittedPanels(
         mode="watertight",
         face=np.arange(pattern.n_cells),
         regular=np.zeros(pattern.n_cells, dtype=bool),
-        spokes=np.zeros((0, CORNERS[pattern.kind], 3)),
+        spokes=_chained([]),
         shapes=shapes,
         center=center,
         normal=normal,
@@ -215,6 +272,35 @@ def _fit_watertight(
         energy=energy,
         notes=WATERTIGHT_NOTES + notes,
     )
+
+
+def _bent_note(shapes: Ragged) -> tuple[str, ...]:
+    bend = row_maxima(np.abs(best_plane_distances(shapes)), shapes.offsets) / mean_edges(shapes)
+    count = int(np.sum(bend > FLAT))
+    if not count:
+        return ()
+    return (
+        f"Watertight panels that could not be made flat: {count}, bent by up to {bend.max():.1e} of their"
+        " mean edge; smaller cells, or another pattern, leave them more room.",
+    )
+
+
+def _convex_note(shapes: Ragged, normal: Floats, pattern: Pattern, surface: Surface) -> tuple[str, ...]:
+    """How many are not, and the pattern that would be."""
+    count = int(np.sum(~convex(shapes, normal)))
+    if not count:
+        return ()
+    saddle = saddle_share(surface)
+    if saddle > 0 and pattern.kind not in FOUR_AT_A_NODE:
+        better = (
+            f"; {max(saddle, 0.01):.0%} of the surface is curved like a saddle, where only patterns with four"
+            " panels at each node can be flat and convex: ask for kind trihexagonal"
+        )
+    elif saddle == 0 and pattern.kind != "hex":
+        better = "; on this surface, which is nowhere a saddle, ask for kind hex"
+    else:
+        better = "; smaller cells leave fewer"
+    return (f"Watertight panels that are not convex: {count} of {shapes.n_rows}{better}.",)
 
 
 def collapsed_note(shapes: Ragged) -> tuple[str, ...]:
@@ -230,76 +316,75 @@ def collapsed_note(shapes: Ragged) -> tuple[str, ...]:
     )
 
 
-def _crossing_note(crossing: Bools, weights: Weights, kind: str) -> tuple[str, ...]:
+def _crossing_note(crossing: Bools) -> tuple[str, ...]:
     count = int(crossing.sum())
     if not count:
         return ()
-    less = "less weight on surface, for " if weights.surface else ""
-    quads = "" if kind == "quad" else "quads, which seldom do, or for "
     return (
-        f"Watertight panels whose outline crosses itself: {count}; ask for {less}{quads}split panels, which"
-        " cannot.",
+        f"Watertight panels whose outline crosses itself: {count}; ask for another pattern, for smaller"
+        " cells, or for split panels, which cannot.",
     )
 
 
-def _far_note(away: Floats, weights: Weights, kind: str) -> tuple[str, ...]:
+def _far_note(away: Floats, weights: Weights, cure: str = "smaller cells stay nearer") -> tuple[str, ...]:
     """away: (p,) distances of the corners from the surface / mean edge."""
     if away.max(initial=0.0) <= FAR:
         return ()
-    flat_quads = kind == "quad" and weights.planarity > 0
-    ways = []
-    if weights.surface < HOLD:
-        cost = "in waves where flat quads do not follow it" if flat_quads else "with less even shapes"
-        ways.append(f"a weight of {HOLD:g} on surface holds them nearer, {cost}; ")
-    if flat_quads:
-        ways.append("quads that need not be flat (planarity 0, surface 1) follow it smoothly; ")
     return (
         f"Watertight panels leave the surface by up to {away.max():.0%} of their mean edge,"
-        f" {away.mean():.0%} on average; {''.join(ways)}split panels stay beside it.",
+        f" {away.mean():.0%} on average; {cure}, and split panels stay beside it.",
     )
 
 
-def _table(cells: Ragged, chosen: Bools, p: int) -> Floats:
-    """(r, p, 3) corner points of the chosen cells, which have p corners each."""
-    return np.asarray(cells.values[cells.offsets[:-1][chosen][:, None] + np.arange(p)], dtype=np.float64)
+def _pulled_note(away: Floats, weights: Weights) -> tuple[str, ...]:
+    """The same of the energies, whose weight of the surface is the user's."""
+    nearer = f"a weight of {HOLD:g} on surface holds them nearer, with less even shapes"
+    return _far_note(away, weights, nearer if weights.surface < HOLD else "other weights may hold them")
 
 
 def _limits(
-    poses: Poses,
-    points: Floats,
+    groups: list[_Group],
     planes: Separation,
-    regular: Bools,
-    pattern: Pattern,
     edges: HalfEdges,
     settings: PanelSettings,
     progress: Progress,
 ) -> tuple[Floats, Floats, tuple[str, ...]]:
-    """Greatest length of each regular panel, its centre, and notes."""
-    p = points.shape[1]
-    at = pattern.faces.offsets[:-1][regular][:, None] + np.arange(p)
-    direction, offset = planes.direction[at], planes.offset[at]
+    """Greatest length of each panel of the groups, its centre, and notes."""
+    if settings.target == "best" and groups:
+        areas = [float(outline_areas(group.spokes).max()) for group in groups]
+        bound = [
+            Bound(g.poses, planes.direction[g.at], planes.offset[g.at], area / max(areas))
+            for g, area in zip(groups, areas, strict=True)
+        ]
+        partner = _partners(np.concatenate([group.at.ravel() for group in groups]), edges)
+        try:
+            return *jointly_largest(bound, partner, settings.joint, progress), ()
+        except ConvergenceError:
+            return *_together([group.inscribed(planes) for group in groups]), JOINTLY_NOTE
+    return *_together([_limit(group, planes, settings) for group in groups]), ()
+
+
+def _limit(group: _Group, planes: Separation, settings: PanelSettings) -> tuple[Floats, Floats]:
+    points = group.points
     if settings.target == "mean":
         edge = np.linalg.norm(np.roll(points, -1, axis=1) - points, axis=2)
-        return edge.mean(axis=1), poses.center, ()
+        return edge.mean(axis=1), group.poses.center
     if settings.target == "shortest":
-        return *limits.shortest_edge(poses, points, direction, offset), ()
-    if settings.target == "best":
-        partner = _partners(at.ravel(), edges)
-        try:
-            return *jointly_largest(poses, direction, offset, partner, settings.joint, progress), ()
-        except ConvergenceError:
-            return *limits.inscribed(poses, direction, offset), JOINTLY_NOTE
-    return *limits.inscribed(poses, direction, offset), ()
+        direction, offset = planes.direction[group.at], planes.offset[group.at]
+        return limits.shortest_edge(group.poses, points, direction, offset)
+    return group.inscribed(planes)
 
 
-def _spare(
-    poses: Poses, planes: Separation, regular: Bools, pattern: Pattern, settings: PanelSettings
-) -> tuple[Floats, Floats] | None:
+def _together(found: list[tuple[Floats, Floats]]) -> tuple[Floats, Floats]:
+    length = np.concatenate([np.zeros(0), *(length for length, _ in found)])
+    return length, np.concatenate([np.zeros((0, 3)), *(center for _, center in found)])
+
+
+def _spare(groups: list[_Group], planes: Separation, settings: PanelSettings) -> tuple[Floats, Floats] | None:
     """Beside the jointly largest panels, which differ more in size from each other, the inscribed ones."""
     if settings.target != "best":
         return None
-    at = pattern.faces.offsets[:-1][regular][:, None] + np.arange(CORNERS[pattern.kind])
-    return limits.inscribed(poses, planes.direction[at], planes.offset[at])
+    return _together([group.inscribed(planes) for group in groups])
 
 
 def _partners(at: Ints, edges: HalfEdges) -> Ints:

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from hexwrap_solver.arrays import Floats, Ints, Ragged
+from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged
 from hexwrap_solver.geometry import dot
+
+#: Corners whose angle exceeds π by less, radians, are straight.
+STRAIGHT = 1e-9
 
 
 def row_sums(values: Floats, offsets: Ints) -> Floats:
@@ -70,6 +73,11 @@ def interior_angles(polygons: Ragged, normal: Floats) -> Floats:
     length = np.linalg.norm(np.cross(ahead, back), axis=1)
     angle = np.arctan2(length, cosine)
     return np.asarray(np.where(sine >= 0, angle, 2 * np.pi - angle))
+
+
+def convex(polygons: Ragged, normal: Floats) -> Bools:
+    """(q,) polygons without a corner of more than π, seen along the unit normals (q, 3)."""
+    return np.asarray(row_maxima(interior_angles(polygons, normal), polygons.offsets) <= np.pi + STRAIGHT)
 
 
 def best_plane_distances(polygons: Ragged) -> Floats:

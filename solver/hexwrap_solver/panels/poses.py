@@ -7,7 +7,7 @@ import numpy as np
 from hexwrap_solver.arrays import Floats, Progress, Ragged
 from hexwrap_solver.panels.energy import minimise_singly
 from hexwrap_solver.panels.polygons import edge_lengths, mean_edges, row_minima
-from hexwrap_solver.panels.regular import Poses, nearest_regular, nearest_regular_in_plane
+from hexwrap_solver.panels.regular import Poses, nearest_copy, nearest_regular, nearest_regular_in_plane
 from hexwrap_solver.panels.tangents import surface_normals
 from hexwrap_solver.panels.types import PanelSettings
 from hexwrap_solver.surface.types import Surface
@@ -17,12 +17,16 @@ REGULAR = 1e-9
 
 
 def fit_poses(
-    surface: Surface, cells: Floats, settings: PanelSettings, progress: Progress
+    surface: Surface,
+    cells: Floats,
+    settings: PanelSettings,
+    progress: Progress,
+    outline: Floats | None = None,
 ) -> tuple[Poses, Floats | None, tuple[str, ...]]:
     """Poses for cells (r, p, 3); with method ``energy`` also the energy curve, and a note where it is not
-    regular."""
-    if settings.method == "exact":
-        return _nearest(surface, cells, settings), None, ()
+    regular. outline: (p, 2) what the panels are copies of, None for regular polygons; always exact."""
+    if settings.method == "exact" or outline is not None:
+        return _nearest(surface, cells, settings, outline), None, ()
     target = target_lengths(Ragged.from_table(cells), settings)
     tree = surface.tree if settings.weights.surface > 0 else None
     shape, energy = minimise_singly(cells, target, settings.weights, tree, progress)
@@ -45,7 +49,12 @@ def target_lengths(cells: Ragged, settings: PanelSettings) -> Floats:
     return mean_edges(cells)
 
 
-def _nearest(surface: Surface, shape: Floats, settings: PanelSettings) -> Poses:
-    if settings.orientation == "fit":
-        return nearest_regular(shape)
-    return nearest_regular_in_plane(shape, surface_normals(surface, shape.mean(axis=1)))
+def _nearest(
+    surface: Surface, shape: Floats, settings: PanelSettings, outline: Floats | None = None
+) -> Poses:
+    normal = None
+    if settings.orientation != "fit":
+        normal = surface_normals(surface, shape.mean(axis=1))
+    if outline is not None:
+        return nearest_copy(shape, outline, normal)
+    return nearest_regular(shape) if normal is None else nearest_regular_in_plane(shape, normal)

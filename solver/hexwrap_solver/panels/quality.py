@@ -16,6 +16,7 @@ from hexwrap_solver.panels.halfedges import HalfEdges, half_edges
 from hexwrap_solver.panels.overlap import overlapping_pairs
 from hexwrap_solver.panels.polygons import (
     best_plane_distances,
+    convex,
     edge_lengths,
     fan_areas,
     interior_angles,
@@ -23,8 +24,10 @@ from hexwrap_solver.panels.polygons import (
     row_maxima,
 )
 from hexwrap_solver.panels.types import Panels, Quality
+from hexwrap_solver.pattern.lattice import LATTICES
 from hexwrap_solver.pattern.types import Pattern
 from hexwrap_solver.surface.types import Surface
+from hexwrap_solver.tolerances import TINY
 
 #: A smaller share of the surface without cells is not worth a note.
 BARE = 0.03
@@ -49,7 +52,7 @@ def measure(
     between = gaps(pattern, edges, panels)
     angle = interior_angles(polygons, panels.normal)
     row, count, mean = polygons.row, polygons.lengths, mean_edges(polygons)
-    ideal = (np.pi * (count - 2) / count)[row]
+    ideal = _ideal_angles(pattern, panels, angle, (np.pi * (count - 2) / count)[row])
     progress(0.5, "distances to the surface")
     away = _surface_distances(cmap.surface, pattern, panels)
     progress(0.9, "looking for overlaps")
@@ -63,13 +66,28 @@ def measure(
         gap_normal=between.normal,
         kink=between.kink,
         gaps_over=_count_wide(edges, panels, between.tangential),
-        convex=row_maxima(angle, polygons.offsets) <= np.pi + 1e-9,
+        convex=convex(polygons, panels.normal),
         congruence=congruence_classes(polygons, panels.normal),
         overlaps=_count_overlaps(pattern, edges, panels),
         coverage=float(fan_areas(polygons).sum()) / cell_area,
         movement=_movement(pattern, panels),
         notes=quality.notes + _bare_note(pattern, cell_area / float(area.sum())),
     )
+
+
+def _ideal_angles(pattern: Pattern, panels: Panels, angle: Floats, even: Floats) -> Floats:
+    """(h,) angles of regular polygons (even), or, of cells that are none, the nearest of the cell's."""
+    row, count = panels.polygons.row, panels.polygons.lengths
+    lattice, ideal = LATTICES[pattern.kind], even
+    for sides in lattice.outlines:
+        outline = lattice.uneven_outline(sides)
+        if outline is None:
+            continue
+        edge = np.roll(outline, -1, axis=0) - outline
+        own = np.pi - np.angle((edge[:, 0] + 1j * edge[:, 1]) / (np.roll(edge[:, 0] + 1j * edge[:, 1], 1)))
+        nearest = own[abs(angle[:, None] - own).argmin(axis=1)]
+        ideal = np.where((count == sides)[row] & panels.whole[row], nearest, ideal)
+    return np.asarray(ideal)
 
 
 def _surface_distances(surface: Surface, pattern: Pattern, panels: Panels) -> Floats:
@@ -130,4 +148,4 @@ def stretch_ratio(cmap: ConformalMap) -> tuple[Floats, Floats]:
     dx = w1 / x
     dy = (w2 - a * dx) / h
     conformal, anti = np.abs(dx - 1j * dy) / 2, np.abs(dx + 1j * dy) / 2
-    return (conformal + anti) / np.maximum(np.abs(conformal - anti), 1e-300), double_area / 2
+    return (conformal + anti) / np.maximum(np.abs(conformal - anti), TINY), double_area / 2

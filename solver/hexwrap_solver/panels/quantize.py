@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,6 +11,8 @@ from hexwrap_solver.arrays import Floats, Ints, Ragged
 from hexwrap_solver.errors import PanelsError
 from hexwrap_solver.panels.facing import mean_normals, widths
 from hexwrap_solver.panels.fewest import SLACK, Fewest, Joints, fewest_lengths
+from hexwrap_solver.panels.polygons import edge_vectors, row_sums, take_rows
+from hexwrap_solver.panels.regular import outline_areas
 from hexwrap_solver.panels.sizes import (
     ALIKE,
     ALIKE_AREA,
@@ -65,12 +68,22 @@ def quantize(fitted: FittedPanels, settings: PanelSettings) -> Panels:
         pick, lengths = 0, [length]
     else:
         lengths = [
-            choose_lengths(limit, settings.sizes, settings.size_cost, settings.increment, smallest)
+            _by_kind(
+                fitted,
+                limit,
+                lambda own: choose_lengths(
+                    own, settings.sizes, settings.size_cost, settings.increment, smallest
+                ),
+            )
             for limit in limits
         ]
         pick = min(range(len(lengths)), key=lambda k: _loss(fitted, lengths[k], smallest, settings))
     fitted, length = choices[pick], lengths[pick]
-    class_length, member, class_count = np.unique(length, return_inverse=True, return_counts=True)
+    sides = fitted.spokes.lengths
+    classes, member, class_count = np.unique(
+        np.stack([-sides, length]), axis=1, return_inverse=True, return_counts=True
+    )
+    class_length, member = classes[1], member.ravel()
     edge_length = fitted.limit.copy()
     edge_length[regular] = length
     size = np.full(len(fitted.face), -1, dtype=np.int64)
@@ -91,20 +104,39 @@ def quantize(fitted: FittedPanels, settings: PanelSettings) -> Panels:
         whole=fitted.whole,
         class_length=np.concatenate([class_length, edge_length[alone]]),
         class_count=np.concatenate([class_count, np.ones(len(alone), dtype=np.int64)]).astype(np.int64),
-        class_sides=np.concatenate(
-            [np.full(len(class_length), fitted.spokes.shape[1]), polygons.lengths[alone]]
-        ).astype(np.int64),
+        class_sides=np.concatenate([_true_sides(fitted, member), polygons.lengths[alone]]).astype(np.int64),
         trade_off=_trade_off(fitted, limits, settings) if len(length) else None,
         energy=fitted.energy,
         notes=(
             *fitted.notes,
             *_range_notes(settings, fitted.limit[regular], outside),
-            *_size_notes(settings, limits[pick], length),
+            *_size_notes(fitted, settings, limits[pick], length),
             *said,
         ),
         outside=outside,
         max_gap=settings.max_gap,
+        n_special=len(alone),
     )
+
+
+def _by_kind(fitted: FittedPanels, limit: Floats, choose: Callable[[Floats], Floats]) -> Floats:
+    """(r,) chosen for the panels of each number of sides by themselves."""
+    sides = fitted.spokes.lengths
+    chosen = np.zeros_like(limit)
+    for kind in np.unique(sides):
+        chosen[sides == kind] = choose(limit[sides == kind])
+    return chosen
+
+
+def _true_sides(fitted: FittedPanels, member: Ints) -> Ints:
+    """(s,) sides of the panels of each class; edges in line with each other are one side."""
+    one = np.unique(member, return_index=True)[1]
+    spokes = take_rows(fitted.spokes, one)[0]
+    ahead = edge_vectors(spokes)
+    back = np.empty_like(ahead)
+    back[spokes.next()] = -ahead
+    bends = np.linalg.norm(np.cross(ahead, back), axis=1) > 1e-6
+    return row_sums(bends.astype(np.int64), spokes.offsets) if len(one) else one
 
 
 def _fewest(fitted: FittedPanels, limit: Floats, settings: PanelSettings) -> tuple[Floats, tuple[str, ...]]:
@@ -117,18 +149,35 @@ def _fewest(fitted: FittedPanels, limit: Floats, settings: PanelSettings) -> tup
         )
     if fitted.facing is None or not len(limit):
         return floor_to(limit, settings.increment), ()
-    order = np.argsort(limit, kind="stable")
-    highest = np.empty_like(limit)
-    highest[order] = level(floor_to(limit[order], settings.increment))
+
+    def leveled(own: Floats) -> Floats:
+        order = np.argsort(own, kind="stable")
+        highest = np.empty_like(own)
+        highest[order] = level(floor_to(own[order], settings.increment))
+        return highest
+
+    sides = fitted.spokes.lengths
     joints = _joints(fitted)
-    found = fewest_lengths(highest, joints, settings.max_gap)
+    found = fewest_lengths(_by_kind(fitted, limit, leveled), joints, settings.max_gap, sides)
     said = _wide_note(fitted, found, settings.max_gap)
     length, bound = found.length, np.where(found.over, np.inf, settings.max_gap * (1 + SLACK))
-    for classes in range(1, min(len(np.unique(length)), TRADE_OFF_CLASSES) + 1):
-        covering = choose_lengths(limit, classes, settings.size_cost, settings.increment)
+    few = _classes(sides, length)
+    for classes in range(1, min(few, TRADE_OFF_CLASSES) + 1):
+        covering = _by_kind(
+            fitted,
+            limit,
+            lambda own, k=classes: choose_lengths(own, k, settings.size_cost, settings.increment),
+        )
+        if _classes(sides, covering) > few:
+            break
         if (joints.width(covering) <= bound).all():
             return covering, said
     return length, said
+
+
+def _classes(sides: Ints, length: Floats) -> int:
+    """How many different panels there are."""
+    return len(np.unique(np.stack([sides, length]), axis=1).T)
 
 
 def _joints(fitted: FittedPanels) -> Joints:
@@ -138,12 +187,11 @@ def _joints(fitted: FittedPanels) -> Joints:
     position = np.full(len(regular), -1, dtype=np.int64)
     position[regular] = np.arange(int(regular.sum()))
     mean = mean_normals(facing, fitted.normal)
-    p = fitted.spokes.shape[1]
     return Joints(
         position[facing.left],
         position[facing.right],
         lambda length: widths(_polygons(fitted, length), facing, mean),
-        1 / (2 * np.tan(np.pi / p)),
+        _inradius(fitted),
     )
 
 
@@ -167,18 +215,18 @@ def _loss(
     """What is to be least: panels below the allowed range, then what ``size_cost`` asks for."""
     below = int((length < smallest).sum())
     if settings.size_cost == "area" or not len(length):
-        return below, -float(length @ length)
+        return below, -float(outline_areas(fitted.spokes) @ length**2)
     return below, float((_free_length(fitted) - length).max())
 
 
 def _free_length(fitted: FittedPanels) -> Floats:
     """(r,) edges of the regular polygons that are as large as the regular panels' cells."""
-    return np.asarray(np.sqrt(fitted.cell_area[fitted.regular] / _unit_area(fitted.spokes.shape[1])))
+    return np.asarray(np.sqrt(fitted.cell_area[fitted.regular] / outline_areas(fitted.spokes)))
 
 
-def _unit_area(p: int) -> float:
-    """Area of the regular p-gon of edge 1."""
-    return float(p / (4 * np.tan(np.pi / p)))
+def _inradius(fitted: FittedPanels) -> Floats:
+    """(r,) of the panels with edge 1: how far a side moves per length; a mean for those not regular."""
+    return np.asarray(2 * outline_areas(fitted.spokes) / fitted.spokes.lengths)
 
 
 def _require_increment(allowed: Floats, panel: Ints, increment: float) -> None:
@@ -195,14 +243,14 @@ def _require_increment(allowed: Floats, panel: Ints, increment: float) -> None:
 def _polygons(fitted: FittedPanels, length: Floats) -> Ragged:
     """All panels in the order of their faces."""
     regular = fitted.regular
-    p = fitted.spokes.shape[1]
-    count = np.full(len(regular), p, dtype=np.int64)
-    count[~regular] = fitted.shapes.lengths
+    spokes = fitted.spokes
+    count = np.zeros(len(regular), dtype=np.int64)
+    count[regular], count[~regular] = spokes.lengths, fitted.shapes.lengths
     offsets = np.concatenate([[0], np.cumsum(count)]).astype(np.int64)
     points = np.zeros((int(offsets[-1]), 3))
     is_regular = np.repeat(regular, count)
     center = fitted.center[regular]
-    points[is_regular] = (center[:, None] + length[:, None, None] * fitted.spokes).reshape(-1, 3)
+    points[is_regular] = center[spokes.row] + length[spokes.row, None] * spokes.values
     points[~is_regular] = fitted.shapes.values
     return Ragged(points, offsets)
 
@@ -217,25 +265,33 @@ def _trade_off(fitted: FittedPanels, limits: list[Floats], settings: PanelSettin
 
 
 def _curve(fitted: FittedPanels, allowed: Floats, settings: PanelSettings) -> Floats:
-    """(k, 4) for 1…k classes: uncovered part, worst gap, mean and greatest width of the joints."""
-    order = np.argsort(allowed, kind="stable")
-    limit = allowed[order]
-    made, floored = partition(limit, TRADE_OFF_CLASSES, settings.size_cost, settings.increment)
-    p = fitted.spokes.shape[1]
-    # A cell's inradius exceeds its panel's by half the gap between cells of the same size.
-    width_of_unit = 1 / np.tan(np.pi / p)
+    """(k, 4) for 1…k classes of each kind: uncovered part, worst gap, mean and greatest width of the
+    joints."""
+    sides, area, inradius = fitted.spokes.lengths, outline_areas(fitted.spokes), _inradius(fitted)
     cell_area = float(fitted.cell_area[fitted.regular].sum())
-    free_length = _free_length(fitted)[order]
+    free_length = _free_length(fitted)
+    kinds = []
+    for kind in np.unique(sides):
+        own = np.flatnonzero(sides == kind)
+        own = own[np.argsort(allowed[own], kind="stable")]
+        made, floored = partition(allowed[own], TRADE_OFF_CLASSES, settings.size_cost, settings.increment)
+        kinds.append((own, made.start, floored))
     joints = None if fitted.facing is None else _joints(fitted)
-    own = np.zeros(0) if joints is None else joints.width(allowed)
-    lost = np.zeros(len(allowed) + 1)  # the last: of panels with a given shape, which lose nothing
+    own_width = np.zeros(0) if joints is None else joints.width(allowed)
+    # The last: of panels with a given shape, which lose nothing.
+    lost, shrink = np.zeros(len(allowed) + 1), np.append(inradius, 0.0)
+    length = np.zeros_like(allowed)
     curve = []
-    for start in made.start:
-        length = lengths_of(start, floored)
-        uncovered = 1 - _unit_area(p) * float(length @ length) / cell_area
-        lost[order] = limit - length
-        joint = own if joints is None else own + joints.shrink * (lost[joints.left] + lost[joints.right])
-        widest = float(np.max(free_length - length)) * width_of_unit
+    for k in range(max(len(start) for _, start, _ in kinds)):
+        for own, start, floored in kinds:
+            length[own] = lengths_of(start[min(k, len(start) - 1)], floored)
+        uncovered = 1 - float(area @ length**2) / cell_area
+        lost[:-1] = allowed - length
+        joint = own_width
+        if joints is not None:
+            joint = own_width + (shrink * lost)[joints.left] + (shrink * lost)[joints.right]
+        # A cell's inradius exceeds its panel's by half the gap between cells of the same size.
+        widest = float(np.max(2 * inradius * (free_length - length)))
         curve.append((uncovered, widest, joint.mean() if len(joint) else 0.0, joint.max(initial=0.0)))
     return np.array(curve)
 
@@ -257,17 +313,23 @@ def _range_notes(settings: PanelSettings, limit: Floats, outside: Ints) -> tuple
     return tuple(notes)
 
 
-def _size_notes(settings: PanelSettings, limit: Floats, length: Floats) -> list[str]:
+def _size_notes(fitted: FittedPanels, settings: PanelSettings, limit: Floats, length: Floats) -> list[str]:
     """Of sizes that are not used, and of panels that share one far below what their cells allow."""
     if not isinstance(settings.sizes, int) or not len(length):
         return []
     notes = []
-    different = len(np.unique(level(np.sort(floor_to(limit, settings.increment)))))
-    used = len(np.unique(length))
-    if used < min(settings.sizes, different):
+    sides = fitted.spokes.lengths
+    for kind in np.unique(sides):
+        own = sides == kind
+        different = len(np.unique(level(np.sort(floor_to(limit[own], settings.increment)))))
+        used = len(np.unique(length[own]))
+        if used >= min(settings.sizes, different):
+            continue
+        of = "" if own.all() else f" of panels with {kind} sides"
         notes.append(
-            f"Of the {settings.sizes} sizes allowed {used} {'is' if used == 1 else 'are'} used: with more, "
-            f"some would differ by less than {ALIKE:.1%}, to cover no more than {ALIKE_AREA:.1%} of the area."
+            f"Of the {settings.sizes} sizes{of} allowed {used} {'is' if used == 1 else 'are'} used: with "
+            f"more, some would differ by less than {ALIKE:.1%}, to cover no more than {ALIKE_AREA:.1%} of "
+            "the area."
         )
     shrunk = np.flatnonzero(length < SHRUNK * limit)
     if len(shrunk):

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexwrap_solver.arrays import Floats
+from hexwrap_solver.arrays import Floats, Ragged
 from hexwrap_solver.geometry import dot, normalize
 
 
@@ -21,13 +21,15 @@ class Poses:
     """Where regular polygons lie. center, x_axis, y_axis: (q, 3); the axes are orthonormal.
 
     Corner i of a polygon with edge ℓ stands at center + ℓ·(corners(p)[i] · [x_axis, y_axis]).
-    free_length: (q,) edge length of the nearest regular polygon of any size.
+    free_length: (q,) edge length of the nearest regular polygon of any size. outline: (q, p, 2) corners at
+    edge length 1 where the polygons are no regular ones.
     """
 
     center: Floats
     x_axis: Floats
     y_axis: Floats
     free_length: Floats
+    outline: Floats | None = None
 
     @property
     def normal(self) -> Floats:
@@ -35,7 +37,17 @@ class Poses:
 
     def spokes(self, p: int) -> Floats:
         """(q, p, 3) from the centre to the corners of polygons of edge length 1."""
+        if self.outline is not None:
+            return np.asarray(np.einsum("qpe,eqd->qpd", self.outline, np.stack([self.x_axis, self.y_axis])))
         return np.asarray(np.einsum("pe,eqd->qpd", corners(p), np.stack([self.x_axis, self.y_axis])))
+
+
+def outline_areas(spokes: Ragged) -> Floats:
+    """(q,) areas of polygons from the centre to the corners."""
+    cross = np.cross(spokes.values, spokes.values[spokes.next()]) / 2
+    if not spokes.n_rows:
+        return np.zeros(0)
+    return np.asarray(np.linalg.norm(np.add.reduceat(cross, spokes.offsets[:-1]), axis=1))
 
 
 def corners(p: int) -> Floats:
@@ -69,6 +81,36 @@ def nearest_regular_in_plane(points: Floats, normal: Floats) -> Poses:
     length = np.linalg.norm(x_axis, axis=1)
     x_axis /= length[:, None]
     return _orthonormal(points, x_axis, np.cross(normal, x_axis), length)
+
+
+def nearest_copy(points: Floats, outline: Floats, normal: Floats | None = None) -> Poses:
+    """The same for copies of any polygon, outline (p, 2) with mean 0, that begin at whichever corner fits
+    best; in planes of unit normals (q, 3) where these are given."""
+    p = len(outline)
+    starts = [np.roll(outline, -k, axis=0) for k in range(p)]
+    tried = [_copy(points, start, normal) for start in starts]
+    best = np.argmax([one.free_length for one in tried], axis=0)
+    pick = best, np.arange(len(points))
+    axes = [np.stack([getattr(one, name) for one in tried])[pick] for name in ("x_axis", "y_axis")]
+    length = np.stack([one.free_length for one in tried])[pick]
+    return Poses(points.mean(axis=1), *axes, length, np.stack(starts)[best])
+
+
+def _copy(points: Floats, outline: Floats, normal: Floats | None) -> Poses:
+    """With the corners in order: the axes are the polar factor of Σ p_i q_iᵀ."""
+    centred = points - points.mean(axis=1, keepdims=True)
+    moment = np.einsum("qid,ie->qde", centred, outline)
+    squares = float((outline**2).sum())
+    if normal is not None:
+        moment -= normal[:, :, None] * np.einsum("qd,qde->qe", normal, moment)[:, None]
+        a, b = moment[..., 0], moment[..., 1]
+        x_axis = a - np.cross(normal, b)
+        length = np.linalg.norm(x_axis, axis=1)
+        x_axis = x_axis / np.where(length > 0, length, 1.0)[:, None]
+        return Poses(centred[:, 0], x_axis, np.cross(normal, x_axis), length / squares)
+    u, sigma, vt = np.linalg.svd(moment, full_matrices=False)
+    axes = u @ vt
+    return Poses(centred[:, 0], axes[..., 0], axes[..., 1], sigma.sum(axis=1) / squares)
 
 
 def _orthonormal(points: Floats, x_axis: Floats, y_axis: Floats, trace: Floats) -> Poses:

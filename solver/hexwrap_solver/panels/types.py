@@ -38,7 +38,9 @@ class PanelSettings:
     """How panels are rationalized (paper, section 5).
 
     sizes: fewer where more would be alike; ``fewest``: as few as leave no joint wider than ``max_gap``; None:
-    one length per panel. size_cost: ``area`` (least uncovered area) or ``worst`` (least greatest loss).
+    one length per panel. method: ``exact`` is the closed form of split panels, and the nearest flat faces of
+    watertight ones, unless weights are given; ``energy`` minimises the functionals with their weights.
+    size_cost: ``area`` (least uncovered area) or ``worst`` (least greatest loss).
     Raises SettingError for an ``edge_range`` out of order.
     """
 
@@ -71,7 +73,7 @@ class PanelSettings:
         float, Setting("least width left open between neighbouring panels", ge=0, unit="length")
     ] = 0.0
     method: Annotated[
-        Literal["exact", "energy"], Setting("closed forms, or minimized energies", rare=True)
+        Literal["exact", "energy"], Setting("exact shapes, or minimized energies", rare=True)
     ] = "exact"
     weights: Annotated[Weights, Setting("weights of the energies", rare=True)] = Weights()
     increment: Annotated[
@@ -109,8 +111,8 @@ class TradeOff:
 class FittedPanels:
     """Panels before their lengths are chosen: everything that does not depend on the size classes.
 
-    mode: as asked for. face: (q,) cell of the pattern. regular: (q,) panels that become regular polygons;
-    the others (trimmed cells, watertight panels) are finished in ``shapes``. spokes: (r, p, 3) corners
+    mode: as asked for. face: (q,) cell of the pattern. regular: (q,) panels that become regular polygons; the
+    others (trimmed cells, watertight panels) are finished in ``shapes``. spokes: r rows of corners (·, 3)
     around the centre at edge length 1, of the r regular panels in order. shapes: polygons of the others in
     order. center, normal: (q, 3). limit: (q,) greatest edge length (mean edge of the others). whole: (q,).
     cell_area: (q,) of the panels' cells. energy, notes: as in ``Panels``. spare_limit, spare_center: another
@@ -122,7 +124,7 @@ class FittedPanels:
     mode: Literal["split", "watertight"]
     face: Ints
     regular: Bools
-    spokes: Floats
+    spokes: Ragged
     shapes: Ragged
     center: Floats
     normal: Floats
@@ -145,10 +147,11 @@ class Panels:
     cell of the pattern. size: (q,) class, −1 for panels without one (trimmed cells). edge_length: (q,) ℓ_P
     (the mean edge for polygons that are not equilateral). limit: (q,) largest length allowed before
     quantization. center, normal: (q, 3). whole: (q,). class_length, class_count, class_sides: (s,) the size
-    classes, ascending, and after them the regular panels with another number of sides (around
-    singularities), a class each. trade_off: None where sizes make no sense. energy: (steps,) value of the
-    weighted energy, None for method ``exact``. outside: panels whose limit lies below the allowed
-    ``edge_range``. max_gap: widest joint wanted.
+    classes, ascending for each kind of cell, the kind with most sides first, and after them the regular
+    panels with another number of sides (around singularities), a class each; n_special of those. trade_off:
+    None where sizes make no sense. energy: (steps,) value of the weighted energy, None for split panels of
+    method ``exact``. outside: panels whose limit lies below the allowed ``edge_range``. max_gap: widest joint
+    wanted.
     """
 
     mode: Literal["split", "watertight"]
@@ -168,6 +171,7 @@ class Panels:
     notes: tuple[str, ...] = ()
     outside: Ints | None = None
     max_gap: float | None = None
+    n_special: int = 0
 
     @property
     def n_panels(self) -> int:
@@ -176,7 +180,7 @@ class Panels:
     @property
     def n_sizes(self) -> int:
         """The classes but those of special panels."""
-        return int((self.class_sides == self.class_sides[0]).sum()) if len(self.class_sides) else 0
+        return len(self.class_length) - self.n_special
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from hexwrap_solver.domain.interpolate import surface_weights
 from hexwrap_solver.domain.lift import points_at
 from hexwrap_solver.domain.locate import barycentric
 from hexwrap_solver.errors import PatternError
+from hexwrap_solver.pattern.along import on_features, told
 from hexwrap_solver.pattern.lattice import LATTICES, Lattice
 from hexwrap_solver.pattern.lay.cells import (
     Cells,
@@ -38,8 +39,10 @@ from hexwrap_solver.pattern.place.size import ASKED, fitting_number
 from hexwrap_solver.pattern.trim.arrangement import Points
 from hexwrap_solver.pattern.trim.boundary import Boundary, boundary_of
 from hexwrap_solver.pattern.trim.enclosed import around_enclosed, met_by_pattern
-from hexwrap_solver.pattern.trim.trim import TooCoarse, Trimmed, trim
+from hexwrap_solver.pattern.trim.folds import cut_open
+from hexwrap_solver.pattern.trim.trim import Folded, TooCoarse, Trimmed, trim
 from hexwrap_solver.pattern.types import Pattern, PatternSettings
+from hexwrap_solver.surface.features import FeatureEdges
 from hexwrap_solver.surface.normals import with_tangents
 from hexwrap_solver.surface.projection import project, start_parameters
 
@@ -67,9 +70,10 @@ def lay_pattern(cmap: ConformalMap, settings: PatternSettings, progress: Progres
     placing = Placing.of(cmap, lattice, settings)
     pattern = _lay(cmap, placing, settings, progress)
     if settings.around is not None and pattern.around != settings.around and cmap.fitted is None:
-        notes.append(
-            f"{pattern.around} cells around instead of {settings.around}: the nearest that closes up."
-        )
+        why = "the nearest that closes up"
+        if any(feature.straight for feature in pattern.features):
+            why = "lines of the pattern follow the folds with less distortion"
+        notes.append(f"{pattern.around} cells around instead of {settings.around}: {why}.")
     wanted = settings.edge_length
     if wanted is not None and abs(pattern.edge_length / wanted - 1) > CLOSE:
         corrected = replace(settings, edge_length=wanted**2 / pattern.edge_length)
@@ -91,26 +95,33 @@ def _lay(cmap: ConformalMap, placing: Placing, settings: PatternSettings, progre
     progress(0.1, "placing the lattice")
     layout = layout_of(placing.cmap, lattice, placement)
     _check_count(cmap, layout, settings)
+    surface = placing.cmap.surface
+    numbers = sorted(placing.features)
+    features = FeatureEdges.of(surface, [surface.features[i] for i in numbers])
+    if len(features):
+        layout = cut_open(layout, features)
     nodes = find_nodes(layout)
     if not nodes.n:
         raise _too_coarse(cmap, settings, placement)
     progress(0.3, f"{nodes.n} nodes")
-    edges = find_edges(layout, nodes)
+    edges, nodes = find_edges(layout, nodes)
     progress(0.6, "edges")
     whole = whole_cells(lattice, edges)
     boundary = boundary_of(cmap.surface, layout)
     met = met_by_pattern(layout, nodes, edges, boundary)
+    met[boundary.loop[boundary.rim < 0]] = True  # where folds meet the boundary, cells are cut anyway
     if cmap.kind != "net":
-        met[:2] = True  # a cell that encloses an end goes around the surface
-    if settings.boundary == "trim" and len(boundary.face):
+        met[boundary.loop[(boundary.rim == 0) | (boundary.rim == 1)]] = True  # it would go around the surface
+    if len(boundary.face) and (settings.boundary == "trim" or len(features)):
+        folded = Folded(surface.faces, placement.glued, features) if len(features) else None
         try:
-            cut = trim(layout, boundary, met, nodes, edges, whole)
+            cut = trim(layout, boundary, met, nodes, edges, whole, folded, rim=settings.boundary == "trim")
         except TooCoarse:
             raise _too_coarse(cmap, settings, placement) from None
     else:
         cut = _uncut(layout, boundary, met, nodes, edges, whole)
     progress(0.8, f"{cut.cells.n} cells")
-    return _finish(cmap, settings, placement, layout, cut)
+    return _finish(cmap, settings, placing, placement, layout, cut)
 
 
 def _uncut(
@@ -122,12 +133,12 @@ def _uncut(
     whole: WholeCells,
 ) -> Trimmed:
     """The whole cells alone."""
-    lattice, own = layout.lattice, nodes.own
-    side = sides_by_edge(lattice, edges, whole)[around_enclosed(layout, boundary, nodes, met)]
+    own = nodes.own
+    side = sides_by_edge(edges, whole)[around_enclosed(layout, boundary, nodes, edges, met)]
     keep = np.ones(whole.n, dtype=bool)
     keep[whole.corner.row[side[side >= 0]]] = False
-    cells = only_whole_cells(lattice, edges, whole).part(keep)
-    points = Points(nodes.face[own], lattice.position(nodes.point[own]), np.zeros(nodes.n, dtype=bool))
+    cells = only_whole_cells(edges, whole).part(keep)
+    points = Points(nodes.face[own], layout.lattice.stand(nodes.point[own]), np.zeros(nodes.n, dtype=bool))
     return Trimmed(cells, np.ones(cells.n, dtype=bool), points, holed=int((~keep).sum()))
 
 
@@ -144,9 +155,17 @@ def layout_of(cmap: ConformalMap, lattice: Lattice, placement: Placement) -> Lay
         placement.isometries,
         net.inverse,
         cmap.surface.twin,
+        _corner_of(cmap.surface.faces, cmap.cones.vertex),
         lattice,
         tolerance,
     )
+
+
+def _corner_of(faces: Ints, vertex: Ints) -> Ints:
+    """(k,) a corner 3·face + c at each vertex."""
+    corner = np.zeros(int(faces.max()) + 1, dtype=np.int64)
+    corner[faces.ravel()] = np.arange(faces.size)
+    return corner[vertex]
 
 
 def _check_count(cmap: ConformalMap, layout: Layout, settings: PatternSettings) -> None:
@@ -165,9 +184,14 @@ def _check_count(cmap: ConformalMap, layout: Layout, settings: PatternSettings) 
 
 
 def _finish(
-    cmap: ConformalMap, settings: PatternSettings, placement: Placement, layout: Layout, cut: Trimmed
+    cmap: ConformalMap,
+    settings: PatternSettings,
+    placing: Placing,
+    placement: Placement,
+    layout: Layout,
+    cut: Trimmed,
 ) -> Pattern:
-    keep, narrow = _usable(cut.cells, placement.narrows)
+    keep, narrow = _usable(cut.cells, placement.narrows or cut.seams is not None)
     if not keep.any():
         raise _too_coarse(cmap, settings, placement)
     cells, whole = cut.cells.part(keep), cut.whole[keep]
@@ -189,9 +213,8 @@ def _finish(
     if first is None:
         raise _too_coarse(cmap, settings, placement)
     ring = rows_from(neighbours, first)
-    if settings.kind == "triangle":
-        ring = ring // 2  # a row of triangles: those that stand and those that hang
-    lattice = layout.lattice
+    ring = ring // layout.lattice.counted  # a row of triangles: those that stand and those that hang
+    features = on_features(cmap, placing, placement, cut.seams, cells, corner, whole)
     return Pattern(
         kind=settings.kind,
         vertices=vertices,
@@ -199,7 +222,7 @@ def _finish(
         uv=uv,
         faces=faces,
         corners=_corners(cmap, layout, faces, cells.isometry, triangle, place, uv),
-        index=np.where(whole, lattice.sides - faces.lengths, 0),
+        index=cells.index,
         sheet=None if net else cells.isometry[:, 3],
         neighbours=neighbours,
         triangle=triangle,
@@ -212,7 +235,12 @@ def _finish(
         rotation=placement.rotation,
         edge_length=mean_edge(vertices, faces),
         distortion=placement.distortion,
-        notes=(*placement.notes, *_told(cut, narrow, int(np.count_nonzero(~keep)) - narrow)),
+        notes=(
+            *placement.notes,
+            *told(features),
+            *_told(cut, narrow, int(np.count_nonzero(~keep)) - narrow),
+        ),
+        features=features,
     )
 
 
@@ -281,6 +309,8 @@ def _told(cut: Trimmed, narrow: int, apart: int) -> list[str]:
         notes.append(
             f"{narrow} cells at the narrow end were left out: so few go around it there that they touch "
             "themselves."
+            if cut.seams is None
+            else f"Cells that touch themselves were left out: {narrow}."
         )
     if cut.holed:
         notes.append(

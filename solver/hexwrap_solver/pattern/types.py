@@ -11,7 +11,17 @@ from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints, Ragged
 from hexwrap_solver.errors import SettingError
 from hexwrap_solver.setting import Setting
 
-Kind = Literal["hex", "triangle", "quad"]
+Kind = Literal[
+    "hex",
+    "triangle",
+    "quad",
+    "diamond",
+    "brick",
+    "trihexagonal",
+    "truncated-hexagonal",
+    "truncated-square",
+    "rhombitrihexagonal",
+]
 
 
 @dataclass(frozen=True)
@@ -57,6 +67,25 @@ class PatternSettings:
 
 
 @dataclass(frozen=True)
+class PatternFeature:
+    """A feature of the surface on the pattern.
+
+    vertices: (k,) of the pattern on it, in order; none where no cell was cut along it. straight: whether it
+    lies on a line of the pattern; else cells are cut where it falls. cut: number of cells cut along it.
+    width: how far it strays from a straight line of the domain, in cells. distortion: of the triangles beside
+    it, the ratio of singular values − 1 that one in a hundred exceeds; None where it is not straight. fold:
+    radians.
+    """
+
+    vertices: Ints
+    straight: bool
+    cut: int
+    width: float
+    distortion: float | None
+    fold: float
+
+
+@dataclass(frozen=True)
 class Pattern:
     """A mesh of cells with shared vertices that closes around the surface.
 
@@ -70,8 +99,8 @@ class Pattern:
     whole: (c,) False for cells cut at the boundary. ring, place: (c,) label numbers, from 0: rows from
     loop 0 and place in the row; on nets around is the greatest number of cells in one.
     rotation: angle actually taken, radians, from the boundary direction (or the horizontal axis on cones).
-    edge_length: mean edge length on the surface. distortion: worst singular-value ratio − 1 of the
-    stretch that ``align`` needed, 0 where none.
+    edge_length: mean edge length on the surface. distortion: worst singular-value ratio − 1 of the stretch
+    that ``align`` and features needed, 0 where none. features: what became of those of the surface.
     """
 
     kind: Kind
@@ -94,6 +123,7 @@ class Pattern:
     edge_length: float
     distortion: float
     notes: tuple[str, ...] = ()
+    features: tuple[PatternFeature, ...] = ()
 
     @property
     def n_cells(self) -> int:

@@ -32,6 +32,8 @@ DIPOLE, STRETCH, TURN, SCALE = 0.15, 0.002, 0.1, 0.02
 #: Largest move in one step, cells; steps of Newton's method; residuals at which it ends, and which are
 #: accepted.
 STRIDE, STEPS, DONE, ACCEPTED = 0.6, 40, 1e-11, 1e-9
+#: A step beyond which there is no map is halved at most so often.
+HALVINGS = 5
 #: Differences for the Jacobian, in units, and the residual of the angle sums that will do for it.
 DIFFERENCE, ROUGH = 0.02, 1e-6
 #: Chord steps of the inner Newton's method, each of which must leave at most this part of the residual
@@ -177,10 +179,16 @@ class Chart:
                 continue
             if fresh:
                 break
-            self.factor.factorise(*energy.hessian(corners))
+            try:
+                self.factor.factorise(*energy.hessian(corners))
+            except np.linalg.LinAlgError:  # the energy is flat where triangles break
+                break
             fresh = True
         if residual > max(enough, ACCEPTED):
-            raise ConvergenceError("Newton's method did not converge after a singularity was moved.")
+            raise ConvergenceError(
+                "The map breaks down where the singularities have to move for the pattern to close: ask for "
+                "smaller cells, or another number of singularities."
+            )
         self._x = x
         return energy.scale_of(x), corners, residual
 
@@ -403,6 +411,15 @@ class Closing:
             rest[2 * e + i] = self.line.first
         return np.stack(columns, axis=1), rest
 
+    def _stepped(self, x: Floats, step: Floats) -> tuple[Floats, Seen]:
+        """The step, halved until the map of the moved singularities is found, and that map."""
+        for _ in range(HALVINGS):
+            try:
+                return step, self.chart.at(x + step[:-2])
+            except ConvergenceError:
+                step = step / 2
+        return step, self.chart.at(x + step[:-2])
+
     def solve(self, progress: Progress = no_progress) -> Closed:
         """Raises ConvergenceError where it does not close."""
         chart = self.chart
@@ -419,8 +436,8 @@ class Closing:
             d = np.linalg.lstsq(slopes, off, rcond=1e-9)[0]
             stride = float(np.hypot(d[0:s:2], d[1:s:2]).max())
             d *= min(1.0, STRIDE / max(stride, 1e-300))
+            d, new_seen = self._stepped(x, d)
             new_x, new_factor = x + d[:-2], factor * complex(np.exp(1j * TURN * d[-2] + SCALE * d[-1]))
-            new_seen = chart.at(new_x)
             new_off = wanted - self._values(new_seen, new_factor)
             slopes = slopes + np.outer(off - new_off - slopes @ d, d) / (d @ d)  # Broyden 1965
             residual = float(np.abs(new_off).max())

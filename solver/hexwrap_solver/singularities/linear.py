@@ -26,6 +26,9 @@ from hexwrap_solver.surface.types import Surface
 
 #: The surface is seen in about so many patches: u is smooth, and a patch is as large as a cell or so.
 PATCHES = 1200
+#: Seats times vertices, which the time of the solves is proportional to: large meshes get fewer seats,
+#: but this number at least.
+SOLVED, FEWEST = 1.5e7, 400
 #: Right-hand sides solved at a time.
 BLOCK = 128
 
@@ -146,6 +149,98 @@ def reference_loops(surface: Surface, rules: Rules) -> tuple[int, ...]:
     return tuple((0 if i in longest else -turns) if free[i] else fixed[i] for i in range(len(ends)))
 
 
+class Responses:
+    """One nonlinear solution without singularities and one factorisation, from which models for any seats
+    follow by a solve for each."""
+
+    def __init__(
+        self,
+        surface: Surface,
+        rules: Rules,
+        turn: Floats | None = None,
+        patches: int = PATCHES,
+        steps: bool = True,
+    ) -> None:
+        """turn: (n,) see Model. patches: about how many. steps: with the nonlinear solution; else the metric
+        of the surface itself stands in."""
+        self.surface, self.rules, self.turn = surface, rules, turn
+        turns = round(2 * np.pi / rules.quantum)
+        self.free = tuple(i for i, end in enumerate(rules.ends) if end == "free")
+        self.loops = reference_loops(surface, rules)
+        self.rest = turns * (2 - len(rules.ends)) - sum(self.loops)
+        none = np.zeros(0, dtype=np.int64)
+        area = vertex_areas(surface)
+        background = self.rest * rules.quantum if not self.free else 0.0
+        wanted = targets(surface, rules.ends, self.loops, rules.quantum, none, none, background, rules.angles)
+        self.energy = energy = Energy(surface, wanted)
+        u, self.factor = _reference(energy, steps)
+        patch, self.middle = _patches(surface, area, patches)
+        weight = np.bincount(patch, area)
+        shape = (len(self.middle), len(patch))
+        self.share = csr_array((area / weight[patch], (patch, np.arange(len(patch)))), shape=shape)
+        self.weight, self.reference = weight / weight.sum(), self._mean(u)
+        self.steepness = Steepness.between(surface, patch, _means(surface.vertices, patch, area))
+        self.shift = np.zeros(len(self.middle))
+        if not self.free:  # a singularity takes its curvature from everywhere
+            self.shift = self._mean(energy.scale_of(self.factor.solve(energy.reduce(area / area.sum()))))
+        ties = np.arange(energy.n_dof - max(len(self.free) - 1, 0), energy.n_dof)
+        self.loop_response = rules.quantum * self._mean(_scales(energy, self.factor, ties))
+
+    def _mean(self, values: Floats) -> Floats:
+        """Over each patch."""
+        return np.asarray(self.share @ values)
+
+    def seats(self) -> Ints:
+        """Vertices on which the rules allow a singularity, one in every patch."""
+        few = int(np.clip(SOLVED / len(self.surface.vertices), FEWEST, len(self.middle)))
+        middle = self.middle
+        if few < len(middle):
+            _, middle = _patches(self.surface, vertex_areas(self.surface), few)
+        return _seats(self.surface, middle, self.rules)
+
+    def near(self, vertices: Ints, radius: float, spacing: float) -> Ints:
+        """The vertices themselves and others around them that the rules allow, about one per cube of a
+        spacing."""
+        places = self.surface.vertices
+        found = cKDTree(places).query_ball_point(places[vertices], radius)
+        around = np.unique(np.concatenate([np.array(one, dtype=np.int64) for one in found]))
+        around = around[np.lexsort(places[around].T)]
+        box = np.floor((places[around] - places.min(axis=0)) / spacing).astype(np.int64)
+        around = around[np.unique(box, axis=0, return_index=True)[1]]
+        return np.union1d(around[_allowed(self.surface, around, self.rules)], vertices)
+
+    def model(self, seats: Ints, orbits: Callable[[Ints], list[Ints]] | None = None) -> Model:
+        """orbits: from seats to lists of vertices that get singularities together."""
+        together = None if orbits is None else _ragged(orbits(seats))
+        seats = seats if together is None else np.asarray(together.values, dtype=np.int64)
+        response = np.empty((len(self.middle), len(seats)))
+        for begin in range(0, response.shape[1], BLOCK):
+            dof = self.energy.dof[seats[begin : begin + BLOCK]]
+            response[:, begin : begin + BLOCK] = self._mean(_scales(self.energy, self.factor, dof))
+        response -= self.shift[:, None]
+        around = None if self.turn is None else self.turn[seats]
+        places = self.surface.vertices[seats]
+        if together is not None:
+            first = together.offsets[:-1]
+            response = _summed(response, first)
+            around = None if around is None else _summed(around, first)
+        return Model(
+            seats if together is None else seats[together.offsets[:-1]],
+            places if together is None else places[together.offsets[:-1]],
+            self.weight,
+            self.reference,
+            self.rules.quantum * response,
+            self.loop_response,
+            self.free,
+            self.loops,
+            None if self.free else self.rest,
+            self.steepness,
+            around,
+            together,
+            None if together is None else places,
+        )
+
+
 def linear_model(
     surface: Surface,
     rules: Rules,
@@ -153,68 +248,17 @@ def linear_model(
     seats: Ints | None = None,
     patches: int = PATCHES,
     steps: bool = True,
-    orbits: Callable[[Ints], list[Ints]] | None = None,
 ) -> Model:
-    """One nonlinear solution without singularities, one factorisation, and a solve for every seat.
+    """For seats (q,), or None: as the rules allow; see ``Responses``."""
+    found = Responses(surface, rules, turn, patches, steps)
+    return found.model(found.seats() if seats is None else seats)
 
-    turn: (n,) see Model. seats: vertices that singularities may stand on; None: as the rules allow. patches:
-    about so many. steps: with the nonlinear solution; else the metric of the surface itself stands in.
-    orbits: from seats to lists of vertices that get singularities together.
-    """
-    turns = round(2 * np.pi / rules.quantum)
-    free = tuple(i for i, end in enumerate(rules.ends) if end == "free")
-    loops = reference_loops(surface, rules)
-    rest = turns * (2 - len(rules.ends)) - sum(loops)
-    none = np.zeros(0, dtype=np.int64)
-    area = vertex_areas(surface)
-    background = rest * rules.quantum if not free else 0.0
-    wanted = targets(surface, rules.ends, loops, rules.quantum, none, none, background, rules.angles)
-    energy = Energy(surface, wanted)
-    u, factor = _reference(energy, steps)
-    patch, seat = _patches(surface, area, patches)
-    weight = np.bincount(patch, area)
-    share = csr_array((area / weight[patch], (patch, np.arange(len(patch)))), shape=(len(seat), len(patch)))
 
-    def mean(values: Floats) -> Floats:
-        return np.asarray(share @ values)
-
-    seats = _seats(surface, seat, rules) if seats is None else seats
-    together = None if orbits is None else _ragged(orbits(seats))
-    seats = seats if together is None else np.asarray(together.values, dtype=np.int64)
-    shift = np.zeros(len(seat))
-    if not free:  # a singularity takes its curvature from everywhere
-        shift = mean(energy.scale_of(factor.solve(energy.reduce(area / area.sum()))))
-    response = np.empty((len(seat), len(seats)))
-    for begin in range(0, response.shape[1], BLOCK):
-        vertices = seats[begin : begin + BLOCK]
-        response[:, begin : begin + BLOCK] = mean(_scales(energy, factor, energy.dof[vertices]))
-    response -= shift[:, None]
-    ties = np.arange(energy.n_dof - max(len(free) - 1, 0), energy.n_dof)
-    loop_response = mean(_scales(energy, factor, ties))
-    around = None if turn is None else turn[seats]
-    places = surface.vertices[seats]
-    if together is not None and together.n_rows:
-        first = together.offsets[:-1]
-        response = np.add.reduceat(response, first, axis=1)
-        around = None if around is None else np.add.reduceat(around, first)
-    elif together is not None:
-        response = response[:, :0]
-        around = None if around is None else around[:0]
-    return Model(
-        seats if together is None else seats[together.offsets[:-1]],
-        places if together is None else places[together.offsets[:-1]],
-        weight / weight.sum(),
-        mean(u),
-        rules.quantum * response,
-        rules.quantum * loop_response,
-        free,
-        loops,
-        None if free else rest,
-        Steepness.between(surface, patch, _means(surface.vertices, patch, area)),
-        around,
-        together,
-        None if together is None else places,
-    )
+def _summed(values: Floats, first: Ints) -> Floats:
+    """Sums over groups of the last axis, which begin at ``first``."""
+    if not len(first):
+        return values[..., :0]
+    return np.asarray(np.add.reduceat(values, first, axis=-1))
 
 
 def _ragged(rows: list[Ints]) -> Ragged:

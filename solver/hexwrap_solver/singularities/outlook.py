@@ -25,7 +25,7 @@ def outlook(cmap: ConformalMap, laid: Pattern, sizes: int, left: float) -> Choic
     first is none, which leaves ``left``. None where all of them together cannot save much."""
     surface = cmap.surface
     if (
-        laid.kind == "triangle"
+        LATTICES[laid.kind].fold < LATTICES[laid.kind].order
         or len(cmap.cones)
         or not 1 <= len(surface.loops) <= 2
         or len(surface.vertices) > LARGEST

@@ -11,17 +11,22 @@ from scipy.spatial import cKDTree
 
 from hexwrap_solver.arrays import Floats, Ints
 from hexwrap_solver.errors import SingularitiesError
-from hexwrap_solver.singularities.linear import linear_model
-from hexwrap_solver.singularities.search import Search, State, curve
+from hexwrap_solver.singularities.linear import Responses, linear_model
+from hexwrap_solver.singularities.search import STARTS, STARTS_ALIGNED, Search, State, curve
 from hexwrap_solver.singularities.symmetry import OFF, Group, orbits, symmetries
 from hexwrap_solver.singularities.types import Proposal, Rules, SingularityAt
 from hexwrap_solver.surface.types import Surface
 
 #: Share of the area that one more singularity must be worth, and the part of what is uncovered without any
 #: that all of them together must save.
-WORTH, CLEARLY = 0.002, 0.25
+WORTH, CLEARLY = 0.001, 0.25
 #: Groups of symmetries that are tried.
 GROUPS = 5
+#: The search ends where so many numbers more have brought nothing.
+PATIENCE = 3
+#: The final places are found within so many cells, again and again nearer, among vertices at such a part of
+#: that apart, in so many steps.
+REACHES, SPACING, ROUNDS = (1.5, 0.8, 0.4), 0.4, 20
 
 
 @dataclass(frozen=True)
@@ -46,21 +51,26 @@ def place(
 
     turn: see ``linear.Model``. Raises SingularitiesError where no number is possible.
     """
-    proposals, symmetry = (
-        _symmetric(surface, rules, turn) if rules.symmetric else (_curve(surface, rules, turn), "")
-    )
+    known = Responses(surface, rules, turn)
+    patience = PATIENCE if count == "auto" else None
+    proposals, symmetry = _symmetric(known, patience) if rules.symmetric else (_curve(known, patience), "")
     if not proposals:
         raise SingularitiesError(
             f"No {rules.most} singularities or fewer can make the angles of this surface add up, "
             f"{_told(rules)}, and keep the distances asked for: allow more."
         )
-    return Placing(tuple(proposals), _choice(proposals, count), symmetry)
+    chosen = _choice(proposals, count)
+    if proposals[chosen].count and not rules.symmetric:
+        proposals[chosen] = _polished(known, proposals[chosen])
+    return Placing(tuple(proposals), chosen, symmetry)
 
 
-def _curve(surface: Surface, rules: Rules, turn: Floats | None, group: Group | None = None) -> list[Proposal]:
+def _curve(known: Responses, patience: int | None, group: Group | None = None) -> list[Proposal]:
     """Raises SingularitiesError where rules that are asked for leave no place."""
-    kept = None if group is None else partial(orbits, surface, group=group, rules=rules)
-    model = linear_model(surface, rules, turn, orbits=kept)
+    rules, kept = known.rules, None
+    if group is not None:
+        kept = partial(orbits, known.surface, group=group, rules=rules)
+    model = known.model(known.seats(), kept)
     if not len(model.seat) and (rules.away or rules.only is not None):
         raise SingularitiesError(
             "The rules leave no place for a singularity: it would have to stand "
@@ -68,13 +78,32 @@ def _curve(surface: Surface, rules: Rules, turn: Floats | None, group: Group | N
             "named in keep_off and the creases, and inside the balls of only. Ask for less.",
             field=("singularities",),
         )
-    return curve(Search(model, rules))
+    starts = STARTS if known.turn is None else STARTS_ALIGNED
+    return curve(Search(model, rules), starts, patience=patience)
 
 
-def _symmetric(surface: Surface, rules: Rules, turn: Floats | None) -> tuple[list[Proposal], str]:
+def _polished(known: Responses, proposal: Proposal) -> Proposal:
+    """From seat to seat singularities move by about a cell; here from vertex to vertex."""
+    for reach in REACHES:
+        radius = reach * known.rules.cell
+        seats = known.near(proposal.vertex, radius, SPACING * radius)
+        search = Search(known.model(seats), known.rules)
+        at = np.searchsorted(search.model.seat, proposal.vertex)
+        pairs = [(int(i), int(k)) for i, k in zip(at, proposal.index, strict=True)]
+        loops = tuple(proposal.loops[i] - search.model.loops[i] for i in search.model.free[1:])
+        _, state = search.refined(
+            State.of(pairs, loops), near=len(seats) // max(len(pairs), 1), rounds=ROUNDS
+        )
+        better = search.proposal(state)
+        if better.uncovered < proposal.uncovered:
+            proposal = better
+    return proposal
+
+
+def _symmetric(known: Responses, patience: int | None) -> tuple[list[Proposal], str]:
     """The best for each number among all symmetries of the surface, and what these are. Raises
     SingularitiesError where it has none."""
-    groups = symmetries(surface, rules.cell)[:GROUPS]
+    groups = symmetries(known.surface, known.rules.cell)[:GROUPS]
     if not groups:
         raise SingularitiesError(
             "Singularities are to stand symmetrically, but no mirror plane and no axis carries this surface "
@@ -83,7 +112,7 @@ def _symmetric(surface: Surface, rules: Rules, turn: Floats | None) -> tuple[lis
         )
     best: dict[int, Proposal] = {}
     for group in groups:
-        for one in _curve(surface, rules, turn, group):
+        for one in _curve(known, patience, group):
             if one.count not in best or one.uncovered < best[one.count].uncovered:
                 best[one.count] = one
     names = list(dict.fromkeys(group.name for group in groups))
@@ -130,7 +159,7 @@ def given(surface: Surface, rules: Rules, listed: tuple[SingularityAt, ...]) -> 
             field=("singularities", "at"),
             data={"sum": int(index.sum()), "wanted": search.model.total},
         )
-    return search.proposal(search.with_loops(state))
+    return search.proposal(search.refined(search.with_loops(state), near=0)[1])
 
 
 def _told(rules: Rules) -> str:

@@ -6,7 +6,6 @@ of the loops, so that every move of one of them is judged for all seats at once.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -23,6 +22,10 @@ Counts = NDArray[np.int8]
 
 #: States carried from one number of singularities to the next; random starts for each number.
 BEAM, STARTS = 5, 16
+#: Random starts where straight ends must stand in lattice directions to each other: the best is hard to find.
+STARTS_ALIGNED = 48
+#: States of each number that are refined.
+REFINED = 8
 #: Best seats that an addition tries per state.
 TRIED = 4
 #: Seats next to a singularity that the refinement tries, and its rounds.
@@ -79,6 +82,7 @@ class Search:
     _moves: tuple[Floats, Floats] = field(init=False)
     _quadratic: Floats = field(init=False)
     _near: cKDTree = field(init=False)
+    _by_seat: Floats = field(init=False)
     _close: list[Counts] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -96,6 +100,7 @@ class Search:
         self._moves = change, change @ self.square[self.seats :, : self.seats]
         self._quadratic = np.einsum("mf,fg,mg->m", change, self.square[self.seats :, self.seats :], change)
         self._near = cKDTree(model.place)
+        self._by_seat = np.ascontiguousarray(model.response.T)
         apart = self._apart() / self.rules.cell
         self._close = [  # too near for opposite signs, and for equal ones
             (apart < least).astype(np.int8) for least in (self.rules.opposite, self.rules.apart)
@@ -134,7 +139,7 @@ class Search:
     def scale(self, state: State) -> Floats:
         """(p,) u of the patches."""
         seat, index = list(state.seat), np.array(state.index, dtype=float)
-        u = self.model.reference + self.model.response[:, seat] @ index
+        u = self.model.reference + index @ self._by_seat[seat]
         return np.asarray(u + self.model.loop_response @ np.array(state.loops, dtype=float))
 
     def value(self, state: State) -> float:
@@ -205,12 +210,11 @@ class Search:
         draft.turn_loops(self.least)
         return draft.state
 
-    def refined(self, state: State) -> tuple[float, State]:
-        """Moved from seat to neighbouring seat, and loops by one, for the least uncovered area."""
+    def refined(self, state: State, near: int = NEAR, rounds: int = ROUNDS) -> tuple[float, State]:
+        """Moved from seat to one of the ``near`` next, and loops by one, for the least uncovered area."""
         least = np.inf
-        for _ in range(ROUNDS):
-            around = [state, *self._neighbours(state)]
-            u = np.stack([self.scale(one) for one in around], axis=1)
+        for _ in range(rounds):
+            around, u = self._neighbours(state, near)
             values = self.misfit(u)
             if self.rules.sizes is not None:
                 values += uncovered_of_many(u, self.model.weight, self.rules.sizes)
@@ -225,17 +229,24 @@ class Search:
         """Share of the area that panels of their own sizes leave open; u: (p, …)."""
         return np.asarray(FIT * self.rules.cell * (self.model.weight @ self.model.steepness.of(u)))
 
-    def _neighbours(self, state: State) -> Iterator[State]:
-        for move in self.moves:
+    def _neighbours(self, state: State, near: int) -> tuple[list[State], Floats]:
+        """The state itself and others next to it, and u of all of them, (p, m)."""
+        here, by_seat = self.scale(state), self._by_seat
+        found, changes = [state], [np.zeros((1, len(here)))]
+        for i, move in enumerate(self.moves):
             if any(move):
-                yield State(state.seat, state.index, _plus(state.loops, move))
+                found.append(State(state.seat, state.index, _plus(state.loops, move)))
+                changes.append((self.model.loop_response @ self._moves[0][i])[None])
         for i, (seat, k) in enumerate(state.pairs):
             rest = State.of([p for j, p in enumerate(state.pairs) if j != i], state.loops)
             clear = self.open_seats(rest, k)
-            near = np.atleast_1d(self._near.query(self.model.place[seat], min(NEAR + 1, self.seats))[1])
-            for other in near[1:]:
-                if clear[other]:
-                    yield State.of([*rest.pairs, (int(other), k)], state.loops)
+            next_to = np.atleast_1d(self._near.query(self.model.place[seat], min(near + 1, self.seats))[1])[
+                1:
+            ]
+            next_to = next_to[clear[next_to]]
+            found += [State.of([*rest.pairs, (int(other), k)], state.loops) for other in next_to]
+            changes.append(k * (by_seat[next_to] - by_seat[seat]))
+        return found, np.ascontiguousarray((here + np.concatenate(changes)).T)
 
     def proposal(self, state: State) -> Proposal:
         u = self.scale(state)
@@ -359,9 +370,12 @@ def _loop_moves(loops: int) -> list[tuple[int, ...]]:
     return moves
 
 
-def curve(search: Search, starts: int = STARTS, refine: bool = True) -> list[Proposal]:
+def curve(
+    search: Search, starts: int = STARTS, refine: bool = True, patience: int | None = None
+) -> list[Proposal]:
     """The best there is with 0, 1, 2, … singularities, as far as the rules allow and numbers are possible.
-    starts: random ones for each number. refine: for the uncovered area, beyond the variance."""
+    starts: random ones for each number. refine: for the uncovered area, beyond the variance. patience:
+    numbers beyond the best at which it ends; None: only at ``rules.most``."""
     rng = np.random.default_rng(17)
     kinds = [k for size in range(1, search.rules.largest + 1) for k in (-size, size)]
     beam = [search.settled(State((), (), (0,) * max(len(search.model.free) - 1, 0)))]
@@ -374,10 +388,12 @@ def curve(search: Search, starts: int = STARTS, refine: bool = True) -> list[Pro
             beam = [
                 one for group in _grouped(search, added, number) for one in _best(search, group, rng, starts)
             ]
-        whole = [one for one in beam if search.complete(one[1])]
+        whole = [one for one in beam if search.complete(one[1])][:REFINED]
         if refine:
-            whole = [search.refined(state) for _, state in whole]
-        for _, state in sorted(whole, key=lambda one: (one[0], one[1].seat)):
+            whole = sorted(
+                (search.refined(state) for _, state in whole), key=lambda one: (one[0], one[1].seat)
+            )
+        for _, state in whole:
             count = search.count_of(state)  # with symmetry a seat may be several singularities
             if count not in found or search.model.orbits is not None:
                 one = search.proposal(state)
@@ -385,6 +401,11 @@ def curve(search: Search, starts: int = STARTS, refine: bool = True) -> list[Pro
                     count not in found or one.uncovered < found[count].uncovered
                 ):
                     found[count] = one
+        least = min(found.values(), key=lambda one: one.uncovered, default=None)
+        if patience is not None and least is not None and max(found) >= least.count + patience:
+            break
+        grouped = {state for _, state in beam[:BEAM]} | {state for _, state in whole[:1]}
+        beam = [(search.value(state), state) for state in sorted(grouped, key=lambda state: state.seat)]
     return [found[number] for number in sorted(found)]
 
 
@@ -416,6 +437,8 @@ def _best(
         tried[settled] = value
     if not tried:
         return []
+    if not search.complete(next(iter(tried))):  # on the way to a number only
+        starts //= 4
     leading = min(tried, key=lambda state: (tried[state], state.seat))
     for _ in range(starts):
         state = State((), (), leading.loops)
@@ -433,4 +456,4 @@ def _best(
             value, settled = search.settled(state)
             tried[settled] = value
     ranked = sorted(((value, state) for state, value in tried.items()), key=lambda one: (one[0], one[1].seat))
-    return ranked[:BEAM]
+    return ranked[:REFINED]

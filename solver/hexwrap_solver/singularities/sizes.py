@@ -44,13 +44,13 @@ def uncovered_of_many(u: Floats, weight: Floats, sizes: int) -> Floats:
     flat = np.broadcast_to(weight[:, None], u.shape).ravel()
     share = np.bincount(step.ravel(), flat, STEPS * len(columns)).reshape(STEPS, -1).T
     start = np.arange(STEPS) * width[:, None]
-    square = np.exp(2 * start)
+    square = np.exp(2 * start).astype(np.float32)
     sums = np.concatenate(
         [np.zeros((len(columns), 1)), np.cumsum(share * np.exp(-2 * (start + width[:, None] / 2)), axis=1)],
         axis=1,
     )
-    gain = square[:, :, None] * (sums[:, None, :] - sums[:, :STEPS, None])
+    gain = square[:, :, None] * (sums[:, None, :] - sums[:, :STEPS, None]).astype(np.float32)
     value = gain[:, 0]
     for _ in range(sizes - 1):
         value = (value[:, :STEPS, None] + gain).max(axis=1)
-    return np.asarray(1 - value[:, -1])
+    return np.asarray(1 - value[:, -1], dtype=float)

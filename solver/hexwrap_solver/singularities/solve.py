@@ -24,7 +24,7 @@ from hexwrap_solver.pattern.place.size import (
     wanted_edge,
     width_per_cell,
 )
-from hexwrap_solver.pattern.types import PatternSettings
+from hexwrap_solver.pattern.types import Kind, PatternSettings
 from hexwrap_solver.singularities.close import Chart, Closed, Closing, Line
 from hexwrap_solver.singularities.drag import refined
 from hexwrap_solver.singularities.linear import vertex_areas
@@ -85,16 +85,12 @@ def frame_of(
     pattern: PatternSettings | None,
     sizes: int | None,
 ) -> Frame:
-    """Raises RequestError; SingularitiesError for triangles."""
+    """Raises RequestError; SingularitiesError where the pattern cannot have what is asked for."""
     pattern = pattern or PatternSettings()
     if pattern.rotation in ("u", "v"):
         pattern = replace(pattern, rotation="edge")
     lattice = LATTICES[pattern.kind]
-    if pattern.kind == "triangle":  # their singularities are nodes, which have as many edges as the lattice
-        raise SingularitiesError(
-            "Triangles around a singularity do not close yet, so that two of seven would be missing there: "
-            "ask for hexagons or quads, or leave singularities out."
-        )
+    _check_kind(lattice, settings)
     ends, angles = _ends(surface, boundary, lattice)
     angle = edge_angle(lattice, pattern)
     straight = [end == "straight" for end in ends]
@@ -127,6 +123,30 @@ def frame_of(
     free_scale = ASKED if pattern.edge_length is not None else FREE
     line = _line(lattice, angle, pattern.boundary) if any(aligned) else None
     return Frame(lattice, rules, width, line, aligned, turn, free_scale)
+
+
+def _check_kind(lattice: Lattice, settings: SingularitySettings) -> None:
+    """Raises SingularitiesError for patterns that no rotation by the quantum of singularities carries to
+    themselves, and for indices that leave no polygon."""
+    if lattice.fold < lattice.order:
+        raise SingularitiesError(
+            f"A {lattice.kind} pattern has no rotations but half turns, so that it closes around no "
+            "singularity: ask for quads or hexagons, or leave singularities out."
+        )
+    most = max((one.index for one in settings.at), default=1)
+    sides = _parts_left(lattice, most)
+    if sides < 3:
+        raise SingularitiesError(
+            f"A singularity of index {most} would leave {sides} "
+            f"{'sides' if lattice.sides_at_centre else 'cells'} around it in a {lattice.kind} pattern: "
+            f"ask for an index of at most {most - 3 + sides}."
+        )
+
+
+def _parts_left(lattice: Lattice, k: int) -> int:
+    """Sides of a cell around a singularity, or cells around a node that is one."""
+    around = lattice.sides_at_centre or lattice.ways.shape[1]
+    return around - k * around // lattice.order
 
 
 def _lines(surface: Surface, settings: SingularitySettings, width: float) -> tuple[tuple[Floats, float], ...]:
@@ -325,33 +345,33 @@ def _as_map(frame: Frame, chart: Chart, found: Closed, placing: Placing, before:
     )
 
 
-#: What cells with k sides fewer are called.
+#: What polygons are called, by their sides.
 NAMES = {
-    "hex": {1: "pentagon", -1: "heptagon", 2: "quadrilateral", -2: "octagon"},
-    "quad": {1: "triangle", -1: "pentagon", 2: "digon", -2: "hexagon"},
-    "triangle": {
-        1: "vertex of five triangles",
-        -1: "vertex of seven triangles",
-        2: "vertex of four triangles",
-        -2: "vertex of eight triangles",
-    },
+    3: "triangle",
+    4: "quadrilateral",
+    5: "pentagon",
+    6: "hexagon",
+    7: "heptagon",
+    8: "octagon",
+    10: "decagon",
 }
 
 
-def told(kind: str, index: Ints) -> str:
+def told(kind: Kind, index: Ints) -> str:
     """Such as "2 pentagons and 1 heptagon"."""
-    parts = []
+    lattice, parts = LATTICES[kind], []
     for k in (1, -1, 2, -2):
-        number = int((index == k).sum())
-        name = NAMES[kind][k]
-        plural = name.replace("vertex", "vertices") if name.startswith("vertex") else name + "s"
-        if number:
-            parts.append(f"{number} {name if number == 1 else plural}")
-    return (
-        ", ".join(parts[:-1]) + (" and " if len(parts) > 1 else "") + parts[-1]
-        if parts
-        else "no singularities"
-    )
+        number, left = int((index == k).sum()), _parts_left(lattice, k)
+        if not number:
+            continue
+        if lattice.sides_at_centre:
+            name = NAMES.get(left, f"{left}-gon") + ("s" if number > 1 else "")
+        else:
+            name = f"{'vertex' if number == 1 else 'vertices'} of {left} {kind}s"
+        parts.append(f"{number} {name}")
+    if not parts:
+        return "no singularities"
+    return ", ".join(parts[:-1]) + (" and " if len(parts) > 1 else "") + parts[-1]
 
 
 def _notes(frame: Frame, found: Closed, placing: Placing) -> Iterator[str]:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import breadth_first_order, connected_components
@@ -13,6 +16,39 @@ from hexwrap_solver.surface.types import Feature, Triangles
 
 #: A chain that turns by more than this at a vertex is two, radians.
 CORNER = np.deg2rad(40.0)
+
+
+@dataclass(frozen=True)
+class FeatureEdges:
+    """The edges of all features, one after the other. half_edge: (k,) of the mesh, along its feature; tail,
+    head: (k,) its vertices. feature: (k,); last: (k,) whether an open feature ends with it."""
+
+    half_edge: Ints
+    tail: Ints
+    head: Ints
+    feature: Ints
+    last: Bools
+
+    @classmethod
+    def of(cls, mesh: Triangles, features: Sequence[Feature]) -> FeatureEdges:
+        """Edges that the mesh does not have are left out."""
+        none = [np.zeros(0, dtype=np.int64)]
+        tail = np.concatenate(none + [f.vertices[:-1] for f in features])
+        head = np.concatenate(none + [f.vertices[1:] for f in features])
+        count = np.array([len(f.vertices) - 1 for f in features], dtype=np.int64)
+        feature = np.repeat(np.arange(len(features)), count)
+        last = np.zeros(len(tail), dtype=bool)
+        last[np.cumsum(count) - 1] = [not f.closed for f in features]
+        n = len(mesh.vertices)
+        start, end = half_edges(mesh.faces)
+        order = np.argsort(start * n + end)
+        keys = (start * n + end)[order]
+        at = np.minimum(np.searchsorted(keys, tail * n + head), len(keys) - 1)
+        there = (keys[at] == tail * n + head) & (mesh.twin[order[at]] >= 0)
+        return cls(order[at][there], tail[there], head[there], feature[there], last[there])
+
+    def __len__(self) -> int:
+        return len(self.half_edge)
 
 
 def folds(mesh: Triangles, angle: float) -> tuple[Ints, Floats]:

@@ -19,6 +19,7 @@ from hexwrap_solver.arrays import Complexes, Floats, Ints
 from hexwrap_solver.geometry import dot, face_areas
 from hexwrap_solver.surface.topology import vertex_normals
 from hexwrap_solver.surface.types import Openings, Surface
+from hexwrap_solver.tolerances import TINY
 
 #: Vertices inside keep this many edge lengths away from the loop.
 CLEARANCE = 0.6
@@ -78,7 +79,7 @@ def _flattened(outline: Floats) -> Complexes:
     """(k,) the outline in its best plane, counter-clockwise."""
     centred = outline - outline.mean(axis=0)
     area = np.cross(centred, np.roll(centred, -1, axis=0)).sum(axis=0)  # twice the vector area
-    normal = area / max(float(np.linalg.norm(area)), 1e-300)
+    normal = area / max(float(np.linalg.norm(area)), TINY)
     x = np.linalg.svd(centred - np.outer(centred @ normal, normal), full_matrices=False)[2][0]
     return np.asarray(centred @ x + 1j * (centred @ np.cross(normal, x)))
 
@@ -137,7 +138,7 @@ def _cotangents(points: Floats, faces: Ints) -> csr_array:
         apex, a, b = (faces[:, (c + i) % 3] for i in range(3))
         one, other = points[a] - points[apex], points[b] - points[apex]
         area = np.linalg.norm(np.cross(one, other), axis=1)
-        cotangent = dot(one, other) / np.maximum(area, 1e-300)
+        cotangent = dot(one, other) / np.maximum(area, TINY)
         rows.append(a)
         columns.append(b)
         weights.append(0.5 * np.clip(cotangent, -STEEPEST, STEEPEST))
@@ -167,7 +168,7 @@ def _faired(vertices: Floats, faces: Ints, old: int, wall: int) -> Floats:
     points, near = vertices[names], local.reshape(-1, 3)
     mass = np.bincount(near.ravel(), np.repeat(face_areas(points, near) / 3, 3), len(names))
     rows = np.flatnonzero(at_fill[names])  # all triangles around these are at hand
-    weight = diags_array(1 / np.sqrt(np.maximum(mass[rows], 1e-300)))
+    weight = diags_array(1 / np.sqrt(np.maximum(mass[rows], TINY)))
     laplacian = csr_array(weight @ _cotangents(points, near)[rows]).tocsc()
     free = np.flatnonzero(names >= old)
     held = np.flatnonzero(names < old)

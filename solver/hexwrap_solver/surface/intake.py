@@ -151,7 +151,8 @@ def _features(surface: Surface, sent: SentMesh, settings: SurfaceSettings) -> tu
     n = len(surface.vertices)
     inside = (low * n + high)[np.diff(surface.edge_groups[1]) == 2]
     keep = np.isin(edges.min(axis=1) * n + edges.max(axis=1), inside)
-    return chained(surface.vertices, edges[keep], fold[keep], rim)
+    chains = chained(surface.vertices, edges[keep], fold[keep], rim)
+    return tuple(replace(chain, given=sent.creases is not None) for chain in chains)
 
 
 def _uncap(draft: _Draft) -> None:

@@ -16,6 +16,7 @@ from hexwrap_solver.surface.topology import face_graph, half_edges
 from hexwrap_solver.surface.triangulate import triangulate
 from hexwrap_solver.surface.types import SentMesh, Triangles
 from hexwrap_solver.surface.weld import TOLERANCE, relabelled, weldings
+from hexwrap_solver.tolerances import TINY
 
 #: Open edges are divided again where a division has made new ones, at most so often.
 ROUNDS = 16
@@ -190,7 +191,7 @@ def _on_edges(vertices: Floats, start: Ints, end: Ints, tolerance: float) -> tup
     if counts.sum() == 0:
         return none
     v = among[np.concatenate([np.array(found, dtype=np.int64) for found in near])]
-    share = dot(vertices[v] - a[edge], along[edge]) / np.maximum(length[edge] ** 2, 1e-300)
+    share = dot(vertices[v] - a[edge], along[edge]) / np.maximum(length[edge] ** 2, TINY)
     apart = np.linalg.norm(vertices[v] - a[edge] - share[:, None] * along[edge], axis=1)
     margin = np.minimum(share, 1 - share) * length[edge]
     hit = (apart <= tolerance) & (margin > tolerance) & (v != start[edge]) & (v != end[edge])

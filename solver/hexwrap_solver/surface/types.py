@@ -33,6 +33,16 @@ class SentMesh:
     creases: Ints | None = None
     fold: Floats | None = None
 
+    def transformed(self, matrix: Floats) -> SentMesh:
+        """The mesh under an affine map (4, 4); mirrored faces keep their outside."""
+        linear, shift = matrix[:3, :3], matrix[:3, 3]
+        faces = self.faces
+        if float(np.linalg.det(linear)) < 0:
+            backwards = np.repeat(faces.offsets[:-1] + faces.offsets[1:] - 1, faces.lengths)
+            faces = Ragged(faces.values[backwards - np.arange(len(faces.values))], faces.offsets)
+        normals = None if self.normals is None else self.normals @ np.linalg.pinv(linear)
+        return SentMesh(self.vertices @ linear.T + shift, faces, normals, self.creases, self.fold)
+
 
 @dataclass(frozen=True)
 class MeshSettings:
@@ -171,12 +181,14 @@ class Feature:
     """A line along which the surface folds, from a junction, a corner or the boundary to the next.
 
     vertices: (k,) of the mesh, neighbours joined by edges; a closed line ends where it begins. fold: mean
-    angle between the faces beside it, radians.
+    angle between the faces beside it, radians. given: of the exact surface, or drawn; not only seen on the
+    mesh.
     """
 
     vertices: Ints
     fold: float
     closed: bool
+    given: bool = False
 
 
 @dataclass(frozen=True)

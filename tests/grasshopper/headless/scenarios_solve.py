@@ -221,11 +221,9 @@ def run_off_cancels_on_the_server():
     send.set(Pattern=LARGE)
     until_running(send)
     job = running()[0]["id"]
-    start = time.time()
     send.set(Run=False)
     assert send.Message == "Run is off" and send.Job == good
-    pump([send], lambda: not running(), 20)
-    assert time.time() - start < 15
+    pump([send], lambda: not running())
     assert world.ask(PORT, "GET", "/v1/jobs/" + job)[1]["status"] in ("cancelled", 404)
     solved = send.solved
     linger(send)
@@ -242,7 +240,7 @@ def escape_cancels_on_the_server():
         send = busy_sender()
         until_running(send)
         press(send)
-        pump([send], lambda: not running(), 20)
+        pump([send], lambda: not running())
         assert send.Message == "cancelled"
         send.solve()  # something else on the canvas: the same request does not start again by itself
         linger(send)
@@ -256,7 +254,7 @@ def escape_cancels_on_the_server():
 
 def hold_escape(send):
     Grasshopper.GH_Document.escape_is_down = True
-    pump([send], lambda: send.Message == "cancelled", 20)
+    pump([send], lambda: send.Message == "cancelled")
     Grasshopper.GH_Document.escape_is_down = False
 
 
@@ -268,14 +266,14 @@ def deleted_components_cancel_their_job():
     send = busy_sender()
     until_running(send)
     send.document = None
-    pump([send], lambda: not running(), 20)
+    pump([send], lambda: not running())
     assert send.solved == 1
 
 
 def time_out():
     send = settle(busy_sender(TimeOut=0.5), 2)
     assert "TimeOut" in send.said("error")[0] and send.Job is None
-    pump([send], lambda: not running(), 20)
+    pump([send], lambda: not running())
 
 
 def slow_jobs_show_progress_and_do_not_freeze_the_canvas():

@@ -128,7 +128,7 @@ class Server(object):
         self.process = subprocess.Popen(
             [PYTHON, "-c", SERVE], stdin=silence, stdout=self.nothing, stderr=self.nothing, env=environment
         )
-        end = time.time() + 90
+        end = time.time() + 300
         while not answers(port):
             assert time.time() < end and self.process.poll() is None, "the server did not come up"
             time.sleep(0.1)

@@ -121,14 +121,40 @@ def triangle_pattern(chart: Chart, around: int, rings: int, low: float = 0.0) ->
     return assemble(chart, grid, np.stack([up, down], axis=1).reshape(-1, 3), "triangle", around, rings)
 
 
-def assemble(chart: Chart, grid: Floats, faces: np.ndarray, kind: str, around: int, rings: int) -> Pattern:
-    cells = Ragged.from_table(faces.astype(np.int64))
+def trihexagonal_pattern(chart: Chart, around: int, rings: int, low: float = 0.0) -> Pattern:
+    """3.6.3.6: the hexagons of ``hex_pattern`` shrunk to the midpoints of their edges, and a triangle at each
+    of their inner nodes."""
+    honeycomb = hex_pattern(cylinder, around, rings, low)
+    faces = honeycomb.faces.values.reshape(-1, 6)
+    start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    edge, index = np.unique(np.sort(np.stack([start, end], 1), axis=1), axis=0, return_inverse=True)
+    here, there = honeycomb.uv[edge].T
+    there = there + 2 * np.pi * np.round((here - there).real / (2 * np.pi))
+    grid = np.stack([((here + there) / 2).real, here.imag / 2 + there.imag / 2], axis=-1)
+    hexagons = index.reshape(-1, 6)
+    # From one edge at a node to the next one to its left, across the cell between them.
+    left: dict[int, dict[int, int]] = {}
+    for cell, corner in zip(hexagons.tolist(), faces.tolist(), strict=True):
+        for k in range(6):
+            left.setdefault(corner[k], {})[cell[k]] = cell[k - 1]
+    triangles = [[a, turn[a], turn[turn[a]]] for turn in left.values() if len(turn) == 3 for a in [min(turn)]]
+    values = np.concatenate([hexagons.ravel(), np.array(triangles).ravel()])
+    count = np.repeat([6, 3], [len(hexagons), len(triangles)])
+    cells = Ragged(values, np.concatenate([[0], np.cumsum(count)]))
+    return assemble(chart, grid, cells, "hex", around, rings)
+
+
+def assemble(
+    chart: Chart, grid: Floats, faces: np.ndarray | Ragged, kind: str, around: int, rings: int
+) -> Pattern:
+    cells = faces if isinstance(faces, Ragged) else Ragged.from_table(faces.astype(np.int64))
     start, end = cells.values, cells.values[cells.next()]
     owner = {(int(a), int(b)): f for a, b, f in zip(start, end, cells.row, strict=True)}
     across = np.array([owner.get((int(b), int(a)), -1) for a, b in zip(start, end, strict=True)])
     points = chart(grid[:, 0], grid[:, 1])
     n = len(grid)
-    per_ring = len(faces) // rings
+    n_cells = cells.n_rows
+    per_ring = -(-n_cells // rings)
     edge = np.linalg.norm(points[start] - points[end], axis=1).mean()
     return Pattern(
         kind=kind,  # type: ignore[arg-type]
@@ -137,14 +163,14 @@ def assemble(chart: Chart, grid: Floats, faces: np.ndarray, kind: str, around: i
         uv=grid[:, 0] + 1j * grid[:, 1],
         faces=cells,
         corners=(grid[:, 0] + 1j * grid[:, 1])[start],
-        index=np.zeros(len(faces), dtype=np.int64),
+        index=np.zeros(n_cells, dtype=np.int64),
         sheet=np.zeros(len(start), dtype=np.int64),
         neighbours=Ragged(across, cells.offsets),
         triangle=np.zeros(n, dtype=np.int64),
         barycentric=np.tile([1.0, 0.0, 0.0], (n, 1)),
-        whole=np.ones(len(faces), dtype=bool),
-        ring=np.arange(len(faces)) // per_ring,
-        place=np.arange(len(faces)) % per_ring,
+        whole=np.ones(n_cells, dtype=bool),
+        ring=np.arange(n_cells) // per_ring,
+        place=np.arange(n_cells) % per_ring,
         rings=rings,
         around=around,
         rotation=0.0,

@@ -126,4 +126,6 @@ def test_covers_of_solids_fill_the_outline_once_however_many_corners_are_reflex(
 
 def concave_panels():
     pattern = hex_pattern(catenoid, 20, 5, -0.6)
-    return rationalize(grid_map(catenoid, 60, 40, -0.7, 1.8), pattern, PanelSettings(mode="watertight"))
+    return rationalize(
+        grid_map(catenoid, 60, 40, -0.7, 1.8), pattern, PanelSettings(mode="watertight", method="energy")
+    )

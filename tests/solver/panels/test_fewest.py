@@ -51,7 +51,9 @@ def test_joints_of_a_row_of_panels_stay_within_the_bound(limits, own, max_gap):
         lost = limit - length
         return own + 0.9 * (lost[left] + lost[right])
 
-    found = fewest_lengths(limit, Joints(left, right, width, 0.9), max_gap)
+    found = fewest_lengths(
+        limit, Joints(left, right, width, np.full(len(limit), 0.9)), max_gap, np.zeros(len(limit))
+    )
     assert (found.length <= limit).all()
     assert (found.over == (own > max_gap * (1 + 1e-9))).all()
     assert (width(found.length)[~found.over] <= max_gap * (1 + 1e-9)).all()

@@ -1,4 +1,4 @@
-"""The watertight mesh: its matrix, its derivatives and its symmetry."""
+"""The watertight mesh: flat, convex where that can be, near the surface, and symmetric where it is."""
 
 from __future__ import annotations
 
@@ -6,20 +6,29 @@ import numpy as np
 import pytest
 
 from hexwrap_solver.arrays import Ragged
-from hexwrap_solver.conformal import conformal_map
-from hexwrap_solver.conformal.types import BoundaryCondition
-from hexwrap_solver.panels import fit, fit_panels, rationalize
+from hexwrap_solver.panels import fit, fit_panels, measure, rationalize
+from hexwrap_solver.panels.energy import NEAREST, functionals, minimise_watertight
 from hexwrap_solver.panels.energy.cell_matrix import CellMatrix
 from hexwrap_solver.panels.energy.residuals import plane_distances, plane_slopes
-from hexwrap_solver.panels.energy.watertight import minimise_watertight
 from hexwrap_solver.panels.planar import crossing_themselves
-from hexwrap_solver.panels.polygons import edge_lengths, mean_edges, means
+from hexwrap_solver.panels.polygons import mean_edges, means
 from hexwrap_solver.panels.regular import corners
 from hexwrap_solver.panels.types import PanelSettings, Weights
-from hexwrap_solver.pattern import lay_pattern
-from hexwrap_solver.pattern.types import PatternSettings
-from tests.solver.conformal.annuli import bump
-from tests.solver.panels.cells import catenoid, grid_map, hex_pattern, inverted, quad_pattern, torus
+from tests.solver.panels.cells import (
+    catenoid,
+    grid_map,
+    hex_pattern,
+    inverted,
+    quad_pattern,
+    sphere,
+    torus,
+    triangle_pattern,
+    trihexagonal_pattern,
+)
+
+
+def measured(pattern, cmap):
+    return measure(cmap, pattern, rationalize(cmap, pattern, PanelSettings(mode="watertight")))
 
 
 def test_cells_sum_up_to_the_normal_matrix():
@@ -60,23 +69,67 @@ def test_plane_distances_of_flat_polygons_have_exact_derivatives(p):
             assert min(np.abs(x - exact).max() for x in (numeric, -numeric, other, -other)) < 1e-5
 
 
-def test_a_surface_of_revolution_keeps_its_symmetry():
-    """However hexagons on a saddle become flat, they do so alike all around (they tip over from a balance,
-    which magnifies rounding)."""
-    pattern, cmap = hex_pattern(catenoid, 20, 5, -0.6), grid_map(catenoid, 60, 40, -0.7, 1.8)
-    fitted = fit_panels(cmap, pattern, PanelSettings(mode="watertight"))
-    length = (edge_lengths(fitted.shapes) / mean_edges(fitted.shapes)[fitted.shapes.row]).reshape(5, 20, 6)
-    assert np.ptp(length, axis=1).max() < 1e-3
-    assert np.ptp(length, axis=2).min() > 1e-2
+def test_flat_faces_are_convex_on_a_saddle_where_four_meet():
+    """Three cannot: the honeycomb is flat, too, but hardly a cell of it is convex."""
+    cmap = grid_map(catenoid, 96, 60, -1.2, 2.2)
+    pattern = trihexagonal_pattern(catenoid, 32, 10, -0.8)
+    quality = measured(pattern, cmap)
+    assert quality.planarity.max() < 1e-9
+    assert quality.convex.all()
+    assert quality.surface_distance.max() < 0.1 * pattern.edge_length  # of corners and centres
+    assert quality.movement < 0.1 * pattern.edge_length
+    honeycomb = measured(hex_pattern(catenoid, 32, 10, -0.8), cmap)
+    assert honeycomb.planarity.max() < 1e-9
+    assert honeycomb.convex.mean() < 0.1
+
+
+@pytest.mark.parametrize("make", [hex_pattern, trihexagonal_pattern, quad_pattern])
+def test_corners_stay_beside_the_surface(make):
+    """Where the pattern allows flat convex faces; hexagons on a sphere, for one."""
+    for chart, low in ((catenoid, -0.6), (sphere, -0.6)):
+        if make is hex_pattern and chart is catenoid:
+            continue
+        pattern, cmap = make(chart, 32, 8, low), grid_map(chart, 96, 72, -1.0, 2.0)
+        moved, _ = minimise_watertight(pattern, mean_edges(pattern.cells), NEAREST, cmap.surface)
+        away = cmap.surface.tree.nearest(moved).distance
+        quality = measured(pattern, cmap)
+        assert quality.planarity.max() < 1e-9
+        assert quality.convex.all()
+        assert away.max() < 0.08 * pattern.edge_length
+
+
+@pytest.mark.parametrize("make", [hex_pattern, trihexagonal_pattern])
+def test_a_surface_of_revolution_keeps_its_symmetry(make):
+    """However hexagons on a saddle become flat, they do so alike all around, but for the facets of
+    the mesh."""
+    pattern, cmap = make(catenoid, 20, 5, -0.6), grid_map(catenoid, 60, 40, -0.7, 1.8)
+    moved, _ = minimise_watertight(pattern, mean_edges(pattern.cells), NEAREST, cmap.surface)
+    movement = moved - pattern.vertices
+    phase = np.exp(1j * pattern.uv.real)
+    radial = (movement[:, 0] + 1j * movement[:, 1]) / phase
+    seen = np.stack([radial.real, radial.imag, movement[:, 2]], axis=1) / pattern.edge_length
+    orbit = np.stack([(phase**20).real, (phase**20).imag, pattern.uv.imag], axis=1).round(6) + 0.0
+    _, alike = np.unique(orbit, axis=0, return_inverse=True)
+    for k in range(alike.max() + 1):
+        assert (alike == k).sum() == 20
+        assert np.ptp(seen[alike == k], axis=0).max() < 1e-3
+
+
+def test_triangles_stay_where_they_are():
+    pattern, cmap = triangle_pattern(catenoid, 20, 5), grid_map(catenoid, 200, 120, -0.2, 2.0)
+    quality = measured(pattern, cmap)
+    assert quality.movement < 1e-2 * pattern.edge_length
+    assert quality.convex.all()
 
 
 @pytest.mark.parametrize("make", [hex_pattern, quad_pattern])
 def test_flatness_is_not_bought_with_more_than_it_costs(make):
     """Without planarity the asked energies alone can only fall, from step to step."""
     chart = inverted(torus, (0.5, 0.1, 4.0))
-    pattern = make(chart, 20, 6, 0.1)
+    pattern, cmap = make(chart, 20, 6, 0.1), grid_map(chart, 60, 40, 0.0, 2.5)
     length = np.full(pattern.n_cells, pattern.edge_length)
-    _, curve = minimise_watertight(pattern, length, Weights(planarity=0.0), None)
+    aims = functionals(Weights(planarity=0.0))
+    _, curve = minimise_watertight(pattern, length, aims, cmap.surface)
     assert len(curve) > 1
     assert (np.diff(curve) < 0).all()
 
@@ -84,22 +137,22 @@ def test_flatness_is_not_bought_with_more_than_it_costs(make):
 @pytest.mark.parametrize(("chart", "center"), [(torus, (0.5, 0.1, 4.0)), (catenoid, (0.7, 0.2, 3.0))])
 def test_quads_become_flat_without_waves(chart, center):
     """Where lines of the net are no conjugate directions, flat quads are nearest in waves like bellows: there
-    neighbours move as far apart as they move at all."""
-    pattern = quad_pattern(inverted(chart, center), 40, 12, 0.1)
-    length = np.full(pattern.n_cells, pattern.edge_length)
-    moved, _ = minimise_watertight(pattern, length, Weights(), None)
+    neighbours move twice as far apart as they move."""
+    chart = inverted(chart, center)
+    pattern, cmap = quad_pattern(chart, 40, 12, 0.1), grid_map(chart, 80, 60, -0.2, 2.5)
+    moved, _ = minimise_watertight(pattern, mean_edges(pattern.cells), NEAREST, cmap.surface)
     face = pattern.faces.values.reshape(-1, 4)
     movement = moved - pattern.vertices
     apart = np.linalg.norm(np.roll(movement[face], -1, axis=1) - movement[face], axis=2)
-    assert np.abs(plane_distances(moved[face], length)).max() < 1e-9
-    assert apart.max() < 0.5 * np.linalg.norm(movement, axis=1).max()
+    assert np.abs(plane_distances(moved[face], mean_edges(pattern.cells))).max() < 1e-9
+    assert apart.max() < 0.7 * np.linalg.norm(movement, axis=1).max()
 
 
 def test_a_mesh_that_no_step_improves_is_told(monkeypatch):
     pattern, cmap = hex_pattern(torus, 16, 4), grid_map(torus, 40, 24, -0.1, 1.2)
     for curve, told in (([1.0, 1.0], True), ([1.0, 0.5, 0.4], False), ([0.0, 0.0], False)):
         monkeypatch.setattr(fit, "minimise_watertight", lambda *_, c=curve: (pattern.vertices, np.array(c)))
-        notes = fit_panels(cmap, pattern, PanelSettings(mode="watertight")).notes
+        notes = fit_panels(cmap, pattern, PanelSettings(mode="watertight", method="energy")).notes
         assert any("No step" in note for note in notes) == told
 
 
@@ -107,7 +160,7 @@ def test_panels_that_leave_the_surface_are_told_and_held_nearer_by_its_weight():
     pattern, cmap = hex_pattern(catenoid, 20, 5, -0.6), grid_map(catenoid, 96, 60, -0.7, 1.8)
     away = {}
     for surface in (0.0, 50.0):
-        wanted = PanelSettings(mode="watertight", weights=Weights(surface=surface))
+        wanted = PanelSettings(mode="watertight", method="energy", weights=Weights(surface=surface))
         panels = rationalize(cmap, pattern, wanted)
         distance = cmap.surface.tree.nearest(panels.polygons.values).distance.max()
         away[surface] = distance / panels.edge_length.mean()
@@ -120,22 +173,37 @@ def test_panels_that_leave_the_surface_are_told_and_held_nearer_by_its_weight():
     assert away[50.0] < away[0.0] / 2
 
 
-def test_flat_quads_are_told_how_to_follow_the_surface():
-    """What the note promises is true."""
-    cmap = conformal_map(bump(48, 24), BoundaryCondition())
-    pattern = lay_pattern(cmap, PatternSettings(kind="quad", around=40))
+def test_weights_alone_ask_for_the_energies():
+    """As they did before there was another way."""
+    pattern, cmap = hex_pattern(torus, 16, 4), grid_map(torus, 40, 24, -0.1, 1.2)
+    weights = Weights(planarity=0.0, surface=1.0)
+    silent, said, plain = (
+        rationalize(cmap, pattern, PanelSettings(mode="watertight", **asked))
+        for asked in ({"weights": weights}, {"weights": weights, "method": "energy"}, {})
+    )
+    assert np.array_equal(silent.polygons.values, said.polygons.values)
+    assert not np.allclose(silent.polygons.values, plain.polygons.values)
+    assert any("Weights were given" in note for note in silent.notes)
 
-    def away(weights: Weights) -> tuple[float, bool, bool]:
-        panels = rationalize(cmap, pattern, PanelSettings(mode="watertight", weights=weights))
-        distance = cmap.surface.tree.nearest(panels.polygons.values).distance.max()
-        told = " ".join(note for note in panels.notes if "leave the surface" in note)
-        return distance / panels.edge_length.mean(), "weight of 50" in told, "planarity 0, surface 1" in told
 
-    flat, held, smooth = map(away, (Weights(), Weights(surface=50.0), Weights(planarity=0.0, surface=1.0)))
-    assert flat[1:] == (True, True)
-    assert held[1:] == (False, True)
-    assert smooth[1:] == (False, False)
-    assert smooth[0] < 0.02 < held[0] < flat[0] / 2
+@pytest.mark.parametrize(
+    ("make", "chart", "better"),
+    [
+        (hex_pattern, catenoid, "kind trihexagonal"),
+        (hex_pattern, torus, "kind trihexagonal"),
+        (hex_pattern, sphere, None),
+        (triangle_pattern, catenoid, None),
+    ],
+)
+def test_panels_that_are_not_convex_are_told_with_the_pattern_that_would_be(make, chart, better):
+    pattern, cmap = make(chart, 24, 6, 0.4), grid_map(chart, 60, 48, 0.0, 3.0)
+    panels = rationalize(cmap, pattern, PanelSettings(mode="watertight"))
+    told = [note for note in panels.notes if "not convex" in note]
+    assert len(told) == (better is not None)
+    if told:
+        count = (~measure(cmap, pattern, panels).convex).sum()
+        assert f"not convex: {count} of {pattern.n_cells}" in told[0]
+        assert better in told[0]
 
 
 def test_panels_that_cross_themselves_are_counted():

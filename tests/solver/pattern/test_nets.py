@@ -125,7 +125,7 @@ def test_frames_of_doors_are_lattice_lines(doors):
     z = placed.glued.corners(cmap.surface.faces, placed.place).ravel()
     rim = np.flatnonzero(cmap.surface.twin < 0)
     along = z[next_half_edge(rim)] - z[rim]
-    steps = np.angle(along / complex(lattice.position(lattice.steps[0]))) / lattice.quantum
+    steps = np.angle(along / lattice.forward) / lattice.quantum
     assert np.abs(steps - np.rint(steps)).max() < 1e-9
     row = (np.conj(1j * along / abs(along)) * z[rim]).real / lattice.edge
     assert np.abs(row - np.rint(row)).max() < 1e-9

@@ -24,8 +24,8 @@ LATTICE = LATTICES["hex"]
 def prepared(case):
     cmap = MAPS[case]
     turns = round(CASES[case][4] / LATTICE.quantum)
-    frame = align._frame(cmap, LATTICE, PatternSettings(around=60), turns, [0, 1])
     motion = Isometry(LATTICE, turns, (0, 0))
+    frame, _ = align._frame(cmap, LATTICE, PatternSettings(around=60), motion, [0, 1], [])
     lines = lines_of(len(cmap.uv), frame.sides, frame.normal, motion)
     system = System(cmap, Glued.by_sheets(cmap, motion), lines.normal)
     strain = Strain.of(system, frame.sides, lines, frame.turned)
@@ -58,7 +58,7 @@ def test_no_single_side_moved_by_a_row_would_lessen_the_strain(case):
     frame, _, _, strain, trials = prepared(case)
     for trial, side, step in product(trials, range(frame.sides.n), (-1, 1)):
         other = trial.moved.copy()
-        other[side] += step * frame.rows.period
+        other[side] += step * frame.period[side]
         assert strain.mean(other) >= strain.mean(trial.moved) * (1 - 1e-9)
 
 

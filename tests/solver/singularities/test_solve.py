@@ -11,7 +11,8 @@ from hexwrap_solver.pipeline import SolveSettings, solve
 from hexwrap_solver.singularities.types import SingularityAt, SingularitySettings
 from tests.solver.singularities import shapes
 
-SIDES = {"hex": 6, "quad": 4}
+SIDES = {"hex": 6, "quad": 4, "triangle": 3}
+DEGREE = {"hex": 3, "quad": 4, "triangle": 6}
 
 
 def solved(surface, mode="isometric", count=None, at=(), panels=None, **pattern):
@@ -30,6 +31,7 @@ CASES = {
     "tube": (shapes.waist, "isometric", None, ASIDE, {"around": 16}),
     "trimmed": (shapes.waist, "isometric", None, ASIDE, {"around": 16, "boundary": "trim"}),
     "octagon": (shapes.waist, "isometric", None, (SingularityAt(-2, vertex=620),), {"around": 16}),
+    "triangles": (shapes.waist, "isometric", None, ASIDE, {"kind": "triangle", "around": 32}),
     "quads": (shapes.waist, "isometric", None, ASIDE, {"kind": "quad", "around": 16}),
     "closed": (shapes.ellipsoid, "straight", None, (), {"edge_length": 0.2}),
     "both ends aligned": (shapes.waist, "straight", None, PAIRS, {"around": 20, "align": "both"}),
@@ -46,7 +48,8 @@ def test_the_pattern_has_the_singularities_of_the_map(case):
     _, solution = case
     cones, laid = solution.map.cones, solution.pattern
     assert len(cones) > 0
-    assert sorted(laid.index[laid.index != 0]) == sorted(cones.index)
+    singular = [] if laid.kind == "triangle" else sorted(cones.index)
+    assert sorted(laid.index[laid.index != 0]) == singular
     lengths = laid.faces.lengths[laid.whole]
     assert (lengths == SIDES[laid.kind] - laid.index[laid.whole]).all()
 
@@ -61,14 +64,18 @@ def test_interior_nodes_are_regular(case):
     inner[laid.faces.values[edge]] = False
     inner[laid.faces.values[laid.faces.next()[edge]]] = False
     valence = np.bincount(laid.faces.values, minlength=len(laid.vertices))[inner]
-    assert set(valence) == {3 if laid.kind == "hex" else 4}
+    regular = DEGREE[laid.kind]
+    odd = sorted(regular - valence[valence != regular])
+    assert odd == (sorted(solution.map.cones.index) if laid.kind == "triangle" else [])
 
 
 def test_nothing_is_deformed(case):
     name, solution = case
     assert solution.pattern.distortion == 0
     moved = solution.map.cones.moved
-    width = solution.pattern.edge_length * {"hex": np.sqrt(3), "quad": 1}[solution.pattern.kind]
+    width = (
+        solution.pattern.edge_length * {"hex": np.sqrt(3), "quad": 1, "triangle": 1}[solution.pattern.kind]
+    )
     assert moved.max() < 1.3 * width, name
 
 
@@ -175,6 +182,35 @@ class TestCurve:
         assert curve.uncovered.min() < 0.7 * curve.uncovered[0]
 
 
-def test_triangles_with_singularities_are_refused():
-    with pytest.raises(SingularitiesError, match="ask for hexagons or quads"):
-        solved(shapes.waist(), "isometric", None, ASIDE, kind="triangle", around=44)
+@pytest.mark.parametrize("index", [1, 2, -1, -2])
+def test_triangles_meet_in_a_vertex_of_another_valence(index):
+    found = solved(
+        shapes.waist(), "isometric", None, (SingularityAt(index, vertex=620),), kind="triangle", around=24
+    ).pattern
+    side = np.flatnonzero(found.neighbours.values < 0)
+    inner = np.ones(len(found.vertices), dtype=bool)
+    inner[found.faces.values[side]] = inner[found.faces.values[found.faces.next()[side]]] = False
+    valence = np.bincount(found.faces.values, minlength=len(found.vertices))
+    assert sorted(6 - valence[inner & (valence != 6)]) == [index]
+    edges = (len(found.faces.values) + len(side)) // 2
+    assert len(found.vertices) - edges + found.n_cells == 0
+
+
+def test_a_closed_surface_takes_triangles():
+    laid = solved(shapes.ellipsoid(), "straight", kind="triangle", edge_length=0.3).pattern
+    assert (laid.neighbours.values >= 0).all()
+    assert len(laid.vertices) - len(laid.faces.values) // 2 + laid.n_cells == 2
+    valence = np.bincount(laid.faces.values)
+    assert (6 - valence).sum() == 12
+
+
+@pytest.mark.parametrize(
+    ("kind", "index", "said"),
+    [
+        ("quad", 2, "would leave 2 sides around it in a quad pattern"),
+        ("brick", 1, "no rotations but half turns"),
+    ],
+)
+def test_what_closes_around_nothing_is_refused(kind, index, said):
+    with pytest.raises(SingularitiesError, match=said):
+        solved(shapes.waist(), "isometric", None, (SingularityAt(index, vertex=620),), kind=kind, around=24)

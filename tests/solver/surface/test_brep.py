@@ -7,13 +7,27 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hexwrap_solver.arrays import Floats
-from hexwrap_solver.surface import MeshSettings, NurbsSurface
-from hexwrap_solver.surface.brep import Brep, BrepMesh, Face, brep_of_surface, joined, mesh_brep, together
+from hexwrap_solver.arrays import Floats, Ragged
+from hexwrap_solver.surface import MeshSettings, NurbsSurface, SentMesh
+from hexwrap_solver.surface.brep import (
+    Brep,
+    BrepMesh,
+    Edge,
+    Face,
+    NurbsCurve,
+    Trim,
+    brep_of_surface,
+    joined,
+    mesh_brep,
+    together,
+)
+from hexwrap_solver.surface.brep.pull import patch_of, pull
+from hexwrap_solver.surface.brep.surface import surface_from_brep
 from hexwrap_solver.surface.errors import NurbsDataError, TooFineError, TrimError
+from hexwrap_solver.surface.nurbs import evaluate_points
 from hexwrap_solver.surface.projection import project
 from hexwrap_solver.surface.topology import boundary_loops, edge_groups, edge_lengths, twins
-from tests.solver.surface.brep_shapes import bilinear, box, fitted_surface, trimmed_tower
+from tests.solver.surface.brep_shapes import bilinear, box, fitted_curve, fitted_surface, line, trimmed_tower
 from tests.solver.surface.nurbs_shapes import CORNERS, WEIGHTS, cylinder, revolution
 
 
@@ -263,3 +277,78 @@ def test_a_face_one_row_high() -> None:
     corner = np.array([[[0, 0, 0], [0, 0, 0.05]], [[40, 0, 0], [40, 0, 0.05]]])
     mesh = mesh_brep(brep_of_surface(bilinear(corner), 1e-3), MeshSettings(max_edge=2.0))
     assert euler(mesh) == 1
+
+
+def test_a_face_a_few_triangles_wide_around_a_pole_or_a_seam_has_every_edge_once() -> None:
+    for name in ("sphere", "dome", "cylinder"):
+        brep = SHAPES[name][0]
+        for longest in (30.0, 100.0):
+            mesh = mesh_brep(brep, MeshSettings(max_edge=longest))
+            _, first = edge_groups(mesh.faces, len(mesh.vertices))
+            assert np.diff(first).max() <= 2
+
+
+def spiral() -> Brep:
+    """A wall that closes only within 0.01, three times the tolerance, between exact circles."""
+
+    def shape(u: Floats, v: Floats) -> Floats:
+        radius = 1 + 0.01 * u
+        return np.stack([radius * np.cos(2 * np.pi * u), radius * np.sin(2 * np.pi * u), v], -1)
+
+    def circle(z: float) -> NurbsCurve:
+        return fitted_curve(
+            lambda t: shape(t, 0 * t + z) / np.stack([1 + 0.01 * t, 1 + 0.01 * t, 1 + 0 * t], -1)
+        )
+
+    points = np.array([[1.0, 0, 0], [1.0, 0, 2]])
+    seams = [line(shape(np.array(u), np.array(0.0)), shape(np.array(u), np.array(2.0))) for u in (0.0, 1.0)]
+    edges = (
+        Edge(circle(0.0), (0.0, 1.0), 0, 0),
+        Edge(circle(2.0), (0.0, 1.0), 1, 1),
+        *(Edge(seam, (0.0, 1.0), 0, 1) for seam in seams),
+    )
+    loop = (Trim(0, False, 0, 0), Trim(3, False, 0, 1), Trim(1, True, 1, 1), Trim(2, True, 1, 0))
+    return Brep(points, edges, (Face(fitted_surface(shape, (0, 1), (0, 2), (40, 6)), (loop,), False),), 3e-3)
+
+
+def test_trims_of_a_surface_that_nearly_closes_end_on_the_side_they_come_from() -> None:
+    mesh = mesh_brep(spiral(), MeshSettings(max_edge=0.3))
+    assert euler(mesh) == -1  # both ends of the slit are one vertex each
+    assert mesh.uv[..., 0].min() < 0.01
+    assert mesh.uv[..., 0].max() > 0.99
+
+
+def test_points_far_off_are_pulled_again_from_their_neighbours() -> None:
+    t = np.linspace(0, 1, 60)
+
+    def shape(u: Floats, v: Floats) -> Floats:  # folds that lie closer to each other than their own waves
+        return np.stack([u, 0.02 * np.sin(40 * u) + 0.1 * v, 2 * v], -1)
+
+    surface = fitted_surface(shape, (0, 1), (0, 1), (60, 8))
+    points = evaluate_points(surface, np.stack([t, t**2], axis=1))
+    uv, distance = pull(patch_of(surface, 1e-6), points, None, 1e-6)
+    assert distance.max() < 1e-6
+    assert np.abs(uv - np.stack([t, t**2], axis=1)).max() < 1e-4
+
+
+def crossing(render: bool) -> Brep:
+    """An open box one of whose walls has a boundary that crosses itself."""
+    brep = box(caps=False)
+    mesh = mesh_brep(brep, MeshSettings(max_edge=4.0))
+    faces = []
+    for k, face in enumerate(brep.faces):
+        own = SentMesh(mesh.vertices, Ragged.from_table(mesh.faces[mesh.face == k])) if render else None
+        loops = face.loops if k else ((*face.loops[0][:1], *face.loops[0][2:], face.loops[0][1]),)
+        faces.append(replace(face, loops=loops, render=own))
+    return replace(brep, faces=tuple(faces))
+
+
+def test_meshes_that_came_with_a_polysurface_are_taken_where_a_face_cannot_be_meshed() -> None:
+    with pytest.raises(TrimError):
+        surface_from_brep(crossing(render=False))
+    matrix = np.diag([-1.0, 2.0, 1.0, 1.0])
+    for brep in (crossing(render=True), crossing(render=True).transformed(matrix)):
+        surface = surface_from_brep(brep)
+        assert len(surface.loops) == 2
+        assert "own render meshes of 4 faces" in surface.repairs[0]
+    assert np.ptp(surface.vertices[:, 1]) == pytest.approx(18)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from hexwrap_solver.pattern.lattice import LATTICES
+
 #: What Hops takes for "as many as there are".
 MANY = 2**31 - 1
 
@@ -71,7 +73,7 @@ COMPONENTS = {
             Parameter("Mode", "Text", "straight, angles or isometric; angles where Points are given"),
             Parameter("Points", "Point", "corners on the boundary", many=True),
             Parameter("Angles", "Number", "degrees, one per point, or one for all", many=True),
-            Parameter("Kind", "Text", "hex, triangle or quad", default="hex"),
+            Parameter("Kind", "Text", ", ".join(LATTICES), default="hex"),
             Parameter("Around", "Integer", "cells around; 0 leaves it to the server", default=0),
             Parameter("Sizes", "Integer", "different panel sizes; 0 for one per panel", default=11),
             Parameter("Target", "Text", "inscribed, best, shortest or mean", default="inscribed"),

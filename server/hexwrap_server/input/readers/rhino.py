@@ -11,11 +11,10 @@ import rhino3dm
 
 from hexwrap_server.input.readers.errors import UnreadableFileError
 from hexwrap_server.input.readers.found import FileContent, Found, Geometry
-from hexwrap_server.input.readers.rhino_brep import brep_of, nurbs_surface, subd_mesh
+from hexwrap_server.input.readers.rhino_brep import brep_of, nurbs_surface, rhino_mesh, subd_mesh
 from hexwrap_server.input.readers.rhino_model import MOST_OBJECTS, Model, Placed, TooManyObjectsError
-from hexwrap_solver.arrays import Floats, Ragged
-from hexwrap_solver.surface import NurbsSurface, SentMesh
-from hexwrap_solver.surface.brep import Brep
+from hexwrap_solver.arrays import Floats
+from hexwrap_solver.surface import NurbsSurface
 
 #: Rhino's geometry types that are surfaces; curves, points, lights and texts beside them do no harm.
 SURFACES = (rhino3dm.Mesh, rhino3dm.Brep, rhino3dm.Surface, rhino3dm.SubD)
@@ -87,36 +86,26 @@ def _moved(geometry: Geometry, matrix: Floats | None) -> Geometry:
     """Where its block puts it; the outside stays outside where a block is mirrored."""
     if matrix is None:
         return geometry
-    if isinstance(geometry, Brep):
+    if not isinstance(geometry, NurbsSurface):
         return geometry.transformed(matrix)
     linear, shift = matrix[:3, :3], matrix[:3, 3]
-    mirrored = float(np.linalg.det(linear)) < 0
-    if isinstance(geometry, NurbsSurface):
-        net = geometry.control_points
-        moved = np.concatenate([net[..., :3] @ linear.T + shift, net[..., 3:]], axis=-1)
-        surface = NurbsSurface(geometry.degree, geometry.knots, moved, geometry.closed)
-        return _turned(surface) if mirrored else surface
-    faces = geometry.faces
-    if mirrored:
-        backwards = np.repeat(faces.offsets[:-1] + faces.offsets[1:] - 1, faces.lengths)
-        faces = Ragged(faces.values[backwards - np.arange(len(faces.values))], faces.offsets)
-    normals = geometry.normals
-    if normals is not None:
-        normals = normals @ np.linalg.pinv(linear)
-    return SentMesh(geometry.vertices @ linear.T + shift, faces, normals)
+    net = geometry.control_points
+    moved = np.concatenate([net[..., :3] @ linear.T + shift, net[..., 3:]], axis=-1)
+    surface = NurbsSurface(geometry.degree, geometry.knots, moved, geometry.closed)
+    return _turned(surface) if float(np.linalg.det(linear)) < 0 else surface
 
 
 def convert(geometry: Any, tolerance: float = 0.0) -> Geometry:
     """One object of rhino3dm. tolerance: the file's. Raises UnreadableFileError."""
     if isinstance(geometry, rhino3dm.Mesh):
-        return _mesh(geometry)
+        return rhino_mesh(geometry)
     if isinstance(geometry, rhino3dm.SubD):
         mesh = subd_mesh(geometry)
         if mesh is None:
             raise UnreadableFileError(
                 "The SubD cannot be subdivided: convert it with Rhino's ToNURBS command."
             )
-        return _mesh(mesh)
+        return rhino_mesh(mesh)
     if isinstance(geometry, rhino3dm.Extrusion):
         geometry = geometry.ToBrep(True) or geometry
     if isinstance(geometry, rhino3dm.Brep) and len(geometry.Faces) == 1 and geometry.IsSurface:
@@ -125,23 +114,6 @@ def convert(geometry: Any, tolerance: float = 0.0) -> Geometry:
     if isinstance(geometry, rhino3dm.Brep):
         return brep_of(geometry, tolerance)
     return nurbs_surface(geometry)
-
-
-def _mesh(mesh: Any) -> SentMesh:
-    vertices = np.array([_xyz(mesh.Vertices.Point3dAt(i)) for i in range(len(mesh.Vertices))], dtype=float)
-    table = np.array([mesh.Faces[i] for i in range(len(mesh.Faces))], dtype=np.int64).reshape(-1, 4)
-    if table.size == 0:
-        raise UnreadableFileError("The mesh in the Rhino file has no faces.")
-    keep = np.ones(table.shape, dtype=bool)
-    keep[:, 3] = table[:, 3] != table[:, 2]
-    offsets = np.concatenate([[0], np.cumsum(keep.sum(axis=1))])
-    return SentMesh(vertices, Ragged(table[keep], offsets), _normals(mesh, len(vertices)))
-
-
-def _normals(mesh: Any, n: int) -> Floats | None:
-    if len(mesh.Normals) != n:
-        return None
-    return np.array([_xyz(mesh.Normals[i]) for i in range(n)], dtype=float)
 
 
 def _xyz(point: Any) -> tuple[float, float, float]:

@@ -8,8 +8,8 @@ import numpy as np
 import rhino3dm
 
 from hexwrap_server.input.readers.errors import UnreadableFileError
-from hexwrap_solver.arrays import Floats
-from hexwrap_solver.surface import NurbsSurface
+from hexwrap_solver.arrays import Floats, Ragged
+from hexwrap_solver.surface import NurbsSurface, SentMesh
 from hexwrap_solver.surface.brep import Brep, Edge, Face, NurbsCurve, Trim
 
 #: A SubD's control net is subdivided so often; its vertices then lie within 1/256 of a face of the limit.
@@ -30,9 +30,15 @@ def brep_of(geometry: Any, tolerance: float) -> Brep:
     for face in brep.Faces:
         loops = sorted(face.Loops, key=lambda loop: loop.LoopType != rhino3dm.BrepLoopType.Outer)
         trims = tuple(tuple(_trim(trim, ends) for trim in loop.Trims) for loop in loops)
-        faces.append(Face(nurbs_surface(face.UnderlyingSurface()), trims, bool(face.OrientationIsReversed)))
+        surface = nurbs_surface(face.UnderlyingSurface())
+        faces.append(Face(surface, trims, bool(face.OrientationIsReversed), _render(face)))
     edges = tuple(_edge(edge, ends.get(i, (-1, -1))) for i, edge in enumerate(brep.Edges))
     return Brep(vertices, edges, tuple(faces), tolerance)
+
+
+def _render(face: Any) -> SentMesh | None:
+    mesh = face.GetMesh(rhino3dm.MeshType.Any)
+    return rhino_mesh(mesh) if mesh is not None and len(mesh.Faces) else None
 
 
 def _as_brep(geometry: Any) -> Any:
@@ -84,6 +90,24 @@ def nurbs_surface(surface: Any) -> NurbsSurface:
     )
 
 
+def rhino_mesh(mesh: Any) -> SentMesh:
+    """Raises UnreadableFileError."""
+    vertices = np.array([_xyz(mesh.Vertices.Point3dAt(i)) for i in range(len(mesh.Vertices))], dtype=float)
+    table = np.array([mesh.Faces[i] for i in range(len(mesh.Faces))], dtype=np.int64).reshape(-1, 4)
+    if table.size == 0:
+        raise UnreadableFileError("The mesh in the Rhino file has no faces.")
+    keep = np.ones(table.shape, dtype=bool)
+    keep[:, 3] = table[:, 3] != table[:, 2]
+    offsets = np.concatenate([[0], np.cumsum(keep.sum(axis=1))])
+    return SentMesh(vertices, Ragged(table[keep], offsets), _normals(mesh, len(vertices)))
+
+
+def _normals(mesh: Any, n: int) -> Floats | None:
+    if len(mesh.Normals) != n:
+        return None
+    return np.array([_xyz(mesh.Normals[i]) for i in range(n)], dtype=float)
+
+
 def _full(knots: Any) -> Floats:
     """Rhino leaves out the first and the last knot, which no basis function depends on."""
     k = np.array(list(knots), dtype=np.float64)
@@ -93,7 +117,14 @@ def _full(knots: Any) -> Floats:
 def subd_mesh(subd: Any) -> Any:
     """The mesh of a SubD, subdivided; None where rhino3dm cannot."""
     copy = subd.Duplicate()
-    return rhino3dm.Mesh.CreateFromSubDControlNet(copy) if copy.Subdivide(SUBDIVISIONS) else None
+    return control_net(copy) if copy.Subdivide(SUBDIVISIONS) else None
+
+
+def control_net(subd: Any) -> Any:
+    try:
+        return rhino3dm.Mesh.CreateFromSubDControlNet(subd, False)
+    except TypeError:  # older versions ask for no texture coordinates
+        return rhino3dm.Mesh.CreateFromSubDControlNet(subd)
 
 
 def _xyz(point: Any) -> tuple[float, float, float]:

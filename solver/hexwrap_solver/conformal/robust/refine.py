@@ -17,6 +17,7 @@ from hexwrap_solver.geometry import dot, normalize
 from hexwrap_solver.surface.flips import angle_sums_opposite
 from hexwrap_solver.surface.topology import half_edges
 from hexwrap_solver.surface.types import Surface
+from hexwrap_solver.tolerances import ANGLE
 
 #: A boundary vertex with target angle Θ gets at least Θ / FULLEST triangles.
 FULLEST = 0.95 * np.pi
@@ -212,7 +213,7 @@ def _chords(surface: Surface, targets: Targets, turn: Ints) -> Ints:
         at[tail[boundary]] = boundary
         # turns and convex corners up to each vertex, twice around so that no way along the loop wraps
         around = np.concatenate([[0], np.cumsum(np.tile(turn[at[loop]], 2))])
-        convex = (targets.angle[loop] < np.pi - 1e-9) & (targets.tie[loop] < 0)
+        convex = (targets.angle[loop] < np.pi - ANGLE) & (targets.tie[loop] < 0)
         corners = np.concatenate([[0], np.cumsum(np.tile(convex, 2))])
         h = np.flatnonzero((twin >= 0) & (place[tail] >= 0) & (place[head] >= 0))
         start, end = place[tail[h]], place[head[h]]

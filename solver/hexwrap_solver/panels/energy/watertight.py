@@ -1,81 +1,103 @@
-"""The mesh stays whole: panels share their corners, and faces become as flat and even as that allows."""
+"""The mesh stays whole: panels share their corners, and faces become flat.
+
+What is minimised, lengths relative to the edges:
+
+    E =   the paper's functionals, as they are weighted
+        + anchor · ½ ‖x − x₀‖²                      movement from the pattern on the surface
+        + evenness · ½ Σ ‖change of the movement from one edge of a cell to the opposite one‖²
+
+subject to flat faces. The last term keeps away waves from row to row, like bellows, by which nets of quads
+become flat near any surface; of opposite edges, because nodes that a translation of the pattern takes to
+each other lie there, whereas flat hexagons on a saddle need neighbouring corners to move apart.
+
+Gauss–Newton steps with the distances from the faces' best planes as a penalty, hundredfold from stage to
+stage, lead near the minimum; Newton's method on the planes alone then makes them flat to rounding, along the
+shortest way in the sense of E. All matrices have the same pattern of entries and are analysed once.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hexwrap_solver.arrays import Floats, Ints, Progress, Ragged, no_progress
+from hexwrap_solver.arrays import Floats, Ints, Progress, no_progress
 from hexwrap_solver.panels.energy.cell_matrix import CellMatrix
 from hexwrap_solver.panels.energy.residuals import (
     bounded,
-    edges_of,
     jacobian,
     plane_distances,
     plane_slopes,
     residuals,
-    surface_residuals,
 )
 from hexwrap_solver.panels.types import Weights
 from hexwrap_solver.pattern.types import Pattern
-from hexwrap_solver.surface.closest import TriangleTree
+from hexwrap_solver.surface.types import Surface
 
-#: Most Gauss–Newton steps for each weight of the plane distances.
-STEPS_PER_STAGE = 12
+#: Weights of the plane distances, stage by stage; the surface weighs 1.
+FLATNESS = (1.0, 1e2, 1e4)
 
-#: Weight of the plane distances in the first stage; from stage to stage tenfold more, so that flatness wins.
-FIRST_FLATNESS, STAGES = 1e3, 5
+#: Most Gauss–Newton steps in a stage.
+STEPS_PER_STAGE = 5
 
-#: Plane distances / ℓ below this count as flat.
-FLAT = 1e-9
+#: A stage ends when a step lowers its energy by less than this fraction: the next one goes on. Nothing
+#: comes after the only stage where nothing is to become flat.
+DECREASE, ONLY_DECREASE = 5e-2, 1e-4
 
-#: A stage ends when a step lowers its energy by less than this fraction. What one leaves undone, the next
-#: does along with its own work; nobody comes after the last, nor after the only one where nothing is to
-#: become flat.
-DECREASE, LAST_DECREASE, ONLY_DECREASE = 2e-2, 4e-3, 1e-4
+#: Weight of the planes in Newton's method at the end, so large that the rest only chooses among flat meshes.
+DECISIVE = 1e9
 
-#: Nor does the last stage end before the greatest distance from a plane / ℓ is below this.
-FLAT_ENOUGH = 1e-4
+#: Distances from planes / ℓ below this are rounding; Newton's method takes at most so many steps to it.
+FLAT, NEWTON_STEPS = 1e-12, 12
 
-#: Corners leave the surface by about this / ℓ before the first step. A regular pattern on a saddle-shaped
-#: surface can become flat in mirrored ways and balances between them, so that the first dozens of steps would
-#: only wait for rounding to tip it over.
+#: Corners leave the surface by about this / ℓ before the first step. A regular pattern on a saddle can become
+#: flat in mirrored ways and balances between them, so that rounding would tip it over, here one way and there
+#: the other.
 NUDGE = 0.03
 
-#: Weight of the squared movement / ℓ²: energies that only know shapes would move the mesh by whole edges.
-ANCHOR = 10.0
-
-#: The same for quads that become flat, and the weight of the squared differences of the movement along edges
-#: / ℓ². Near any surface quads can become flat by waves from row to row, like bellows; smooth nets of flat
-#: quads may lie further away. (Hexagons on a saddle become flat by moving apart, and so they do without.)
-QUAD_ANCHOR, EVENNESS = 1.0, 10.0
-
-#: Damping relative to 1/ℓ², how it changes after a good and after a bad step, and its least value.
-DAMPING, EASE, TIGHTEN, LEAST_DAMPING = 1e-3, 0.2, 8.0, 1e-9
+#: Cosine of the angle to the normal above which the way to the nearest point leads off a boundary.
+ASLANT = 0.7
 
 #: A step is halved at most down to this fraction.
 SHORTEST = 1e-3
 
-#: Most corrections at the end that see the planes only.
-MOST_CORRECTIONS = 5
+
+@dataclass(frozen=True)
+class Aims:
+    """What is asked of the mesh, see the head of this module. flat: whether faces must become flat."""
+
+    weights: Weights
+    anchor: float
+    evenness: float
+    flat: bool
+
+
+#: As near to the surface, and to the pattern on it, as flat faces can be. A movement along the surface costs
+#: a tenth of one off it.
+NEAREST = Aims(Weights(planarity=0.0, angle=0.0, edge=0.0, surface=1.0), anchor=0.1, evenness=0.1, flat=True)
+
+
+def functionals(weights: Weights) -> Aims:
+    """The paper's. They know shapes only, and would move the mesh by whole edges without a stronger anchor.
+    Faces become flat where planarity has a weight."""
+    return Aims(weights, anchor=10.0, evenness=0.1, flat=weights.planarity > 0)
 
 
 @dataclass(frozen=True)
 class _Group:
-    """Cells with the same number of corners. corner: (q, p) pattern vertices; length: (q,) targets; edge:
-    (q, p, 3) the cells' edges."""
+    """Cells with the same number of corners. corner: (q, p) pattern vertices; length: (q,) target lengths;
+    across: (m, p), applied to corners, those on one edge minus those on the opposite one."""
 
     corner: Ints
     length: Floats
     regular: bool
-    edge: Floats
+    across: Floats
 
 
 @dataclass(frozen=True)
 class _State:
-    """points: (n, 3). residual: of each part, (q, m), see ``_Problem``; pull: (n, 3) the anchor's.
-    asked, planes: energy of what was asked for, and of the plane distances."""
+    """points: (n, 3). residual: of each part, see ``_Problem``; pull: (n, 3) the anchor's. asked, planes:
+    energy of what was asked for, and of the plane distances, at the stage's weight."""
 
     points: Floats
     residual: tuple[Floats, ...]
@@ -91,88 +113,81 @@ class _State:
 def minimise_watertight(
     pattern: Pattern,
     length: Floats,
-    weights: Weights,
-    surface: TriangleTree | None,
+    aims: Aims,
+    surface: Surface,
     progress: Progress = no_progress,
 ) -> tuple[Floats, Floats]:
-    """New places (p, 3) of the pattern's vertices, and the energy (weights as asked for) after each step.
+    """New places (p, 3) of the pattern's vertices, and the energy (what was asked for) after each step.
 
-    length: (cells,) target edge lengths. Angles count in whole cells only. Damped Gauss–Newton with a weak
-    anchor. Where planarity has a weight, the distances from the faces' planes are added, weighing more
-    from stage to stage, until faces are flat; and quads are to move evenly.
+    length: (cells,) target edge lengths. Angles count in whole cells with the usual number of corners only.
     """
-    weights, factor = bounded(weights)
-    flat = weights.planarity > 0
-    problem = _Problem(pattern, length, weights, surface, even=flat and pattern.kind == "quad")
-    state = problem.at(pattern.vertices, 0.0)
-    curve = [state.asked]
-    damping = DAMPING
-    if flat and problem.bend(state.points) >= FLAT:
-        state = problem.at(state.points + NUDGE * problem.unit * _nudges(pattern), 0.0)
-    for stage in range(STAGES if flat else 1):
-        flatness = weights.planarity * FIRST_FLATNESS * 10.0**stage
-        state = problem.at(state.points, flatness)
-        last = flat and stage == STAGES - 1
-        enough = ONLY_DECREASE if not flat else LAST_DECREASE if last else DECREASE
-        for step in range(STEPS_PER_STAGE):
-            done = (stage + step / STEPS_PER_STAGE) / STAGES
-            progress(done, f"flatness weight {flatness:.0e}, energy {state.energy:.3e}")
-            problem.linearise(state, flatness, damping)
-            found, fraction = _search(problem, state, flatness)
-            damping = max(damping * (EASE if fraction == 1 else TIGHTEN), LEAST_DAMPING)
-            if fraction == 0:
-                continue
-            slow = state.energy - found.energy < enough * state.energy
-            state = found
-            curve.append(state.asked)
-            if slow and not (last and problem.bend(state.points) > FLAT_ENOUGH):
+    weights, factor = bounded(aims.weights)
+    problem = _Problem(pattern, length, replace(aims, weights=weights), surface)
+    stages = FLATNESS if aims.flat else (0.0,)
+    enough = DECREASE if aims.flat else ONLY_DECREASE
+    points = pattern.vertices
+    curve: list[float] = []
+    if aims.flat and problem.bend(points) >= FLAT:
+        points = points + NUDGE * pattern.edge_length * _nudges(pattern)
+    for stage, flatness in enumerate(stages):
+        for step in range(STEPS_PER_STAGE if aims.flat else 3 * STEPS_PER_STAGE):
+            state = problem.linearise(points, flatness)
+            if not curve:
+                curve.append(state.asked)
+            done = (stage + step / STEPS_PER_STAGE) / (len(stages) + 1)
+            progress(min(done, 1.0), f"flatness weight {flatness:.0e}, energy {state.energy:.3e}")
+            found = _search(problem, state)
+            if found is None:
                 break
-        if problem.bend(state.points) < FLAT:
-            break
-    if flat:
-        state = _flattened(problem, state, flatness)
-        curve.append(state.asked)
-    return state.points, factor * np.array(curve)
+            points = found.points
+            curve.append(found.asked)
+            if state.energy - found.energy < enough * state.energy:
+                break
+    if aims.flat:
+        progress(0.9, "flattening")
+        points = _flattened(problem, points)
+        curve.append(problem.linearise(points, 0.0).asked)
+    return points, factor * np.array(curve)
 
 
-def _search(problem: _Problem, state: _State, flatness: float) -> tuple[_State, float]:
-    """A state of less energy, and the fraction of the step that led there: 0 where none was found.
+def _search(problem: _Problem, state: _State) -> _State | None:
+    """A state of less energy, None where none was found.
 
     Faces turn as they move, so that a long step leaves their planes. A second step from where the first one
     ends, with the same derivatives and so without another factorisation, leads back to them (second-order
     correction; Fletcher 1982). If that is not enough, both are shortened along t·step + t²·correction.
     """
     step = problem.step(state)
-    best = problem.at(state.points + step, flatness)
+    best = problem.at(state.points + step)
     correction = np.zeros_like(step)
     if np.isfinite(best.energy):
         correction = problem.step(best)
-        corrected = problem.at(best.points + correction, flatness)
+        corrected = problem.at(best.points + correction)
         best = corrected if corrected.energy < best.energy else best
     fraction = 1.0
     while not best.energy < state.energy:  # nor where it is no number
         fraction /= 2
         if fraction < SHORTEST:
-            return state, 0.0
-        best = problem.at(state.points + fraction * step + fraction**2 * correction, flatness)
-    return best, fraction
+            return None
+        best = problem.at(state.points + fraction * step + fraction**2 * correction)
+    return best
 
 
-def _flattened(problem: _Problem, state: _State, flatness: float) -> _State:
-    """The nearest flat mesh: however heavy, a weight leaves distances that the other energies still pull at.
-
-    "Nearest" in the sense of the matrix factorised last, so that the other energies change least.
-    """
-    bend = problem.bend(state.points)
-    for _ in range(MOST_CORRECTIONS):
-        tried = problem.at(state.points + problem.step(state, planes_only=True), flatness)
-        if not tried.planes < state.planes / 2:
+def _flattened(problem: _Problem, points: Floats) -> Floats:
+    """The nearest flat mesh: however heavy, a penalty leaves distances that the rest still pulls at."""
+    for _ in range(NEWTON_STEPS):
+        state = problem.linearise(points, DECISIVE)
+        step, fraction = problem.step(state, planes_only=True), 1.0
+        best = problem.at(points + step)
+        while not best.planes < state.planes and fraction > SHORTEST:
+            fraction /= 2
+            best = problem.at(points + fraction * step)
+        if not best.planes < state.planes:
             break
-        reached = problem.bend(tried.points)
-        if reached > bend:
+        points = best.points
+        if problem.bend(points) < FLAT:
             break
-        state, bend = tried, reached
-    return state
+    return points
 
 
 def _nudges(pattern: Pattern) -> Floats:
@@ -192,40 +207,50 @@ class _Problem:
     """Residuals of all cells over the shared vertices.
 
     Its parts are the groups of cells with the same number p of corners, whose last p residuals are the
-    distances from their planes; and, where the surface counts, the vertices' distances from it. unit: mean
-    target length. even: whether differences of the movement count.
+    distances from their planes; and the vertices' distances from the surface, which between two
+    linearisations is seen as the plane through each vertex' nearest point. unit: mean target length.
     """
 
-    def __init__(
-        self,
-        pattern: Pattern,
-        length: Floats,
-        weights: Weights,
-        surface: TriangleTree | None,
-        *,
-        even: bool,
-    ) -> None:
+    def __init__(self, pattern: Pattern, length: Floats, aims: Aims, surface: Surface) -> None:
+        self._aims = aims
         self._groups = _groups(pattern, length)
-        self._weights = weights
         self._surface = surface
         self._start = pattern.vertices
-        self.unit = float(length.mean())
-        self._even = even
-        self._anchor = np.sqrt(QUAD_ANCHOR if even else ANCHOR) / self.unit
+        self._unit = float(length.mean())
         self._corners = [group.corner for group in self._groups]
-        if surface is not None:
+        if aims.weights.surface:
             self._corners.append(np.arange(len(pattern.vertices))[:, None])
         self._matrix = CellMatrix(pattern.vertices, self._corners)
+        self._flatness = 0.0
+        self._from = pattern.vertices
         self._slopes: list[Floats] = []
+        self._away: Floats = np.zeros((0, 1))
 
-    def at(self, points: Floats, flatness: float) -> _State:
+    def linearise(self, points: Floats, flatness: float) -> _State:
+        """Takes the derivatives there, with that weight of the planes, and gives the state."""
+        self._flatness, self._from, self._slopes = flatness, points, []
+        for g in self._groups:
+            corner = points[g.corner]
+            shape = self._shape_slopes(g, corner)
+            plane = np.sqrt(flatness) * plane_slopes(corner, g.length)
+            slope = np.concatenate([shape, plane], axis=1)
+            self._slopes.append(slope.reshape(*slope.shape[:2], -1))
+        weight = self._aims.weights.surface
+        if weight:
+            away, direction = _beside(points, self._surface)
+            self._away = np.sqrt(weight) / self._unit * away[:, None]
+            self._slopes.append(np.sqrt(weight) / self._unit * direction[:, None])
+        self._matrix.factorise(self._slopes, self._aims.anchor / self._unit**2)
+        return self.at(points)
+
+    def at(self, points: Floats) -> _State:
         """The energy is ∞ where a step went so far that squares overflow."""
         with np.errstate(all="ignore"):
-            return self._at(points, flatness)
+            return self._at(points)
 
-    def _at(self, points: Floats, flatness: float) -> _State:
-        pull = self._anchor * (points - self._start)
-        root = np.sqrt(flatness)
+    def _at(self, points: Floats) -> _State:
+        pull = np.sqrt(self._aims.anchor) / self._unit * (points - self._start)
+        root = np.sqrt(self._flatness)
         residual, asked, planes = [], _square(pull), 0.0
         try:
             for g in self._groups:
@@ -235,71 +260,68 @@ class _Problem:
                 residual.append(np.concatenate([shape, plane], axis=1))
                 asked, planes = asked + _square(shape), planes + _square(plane)
         except np.linalg.LinAlgError:
-            return _State(points, (), pull, np.inf, 0.0)
-        if self._surface is not None:
-            away = self._to_surface(points, self._surface)[0]
+            return _State(points, (), pull, np.inf, np.inf)
+        if self._aims.weights.surface:
+            slope = self._slopes[-1][:, 0]
+            away = self._away + np.einsum("nd,nd->n", slope, points - self._from)[:, None]
             residual.append(away)
             asked += _square(away)
         return _State(points, tuple(residual), pull, asked, planes)
 
     def _shape(self, g: _Group, corner: Floats) -> Floats:
         """(q, r) what is asked of the cells' shapes."""
-        shape = residuals(corner, g.length, self._weights, angles=g.regular)
-        if not self._even:
-            return shape
-        change = (edges_of(corner) - g.edge) * (np.sqrt(EVENNESS) / g.length)[:, None, None]
+        moved = corner - self._start[g.corner]
+        change = (np.sqrt(self._aims.evenness) / self._unit) * (g.across @ moved)
+        shape = residuals(corner, g.length, self._aims.weights, angles=g.regular)
         return np.concatenate([change.reshape(len(change), -1), shape], axis=1)
 
     def _shape_slopes(self, g: _Group, corner: Floats) -> Floats:
         """(q, r, p, 3) derivatives of it by the corners."""
-        shape = jacobian(corner, g.length, self._weights, angles=g.regular)
-        if not self._even:
-            return shape
-        p = corner.shape[1]
-        step = np.einsum("kc,xy->kxcy", np.roll(np.eye(p), 1, axis=1) - np.eye(p), np.eye(3))
-        change = step.reshape(3 * p, p, 3) * (np.sqrt(EVENNESS) / g.length)[:, None, None, None]
+        q, p, _ = corner.shape
+        change = np.einsum("kc,xy->kxcy", g.across, np.eye(3)).reshape(-1, p, 3)
+        change = np.broadcast_to(np.sqrt(self._aims.evenness) / self._unit * change, (q, *change.shape))
+        shape = jacobian(corner, g.length, self._aims.weights, angles=g.regular)
         return np.concatenate([change, shape], axis=1)
 
     def bend(self, points: Floats) -> float:
-        """Greatest distance of a corner from its face's plane / ℓ."""
-        return float(max(np.abs(plane_distances(points[g.corner], g.length)).max() for g in self._groups))
-
-    def linearise(self, state: _State, flatness: float, damping: float) -> None:
-        """Takes the derivatives at a state; damping is relative to 1/ℓ²."""
-        self._slopes = []
-        for g in self._groups:
-            corner = state.points[g.corner]
-            shape = self._shape_slopes(g, corner)
-            plane = np.sqrt(flatness) * plane_slopes(corner, g.length)
-            slope = np.concatenate([shape, plane], axis=1)
-            self._slopes.append(slope.reshape(*slope.shape[:2], -1))
-        if self._surface is not None:
-            self._slopes.append(self._to_surface(state.points, self._surface)[1])
-        self._matrix.factorise(self._slopes, self._anchor**2 + damping / self.unit**2)
+        """Greatest distance of a corner from its face's plane / ℓ; ∞ where points are no numbers."""
+        with np.errstate(all="ignore"):
+            try:
+                return float(
+                    max(np.abs(plane_distances(points[g.corner], g.length)).max() for g in self._groups)
+                )
+            except np.linalg.LinAlgError:
+                return np.inf
 
     def step(self, state: _State, *, planes_only: bool = False) -> Floats:
         """(n, 3) Gauss–Newton step from a state with the derivatives taken last."""
-        gradient = np.zeros(state.points.size) if planes_only else self._anchor * state.pull.ravel()
-        for g, slope, residual in zip(self._groups, self._slopes, state.residual, strict=False):
-            some = slice(-g.corner.shape[1] if planes_only else 0, None)
-            gradient += self._spread(g.corner, slope[:, some], residual[:, some])
-        if self._surface is not None and not planes_only:
-            gradient += (self._slopes[-1] * state.residual[-1][..., None]).ravel()
+        gradient = np.zeros(state.points.size)
+        if not planes_only:
+            gradient += np.sqrt(self._aims.anchor) / self._unit * state.pull.ravel()
+        parts = len(self._groups) if planes_only else len(self._corners)
+        for corner, slope, residual in zip(self._corners[:parts], self._slopes, state.residual, strict=False):
+            some = slice(-corner.shape[1] if planes_only else 0, None)
+            share = (residual[:, None, some] @ slope[:, some]).ravel()
+            at = 3 * corner[..., None] + np.arange(3)
+            gradient += np.bincount(at.ravel(), weights=share, minlength=gradient.size)
         return -self._matrix.solve(gradient).reshape(-1, 3)
 
-    def _spread(self, corner: Ints, slope: Floats, residual: Floats) -> Floats:
-        """(3n,) Jᵀ r, summed over cells."""
-        share = (residual[:, None] @ slope).ravel()
-        at = 3 * corner[..., None] + np.arange(3)
-        return np.asarray(
-            np.bincount(at.ravel(), weights=share, minlength=self._start.size), dtype=np.float64
-        )
 
-    def _to_surface(self, points: Floats, surface: TriangleTree) -> tuple[Floats, Floats]:
-        """(n, 1) residuals and (n, 1, 3) derivatives."""
-        value, slope = surface_residuals(points, np.full(len(points), self.unit), surface)
-        root = np.sqrt(self._weights.surface)
-        return root * value[:, None], root * slope[:, None]
+def _beside(points: Floats, surface: Surface) -> tuple[Floats, Floats]:
+    """(n,) distances from the surface, along (n, 3) unit vectors.
+
+    These are the normals, interpolated, so that facets leave no print; but beyond a boundary, where the way
+    back is not along them, those from the nearest points.
+    """
+    nearest = surface.tree.nearest(points)
+    face = surface.faces[nearest.face]
+    spoke = np.einsum("nc,ncd->nd", nearest.barycentric, points[:, None] - surface.vertices[face])
+    normal = np.einsum("nc,ncd->nd", nearest.barycentric, surface.normals[face])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1), np.finfo(float).tiny)[:, None]
+    along = np.einsum("nd,nd->n", normal, spoke)
+    beyond = np.abs(along) < ASLANT * nearest.distance
+    direction = np.where(beyond[:, None], spoke / np.maximum(nearest.distance, 1e-300)[:, None], normal)
+    return np.where(beyond, nearest.distance, along), direction
 
 
 def _square(residual: Floats) -> float:
@@ -307,7 +329,7 @@ def _square(residual: Floats) -> float:
 
 
 def _groups(pattern: Pattern, length: Floats) -> list[_Group]:
-    faces: Ragged = pattern.faces
+    faces = pattern.faces
     p = np.bincount(faces.lengths[pattern.whole]).argmax() if pattern.whole.any() else 0
     regular = pattern.whole & (faces.lengths == p)
     groups = []
@@ -316,5 +338,13 @@ def _groups(pattern: Pattern, length: Floats) -> list[_Group]:
             chosen = np.flatnonzero((faces.lengths == count) & (regular == even))
             if len(chosen):
                 corner = faces.values[faces.offsets[chosen][:, None] + np.arange(count)].astype(np.int64)
-                groups.append(_Group(corner, length[chosen], even, edges_of(pattern.vertices[corner])))
+                groups.append(_Group(corner, length[chosen], even, _across(int(count))))
     return groups
+
+
+def _across(p: int) -> Floats:
+    """(p, p) from each corner to the one across the cell by a translation that takes an edge to the opposite
+    one; (0, p) where p is odd, and no edges are opposite."""
+    if p % 2:
+        return np.zeros((0, p))
+    return np.asarray((np.roll(np.eye(p), p // 2 - 1, axis=1) - np.eye(p)) / np.sqrt(2))

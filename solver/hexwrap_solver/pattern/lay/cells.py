@@ -12,8 +12,8 @@ from hexwrap_solver.arrays import Bools, Ints, Ragged
 from hexwrap_solver.pattern.lattice import Lattice
 from hexwrap_solver.pattern.lay.edges import PatternEdges
 
-#: A cell at a singularity has at most so many sides more than others.
-MOST_EXTRA_SIDES = 6
+#: Around a singularity there are at most so many sectors more than elsewhere.
+MOST_EXTRA = 6
 
 
 @dataclass(frozen=True)
@@ -22,12 +22,13 @@ class Cells:
 
     corner: points per cell, counter-clockwise. isometry: (sides, 4) carry the corners' own coordinates to
     those of the cell's first one. twin: (sides,) the same side of the neighbouring cell, −1 where there is
-    none.
+    none. index: (cells,) k around a singularity, else 0.
     """
 
     corner: Ragged
     isometry: Ints
     twin: Ints
+    index: Ints
 
     @property
     def n(self) -> int:
@@ -50,17 +51,20 @@ class Cells:
             Ragged(self.corner.values[side], offsets),
             self.isometry[side],
             np.where(twin >= 0, renumber[twin], -1),
+            self.index[keep],
         )
 
 
 @dataclass(frozen=True)
 class WholeCells:
-    """Cells whose edges all run inside the domain: corner: nodes per cell. direction, isometry: (sides,) and
-    (sides, 4) of each side in its corner's own coordinates, and of these to the cell's first corner's."""
+    """Cells whose edges all run inside the domain: corner: nodes per cell. slot: (sides,) of each side at its
+    corner; isometry: (sides, 4) from the corner's own coordinates to the first corner's. index: (cells,) k
+    where a singularity of that index lies inside, else 0."""
 
     corner: Ragged
-    direction: Ints
+    slot: Ints
     isometry: Ints
+    index: Ints
 
     @property
     def n(self) -> int:
@@ -72,63 +76,75 @@ class WholeCells:
         side = np.repeat(keep, self.corner.lengths)
         offsets = np.concatenate([[0], np.cumsum(self.corner.lengths[keep])])
         corner = Ragged(self.corner.values[side], offsets)
-        return WholeCells(corner, self.direction[side], self.isometry[side])
+        return WholeCells(corner, self.slot[side], self.isometry[side], self.index[keep])
 
 
 def whole_cells(lattice: Lattice, edges: PatternEdges) -> WholeCells:
     """Walks that come back after as many sides as a cell has, or fewer or more around a singularity.
 
     A walk that has gone around the surface (w of its isometry) bounds no cell. Otherwise it bounds a disk, or
-    a disk with boundary loops inside that no edge of the pattern meets; see ``enclosed_loops``.
+    a disk with boundary loops inside that no edge of the pattern meets; see ``enclosed_loops``. By how much
+    it turns altogether tells the index of what it encloses: (order − k)/order of a full turn.
     """
-    order, turned = lattice.order, edges.isometries[:, 0]
     start = np.flatnonzero(edges.head.ravel() >= 0)
-    node, way = start // order, start % order
+    node, slot = start // edges.width, start % edges.width
     products = np.zeros((1, 4), dtype=np.int64)  # of the gluings met: few walks meet any
     product = np.zeros(len(start), dtype=np.int64)  # which of them each walk has met, 0: none
-    walk = np.arange(len(start))
+    walk, turned = np.arange(len(start)), np.zeros(len(start), dtype=np.int64)
     first, visits = start, []
-    closed = np.zeros(len(start), dtype=bool)
-    for _ in range(lattice.sides + MOST_EXTRA_SIDES):
-        visits.append((walk, node, way, product))
-        gluing = edges.gluing[node, way]
-        node = edges.head[node, way]
-        way = (way - turned[gluing] + lattice.turn) % order
-        glued = np.flatnonzero(gluing)
-        if len(glued):
-            met = lattice.compose(products[product[glued]], edges.isometries[gluing[glued]])
+    closed, total = np.zeros(len(start), dtype=bool), np.zeros(len(start), dtype=np.int64)
+
+    def meet(which: Ints, isometry: Ints) -> None:
+        nonlocal products, product
+        if len(which):
+            met = lattice.compose(products[product[which]], isometry)
             product = product.copy()
-            product[glued] = len(products) + np.arange(len(glued))
+            product[which] = len(products) + np.arange(len(which))
             products = np.concatenate([products, met])
-        slot = node * order + way
-        back = (node >= 0) & (slot == first)
-        closed[walk[back]] = products[product[back], 3] == 0
+
+    for _ in range(lattice.sides + lattice.sides // lattice.order * MOST_EXTRA):
+        visits.append((walk, node, slot, product))
+        gluing, back = edges.gluing[node, slot], edges.back[node, slot]
+        node = edges.head[node, slot]
+        glued = np.flatnonzero(gluing)
+        meet(glued, edges.isometries[gluing[glued]])
+        slot, inner, passed = edges.clockwise(node, back % edges.width)
+        seam = np.flatnonzero(passed & (edges.around[node] != lattice.directions))
+        meet(seam, edges.seam[node[seam]])
+        turned = turned + lattice.directions // 2 - inner
+        number = edges.number(node, slot)
+        at_first = number == first
+        closed[walk[at_first]] = products[product[at_first], 3] == 0
+        total[walk[at_first]] = turned[at_first]
         # Each cell once, from its lowest side on; a walk that comes to a lower one is another's, or none.
-        going = (node >= 0) & (slot > first)
-        walk, first, node, way, product = (x[going] for x in (walk, first, node, way, product))
+        going = (edges.head[node, slot] >= 0) & (number > first)
+        walk, first, node, slot, product, turned = (
+            x[going] for x in (walk, first, node, slot, product, turned)
+        )
         if not len(walk):
             break
     kept = [closed[walk] for walk, *_ in visits]
-    walk, node, way, product = (
+    walk, node, slot, product = (
         np.concatenate([visit[i][keep] for visit, keep in zip(visits, kept, strict=True)]) for i in range(4)
     )
     sorted_by_walk = np.argsort(walk, kind="stable")
     lengths = np.bincount(walk, minlength=len(start))[closed]
     offsets = np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
+    index = (lattice.directions - total[closed]) // lattice.steps_per_turn
     isometry = products[product[sorted_by_walk]]
-    return WholeCells(Ragged(node[sorted_by_walk], offsets), way[sorted_by_walk], isometry)
+    return WholeCells(Ragged(node[sorted_by_walk], offsets), slot[sorted_by_walk], isometry, index)
 
 
-def sides_by_edge(lattice: Lattice, edges: PatternEdges, cells: WholeCells) -> Ints:
-    """(n·order,) the side that runs along each directed edge, −1 where there is none."""
+def sides_by_edge(edges: PatternEdges, cells: WholeCells) -> Ints:
+    """(n·width,) the side that runs along each directed edge, −1 where there is none."""
     side = np.full(edges.head.size, -1, dtype=np.int64)
-    side[cells.corner.values * lattice.order + cells.direction] = np.arange(len(cells.direction))
+    side[edges.number(cells.corner.values, cells.slot)] = np.arange(len(cells.slot))
     return side
 
 
-def only_whole_cells(lattice: Lattice, edges: PatternEdges, cells: WholeCells) -> Cells:
-    reverse = edges.reverse(lattice, cells.corner.values.astype(np.int64), cells.direction)
-    return Cells(cells.corner, cells.isometry, sides_by_edge(lattice, edges, cells)[reverse])
+def only_whole_cells(edges: PatternEdges, cells: WholeCells) -> Cells:
+    reverse = edges.back[cells.corner.values, cells.slot]
+    return Cells(cells.corner, cells.isometry, sides_by_edge(edges, cells)[reverse], cells.index)
 
 
 def largest_part(cells: Cells) -> Bools:

@@ -15,8 +15,8 @@ class Layout:
     corners: (m, 3) complex, the triangles. across: (m, 3) face beyond half-edge c → c + 1, −1 at the
     boundary; there stands the image of that face under isometries[crossing], (m, 3), of the table (t, 4) of
     lattice isometries, whose row 0 is the identity and whose inverses are the rows ``inverse``, (t,). twin:
-    (3m,) the same edge as a half-edge of the face beyond. tolerance: distance below which a point counts as
-    lying on an edge, lattice units.
+    (3m,) the same edge as a half-edge of the face beyond. cones: (s,) a corner 3·face + c at each
+    singularity. tolerance: distance below which a point counts as lying on an edge, lattice units.
     """
 
     corners: Complexes
@@ -25,6 +25,7 @@ class Layout:
     isometries: Ints
     inverse: Ints
     twin: Ints
+    cones: Ints
     lattice: Lattice
     tolerance: float
 

@@ -49,7 +49,7 @@ class Nodes:
 
     def near_edges(self, layout: Layout, distance: float) -> Bools:
         """(k, 3) which edges of its triangle each incidence lies on."""
-        place = layout.lattice.position(self.point)
+        place = layout.lattice.stand(self.point)
         return np.asarray(abs(edge_distances(layout.corners[self.face], place)) <= distance)
 
     def find(self, face: Ints, point: Ints) -> Ints:
@@ -108,9 +108,7 @@ def edge_distances(corners: Complexes, place: Complexes) -> Floats:
 def find_nodes(layout: Layout) -> Nodes:
     """All lattice nodes in the domain, each once, also on edges, at vertices and at the cut."""
     lattice = layout.lattice
-    face, point = lattice_points_in_triangles(lattice.coordinates(layout.corners), layout.tolerance)
-    wanted = lattice.is_node(point)
-    face, point = face[wanted], point[wanted]
+    face, point = _points_in_faces(layout)
     low = point.min(axis=0, initial=0)
     span = point.max(axis=0, initial=0) - low + 1
     if len(layout.corners) * int(span[0]) * int(span[1]) >= MOST_KEYS:
@@ -129,6 +127,20 @@ def find_nodes(layout: Layout) -> Nodes:
     own = incidence[starts[:-1]]
     isometry = _seen_from(own, first, second, layout.isometries[step], lattice, len(face))
     return Nodes(face, point, node, isometry, own, starts, incidence, keys, low, span)
+
+
+def _points_in_faces(layout: Layout) -> tuple[Ints, Ints]:
+    """Every face with every node that stands in it; those that stand off their points are looked for farther
+    around."""
+    lattice, tolerance = layout.lattice, layout.tolerance
+    far = lattice.reach / lattice.unit.imag  # in lattice coordinates
+    face, point = lattice_points_in_triangles(lattice.coordinates(layout.corners), tolerance + far)
+    wanted = lattice.is_node(point)
+    face, point = face[wanted], point[wanted]
+    if far:
+        inside = (edge_distances(layout.corners[face], lattice.stand(point)) >= -tolerance).all(axis=1)
+        face, point = face[inside], point[inside]
+    return face, point
 
 
 def _same_place(layout: Layout, found: Nodes) -> tuple[Ints, Ints, Ints]:

@@ -35,7 +35,7 @@ class Traces:
 
 
 def trace(layout: Layout, face: Ints, origin: Complexes, target: Ints) -> Traces:
-    """Straight lines from places, (k,), to lattice points, (k, 2), in the coordinates of the first triangle.
+    """Straight lines from places, (k,), to nodes, (k, 2), in the coordinates of the first triangle.
 
     A boundary vertex on the way can be passed on two sides; what fails on one side is tried on the other.
     """
@@ -63,7 +63,7 @@ def _trace(layout: Layout, face: Ints, origin: Complexes, target: Ints, *, pass_
     active = np.arange(len(face))
     for _ in range(len(layout.corners) + 3):  # a straight line as short as these meets no triangle twice
         corners = layout.corners[face[active]]
-        goal = lattice.position(target[active])
+        goal = lattice.stand(target[active])
         beyond = edge_distances(corners, goal) < -tolerance
         moving = beyond.any(axis=1)
         active, corners, goal, beyond = active[moving], corners[moving], goal[moving], beyond[moving]

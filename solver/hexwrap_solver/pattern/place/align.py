@@ -39,10 +39,11 @@ from hexwrap_solver.arrays import Complexes, Floats, Ints
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.pattern.lattice import Isometry, Lattice
 from hexwrap_solver.pattern.place.deform import System, deform, distortion_of
+from hexwrap_solver.pattern.place.features import Chain, FeatureLines, lines_from
 from hexwrap_solver.pattern.place.glued import Glued
 from hexwrap_solver.pattern.place.meeting import meeting
 from hexwrap_solver.pattern.place.placement import Placement, edge_angle
-from hexwrap_solver.pattern.place.rows import Rows, rows_along
+from hexwrap_solver.pattern.place.rows import rows_along
 from hexwrap_solver.pattern.place.sides import Lines, Sides, lines_of, sides_of
 from hexwrap_solver.pattern.place.size import edges_around, size_spread, wanted_edge, width_per_cell
 from hexwrap_solver.pattern.place.strain import Strain
@@ -59,9 +60,15 @@ COST_OF_SIZE, COST_OF_CORNERS = 0.002, 0.004
 #: tip goes before the two corners beside it.
 COST_OF_LOPSIDED = 3.0
 
+#: Parallel lines of a lattice are of this many kinds at most, up to translations.
+MOST_LINES = 3
+
 #: So many placements with the least mean strain are compared by their sharp one, and so many of these, in
 #: order, are deformed, until one of them distorts by less than ENOUGH.
 COMPARED, DEFORMED, ENOUGH = 12, 3, 0.03
+
+#: With features: sizes that are tried at most, and places along the first side.
+SCALES_OF_FEATURES, PHASES = 61, 48
 
 
 @dataclass(frozen=True)
@@ -85,15 +92,18 @@ class _Trial:
 
 @dataclass(frozen=True)
 class _Frame:
-    """The sides turned to the lattice's directions. normal: (s,) inward; depth: (s,) of the sides at scale 1,
-    from the apex or the layout's origin; unit: the turn common to all; around: cells that are asked for."""
+    """The sides turned to the lattice's directions. first, period: (s,) of the lattice lines of each side.
+    normal: (s,) inward; depth: (s,) of the sides at scale 1, from the apex or the layout's origin; unit: the
+    turn common to all; around: cells that are asked for. spread: instead of the freedom of the size that goes
+    with what is asked, where not None."""
 
     cmap: ConformalMap
     lattice: Lattice
     turns: int
     around: int | None
     sides: Sides
-    rows: Rows
+    first: Floats
+    period: Floats
     normal: Complexes
     depth: Floats
     unit: complex
@@ -109,8 +119,9 @@ class _Frame:
     def following(self) -> tuple[Ints, Ints]:
         """(s,) the side after each, and the sheet on which the frame of the loop shows it: the first one
         comes again a turn further."""
-        side, sheet = np.arange(1, self.sides.n + 1), np.zeros(self.sides.n, dtype=np.int64)
-        for loop in np.unique(self.sides.loop):
+        bounding = int((self.sides.loop >= 0).sum())
+        side, sheet = np.arange(1, bounding + 1), np.zeros(bounding, dtype=np.int64)
+        for loop in np.unique(self.sides.loop[self.sides.loop >= 0]):
             members = np.flatnonzero(self.sides.loop == loop)
             side[members[-1]] = members[0]
             sheet[members[-1]] = self.sides.sheet[self.sides.side == members[-1]][-1]
@@ -125,34 +136,39 @@ class Straightening:
     lines: Lines
     system: System
     strain: Strain
+    features: FeatureLines | None = None
 
     @classmethod
     def of(
-        cls, cmap: ConformalMap, lattice: Lattice, settings: PatternSettings, turns: int, loops: list[int]
+        cls,
+        cmap: ConformalMap,
+        lattice: Lattice,
+        settings: PatternSettings,
+        turns: int,
+        loops: list[int],
+        chains: list[Chain] | None = None,
     ) -> Straightening:
-        """settings: their sizes do not matter. loops: the ones to straighten, polygons."""
-        frame = _frame(cmap, lattice, settings, turns, loops)
+        """settings: their sizes do not matter. loops: the ones to straighten, polygons. chains: features to
+        straighten."""
         rotation = Isometry(lattice, turns, (0, 0))
+        frame, features = _frame(cmap, lattice, settings, rotation, loops, chains or [])
         lines = lines_of(len(cmap.uv), frame.sides, frame.normal, rotation)
         system = System(cmap, Glued.by_sheets(cmap, rotation), lines.normal)
-        return cls(frame, lines, system, Strain.of(system, frame.sides, lines, frame.turned))
+        return cls(frame, lines, system, Strain.of(system, frame.sides, lines, frame.turned), features)
 
 
-def place_by_sides(straightening: Straightening, settings: PatternSettings) -> Placement:
-    """Scale, centre and lines whose deformation distorts least, then that deformation."""
+def place_by_sides(
+    straightening: Straightening, settings: PatternSettings, spread: float | None = None
+) -> Placement:
+    """Scale, centre and lines whose deformation distorts least, then that deformation.
+
+    spread: relative freedom of the size, instead of what goes with the size asked for.
+    """
     frame, lines = replace(straightening.frame, around=settings.around), straightening.lines
     system, strain = straightening.system, straightening.strain
     cmap, lattice = frame.cmap, frame.lattice
     angle = edge_angle(lattice, settings)
-    if cmap.deck.apex is None:
-        edges_around(cmap, lattice, settings, angle)
-    size = lattice.edge / wanted_edge(cmap, lattice, settings, angle)
-    spread = size_spread(settings)
-    trials = [
-        trial
-        for x in np.linspace(-1, 1, SCALES)
-        for trial in _trials_at(frame, strain, size * (1 + spread * x) * frame.unit, COST_OF_SIZE * x**2)
-    ]
+    trials = _trials(straightening, settings, spread)
     tried = []
     for trial in _best_of(trials, strain)[:DEFORMED]:
         rest = trial.scale * (cmap.uv - (cmap.deck.apex or 0)) + trial.origin
@@ -172,41 +188,117 @@ def place_by_sides(straightening: Straightening, settings: PatternSettings) -> P
     return Placement.on_annulus(cmap, place, best.motion, angle, around, distortion, notes)
 
 
+def predicted(
+    straightening: Straightening, settings: PatternSettings, spread: float | None = None
+) -> tuple[Floats, float]:
+    """(m,) predicted ratios of singular values − 1 of the best way to place the pattern, and its cost."""
+    strain = straightening.strain
+    best = _best_of(_trials(straightening, settings, spread), strain)[0]
+    return strain.ratios(best.moved, abs(best.scale)), best.cost(strain.sharp(best.moved))
+
+
+def _trials(
+    straightening: Straightening, settings: PatternSettings, spread: float | None = None
+) -> list[_Trial]:
+    frame, strain = replace(straightening.frame, around=settings.around), straightening.strain
+    cmap, lattice = frame.cmap, frame.lattice
+    angle = edge_angle(lattice, settings)
+    if cmap.deck.apex is None:
+        edges_around(cmap, lattice, settings, angle)
+    size = lattice.edge / wanted_edge(cmap, lattice, settings, angle)
+    spread = size_spread(settings) if spread is None else spread
+    if spread > size_spread(settings):
+        frame = replace(frame, around=None)
+    return [
+        trial
+        for x in _sizes(frame, size, spread)
+        for trial in _trials_at(frame, strain, size * (1 + spread * x) * frame.unit, COST_OF_SIZE * x**2)
+    ]
+
+
+def _sizes(frame: _Frame, size: float, spread: float) -> Floats:
+    """Sizes to try, from −1 to 1. With features on a cylinder, those at which a row of cells closes up, once
+    each; for then the places along it are tried, too."""
+    if not (frame.sides.loop < 0).any():
+        return np.linspace(-1, 1, SCALES)
+    if not frame.sides.closed.any() or frame.turns:
+        return np.linspace(-1, 1, SCALES_OF_FEATURES)
+    row = frame.lattice.shortest_towards(frame.unit * frame.cmap.deck.translation)
+    cells = size * abs(frame.cmap.deck.translation) / abs(complex(frame.lattice.position(row)))
+    near = np.arange(np.ceil(cells * (1 - spread)), cells * (1 + spread) + 1e-9)
+    near = np.unique(np.append(near, max(1.0, round(cells))))
+    near = near[np.argsort(abs(near - cells), kind="stable")][:SCALES_OF_FEATURES]
+    return np.asarray((near / cells - 1) / max(spread, 1e-9))
+
+
 def _frame(
-    cmap: ConformalMap, lattice: Lattice, settings: PatternSettings, turns: int, loops: list[int]
-) -> _Frame:
+    cmap: ConformalMap,
+    lattice: Lattice,
+    settings: PatternSettings,
+    rotation: Isometry,
+    loops: list[int],
+    chains: list[Chain],
+) -> tuple[_Frame, FeatureLines | None]:
     angle = edge_angle(lattice, settings)
     sides = sides_of(cmap, lattice, loops)
-    zero = complex(lattice.position(lattice.steps[0])) / lattice.edge * np.exp(-1j * angle)
+    zero = complex(lattice.forward * np.exp(-1j * angle))
     turn = _turns(cmap, lattice, sides, zero)
+    unit = _common(cmap, lattice, turn, zero, chains)
     # Directions are exact up to rounding of the boundary angles; from here on they are exact.
     steps = np.rint(np.angle(sides.direction * turn / zero) / lattice.quantum)
     normal = 1j * zero * np.exp(1j * lattice.quantum * steps)
-    return _Frame(
+    rows = rows_along(lattice, angle, settings.boundary)
+    first, period = np.full(sides.n, rows.first), np.full(sides.n, rows.period)
+    features = None
+    if chains:
+        features = lines_from(cmap, chains, rotation, zero, unit, sides, normal)
+        halves = np.rint(np.angle(features.normal / (1j * zero)) / (lattice.quantum / 2))
+        own = [rows_along(lattice, angle + half * lattice.quantum / 2, "trim") for half in halves.tolist()]
+        sides = sides.and_also(features.sides)
+        normal = np.concatenate([normal, features.normal])
+        first = np.concatenate([first, [rows.first for rows in own]])
+        period = np.concatenate([period, [rows.period for rows in own]])
+        turn = np.concatenate([turn, np.full(len(own), unit)])
+    frame = _Frame(
         cmap,
         lattice,
-        turns,
+        rotation.turns,
         settings.around,
         sides,
-        rows_along(lattice, angle, settings.boundary),
+        first,
+        period,
         normal,
         _mean_depth(cmap, sides, normal, turn),
-        complex(turn.mean() / abs(turn.mean())),
+        unit,
     )
+    return frame, features
+
+
+def _common(
+    cmap: ConformalMap, lattice: Lattice, turn: Complexes, zero: complex, chains: list[Chain]
+) -> complex:
+    """The turn common to all sides; of features alone, that of one turn around, or of the longest one."""
+    if len(turn):
+        return complex(turn.mean() / abs(turn.mean()))
+    along = cmap.deck.translation if cmap.deck.apex is None else 0j
+    if along == 0:
+        along = max(chains, key=lambda chain: chain.length).axis
+    return zero * abs(along) / along
 
 
 def _trials_at(frame: _Frame, strain: Strain, scale: complex, cost_of_size: float) -> list[_Trial]:
     """For every centre the best lines at one scale."""
-    lattice, sides, rows, normal = frame.lattice, frame.sides, frame.rows, frame.normal
+    lattice, sides, normal = frame.lattice, frame.sides, frame.normal
+    first, period = frame.first, frame.period
     trials = []
     for motion, origin in _origins(frame, scale):
         depth = frame.depth * abs(scale) + (normal.conj() * origin).real
-        moved = rows.first + rows.period * np.rint((depth - rows.first) / rows.period) - depth
+        moved = first + period * np.rint((depth - first) / period) - depth
         if frame.cmap.deck.apex is None:
             apart = complex(lattice.position(np.array(motion.shift))) - scale * frame.cmap.deck.translation
             moved = np.append(moved, [apart.real, apart.imag])
         moved = np.append(moved, abs(scale))
-        moved = strain.nearest(moved, rows.period, sides.n)
+        moved = strain.nearest(moved, period)
         line = depth + moved[: sides.n]
         extra = cost_of_size + COST_OF_CORNERS * _misplaced_corners(frame, motion, line)
         trials.append(_Trial(scale, origin, motion, line, moved, extra))
@@ -235,8 +327,8 @@ def _turns(cmap: ConformalMap, lattice: Lattice, sides: Sides, zero: complex) ->
     before: complex | None = None
     for loop in np.unique(loops):
         on = loops == loop
-        mean = complex((sides.length[on] * sides.direction[on] ** lattice.order).sum())
-        unit = zero / complex(np.exp(1j * np.angle(mean) / lattice.order))
+        mean = complex((sides.length[on] * sides.direction[on] ** lattice.fold).sum())
+        unit = zero / complex(np.exp(1j * np.angle(mean) / lattice.fold))
         if before is not None:
             steps = round(float(np.angle(before / unit)) / lattice.quantum)
             unit *= complex(np.exp(1j * lattice.quantum * steps))
@@ -261,7 +353,7 @@ def _mean_depth(cmap: ConformalMap, sides: Sides, normal: Complexes, turn: Compl
 def _origins(frame: _Frame, scale: complex) -> list[tuple[Isometry, complex]]:
     """Every way in which g can be a motion of the lattice, and where the apex, or the layout's origin, stands
     then: on a cone at the kinds of symmetry centres; for a translation as two sides may lie on lines."""
-    lattice, rows, normal = frame.lattice, frame.rows, frame.normal
+    lattice, normal, first = frame.lattice, frame.normal, frame.first
     if frame.cmap.deck.apex is not None:
         return symmetry_centres(lattice, frame.turns)
     shift = _translation(frame, scale * frame.cmap.deck.translation)
@@ -269,10 +361,15 @@ def _origins(frame: _Frame, scale: complex) -> list[tuple[Isometry, complex]]:
     depth = frame.depth * abs(scale)
     across = np.flatnonzero(abs((normal.conj() * normal[0]).imag) > 1e-6)
     if not len(across):
-        return [(motion, complex(normal[0] * (rows.first - depth[0])))]
+        return [(motion, complex(normal[0] * (first[0] - depth[0])))]
+    if (frame.sides.loop < 0).any():
+        # One side on a line; places along it, as features across it share what they cannot all have.
+        along = lattice.period_along(1j * normal[0])
+        places = along * np.arange(PHASES) / PHASES
+        return [(motion, complex(normal[0] * (first[0] - depth[0] + 1j * place))) for place in places]
     p, q = normal[0], normal[across[0]]
-    d = rows.first - depth[0]
-    lines = rows.first + rows.period * np.arange(lattice.cosets) - depth[across[0]]
+    d = first[0] - depth[0]
+    lines = first[across[0]] + frame.period[across[0]] * np.arange(MOST_LINES) - depth[across[0]]
     return [(motion, complex(origin)) for origin in meeting(p, d, q, lines)]
 
 
@@ -284,7 +381,7 @@ def _translation(frame: _Frame, wanted: complex) -> Ints:
     lattice = frame.lattice
     if wanted == 0:  # a disk
         return np.zeros(2, dtype=np.int64)
-    if (np.bincount(frame.sides.loop) == 1).any():
+    if frame.sides.closed.any():
         row = lattice.shortest_towards(wanted)
         return np.asarray(max(1, round(abs(wanted) / abs(complex(lattice.position(row))))) * row)
     if frame.turns == 0 and frame.around is not None:
@@ -295,7 +392,7 @@ def _translation(frame: _Frame, wanted: complex) -> Ints:
 def symmetry_centres(lattice: Lattice, turns: int) -> list[tuple[Isometry, complex]]:
     """Motions p ↦ ζ^turns·p + τ that differ by more than a translation of the lattice, with their fixed
     points: centres of 6-, 4-, 3- or 2-fold symmetry, the highest first."""
-    zeta = np.exp(1j * lattice.quantum * turns)
+    zeta = np.exp(1j * lattice.step_angle * turns)
     e1 = complex(lattice.position(lattice.basis[0]))
     found: list[tuple[Isometry, complex]] = []
     reach = range(-2, 3)
@@ -318,9 +415,9 @@ def _misplaced_corners(frame: _Frame, motion: Isometry, line: Floats) -> float:
     lattice = frame.lattice
     following, sheet = frame.following
     shift = lattice.position(motion.apply(np.zeros((len(sheet), 2), dtype=np.int64), sheet))
-    p, d = frame.normal, line
-    q = p[following] * np.exp(1j * lattice.quantum * motion.rotation(sheet))
-    e = line[following] + (q.conj() * shift).real
+    p, d = frame.normal[: len(sheet)], line[: len(sheet)]
+    q = p[following] * np.exp(1j * lattice.step_angle * motion.rotation(sheet))
+    e = d[following] + (q.conj() * shift).real
     area = (p.conj() * q).imag
     inner = abs(area) > 1e-6
     p, q, d, e = p[inner], q[inner], d[inner], e[inner]

@@ -7,11 +7,18 @@ from functools import cached_property
 
 import numpy as np
 
+from hexwrap_solver.arrays import Bools, Floats
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.pattern.lattice import Lattice
-from hexwrap_solver.pattern.place.align import Straightening, place_by_sides, turn_between_loops
+from hexwrap_solver.pattern.place.align import (
+    Straightening,
+    place_by_sides,
+    predicted,
+    turn_between_loops,
+)
 from hexwrap_solver.pattern.place.cone import place_on_cone, place_on_flat_ring
 from hexwrap_solver.pattern.place.cylinder import place_on_cylinder
+from hexwrap_solver.pattern.place.features import Chain, chains_of, narrow, worth_following
 from hexwrap_solver.pattern.place.net import as_sheet, place_on_net
 from hexwrap_solver.pattern.place.placement import (
     BEARABLE,
@@ -24,7 +31,16 @@ from hexwrap_solver.pattern.place.placement import (
     quantum_turns,
 )
 from hexwrap_solver.pattern.place.sides import has_corners, is_polygon
+from hexwrap_solver.pattern.place.size import FREE, mean_stretch, wanted_edge
 from hexwrap_solver.pattern.types import PatternSettings
+
+#: Features are made straight where that costs no more than this at all but one triangle of a hundred, as
+#: predicted, and than that at the worst; above FINE, numbers of cells around further off are tried, too.
+P99, MOST_PREDICTED, MOST_DISTORTED, FINE = 0.99, 0.15, 1.5, 0.02
+#: Features are given up, the costliest first, in so many rounds.
+MOST_GIVEN_UP = 8
+#: So many are told one by one.
+MOST_TOLD = 4
 
 
 def place_lattice(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings) -> Placement:
@@ -36,7 +52,8 @@ def place_lattice(cmap: ConformalMap, lattice: Lattice, settings: PatternSetting
 class Placing:
     """Ways of placing that differ in the size of the cells alone: what they share is computed once.
 
-    loops: those to align. shape: settings whose sizes do not matter.
+    loops: those to align. features: numbers of those that cells are cut along. shape: settings whose sizes do
+    not matter.
     """
 
     cmap: ConformalMap
@@ -44,6 +61,7 @@ class Placing:
     shape: PatternSettings
     turns: int
     loops: list[int]
+    features: frozenset[int]
     notes: list[str]
 
     @classmethod
@@ -52,20 +70,150 @@ class Placing:
         cmap = as_sheet(cmap) if cmap.kind == "net" else quantized(cmap, lattice)
         loops, notes = loops_to_align(cmap, lattice, settings)
         turns = 0 if cmap.kind == "net" else quantum_turns(cmap, lattice)
-        return cls(cmap, lattice, settings, turns, loops, notes)
+        features: frozenset[int] = frozenset()
+        if cmap.surface.features:
+            every = cls(cmap, lattice, settings, turns, loops, features, notes)
+            cell = every.cell * mean_stretch(cmap)
+            features, told = worth_following(cmap.surface, cmap.surface.features, cell)
+            notes = [*notes, *told]
+        return cls(cmap, lattice, settings, turns, loops, features, notes)
 
     def at(self, settings: PatternSettings) -> Placement:
         """settings: those it was made for, but for the size."""
         cmap, lattice, loops = self.cmap, self.lattice, self.loops
+        along, told = self._along_features(settings)
         if cmap.kind == "net":
             placement = place_on_net(cmap, lattice, settings, loops)
+        elif along is not None:
+            placement = along
         elif self.is_cylinder and not any(has_corners(cmap, lattice, loop) for loop in loops):
             placement = place_on_cylinder(cmap, lattice, settings, loops)
         elif loops:
             placement = self._by_sides(settings)
         else:
             placement = self._freely(settings)
-        return replace(placement, notes=(*self.notes, *placement.notes))
+        if len(told) > MOST_TOLD:
+            told = [*told[:MOST_TOLD], f"The same holds of {len(told) - MOST_TOLD} further folds."]
+        return replace(placement, notes=(*self.notes, *told, *placement.notes))
+
+    @cached_property
+    def chains(self) -> list[Chain]:
+        """Features in the domain, those that the pattern is cut along."""
+        if self.cmap.kind == "net":
+            return []
+        chains = chains_of(self.cmap, self.cmap.surface.features)
+        return [chain for chain in chains if chain.feature in self.features]
+
+    def _along_features(self, settings: PatternSettings) -> tuple[Placement | None, list[str]]:
+        """With lattice lines on as many features as bearable deformations allow, None if on none; and why not
+        on others."""
+        if not self.features:
+            return None, []
+        if not is_straight(self.lattice, edge_angle(self.lattice, self.shape)):
+            return None, [
+                "At this rotation no line of the pattern can follow a fold: cells are cut where it falls."
+            ]
+        if self.cmap.kind == "net":
+            return None, [
+                "On this domain no line of the pattern follows a fold: cells are cut where it falls."
+            ]
+        chains = narrow(self.chains, self.cmap)
+        told = [self._wide_note(chain) for chain in self.chains if chain not in chains]
+        for _ in range(MOST_GIVEN_UP):
+            if not chains:
+                return None, told
+            straightening = self._straightened(tuple(chains))
+            ratio, _ = predicted(straightening, settings)
+            spread = None
+            if np.quantile(ratio, P99) > FINE:
+                wider, _ = predicted(straightening, settings, FREE)
+                if np.quantile(wider, P99) < 0.5 * np.quantile(ratio, P99):
+                    ratio, spread = wider, FREE
+            if np.quantile(ratio, P99) <= MOST_PREDICTED:
+                placed = place_by_sides(straightening, settings, spread)
+                if placed.distortion <= MOST_DISTORTED:
+                    assert straightening.features is not None
+                    return replace(placed, straight=straightening.features.straight), [
+                        *told,
+                        *(
+                            self._third_note(c)
+                            for c in chains
+                            if c.feature not in straightening.features.straight
+                        ),
+                    ]
+            left = self._without_worst(chains, ratio)
+            told += [self._costly_note(chain, straightening, ratio) for chain in chains if chain not in left]
+            chains = left
+        return None, told
+
+    def _wide_note(self, chain: Chain) -> str:
+        cells = chain.width / self.cell
+        return (
+            f"The fold {self._ends(chain)} strays from a straight line of the domain by "
+            f"{chain.width / self.cmap.circumference:.1%} of the circumference, {cells:.1f} cells: "
+            "cells are cut where it falls."
+        )
+
+    def _third_note(self, chain: Chain) -> str:
+        return (
+            f"The fold {self._ends(chain)} comes to where two other lines meet already: cells are cut where "
+            "it falls."
+        )
+
+    def _costly_note(self, chain: Chain, straightening: Straightening, ratio: Floats) -> str:
+        features = straightening.features
+        assert features is not None
+        lean = float(features.lean_of(chain.feature))
+        worst = float(np.quantile(ratio[self._beside(chain)], P99))
+        least = 1 / np.tan(np.pi / 4 - abs(lean) / 2) - 1
+        law = (
+            f"; it leans by {abs(np.rad2deg(lean)):.1f}° against the lattice, which alone costs {least:.2f}"
+            if least > 0.5 * MOST_PREDICTED
+            else ""
+        )
+        return (
+            f"To lay a line of the pattern along the fold {self._ends(chain)} would distort cells there by "
+            f"about {worst:.2f}{law}: cells are cut where it falls."
+        )
+
+    def _ends(self, chain: Chain) -> str:
+        points = self.cmap.surface.vertices[chain.vertex[[0, -1]]]
+        size = float(np.ptp(self.cmap.surface.vertices, axis=0).max())
+        first, last = (
+            "(" + ", ".join(f"{x:.4g}" for x in np.where(abs(p) < 1e-9 * size, 0.0, p)) + ")" for p in points
+        )
+        return f"through {first}" if chain.closed else f"from {first} to {last}"
+
+    @cached_property
+    def cell(self) -> float:
+        """Width of a cell in the domain, the root of its area."""
+        angle = edge_angle(self.lattice, self.shape)
+        edge = wanted_edge(self.cmap, self.lattice, self.shape, angle) / self.lattice.edge
+        return edge * float(np.sqrt(self.lattice.cell_area))
+
+    def _beside(self, chain: Chain) -> Bools:
+        """(m,) triangles at its vertices."""
+        on = np.zeros(len(self.cmap.surface.vertices), dtype=bool)
+        on[chain.vertex] = True
+        return np.asarray(on[self.cmap.surface.faces].any(axis=1))
+
+    def _straightened(self, chains: tuple[Chain, ...]) -> Straightening:
+        known = self._straightenings
+        key = frozenset(chain.feature for chain in chains)
+        if key not in known:
+            known[key] = Straightening.of(
+                self.cmap, self.lattice, self.shape, self.turns, self.loops, list(chains)
+            )
+        return known[key]
+
+    @cached_property
+    def _straightenings(self) -> dict[frozenset[int], Straightening]:
+        return {}
+
+    def _without_worst(self, chains: list[Chain], ratio: Floats) -> list[Chain]:
+        """All but the ones beside which triangles would be distorted most."""
+        cost = [float(np.quantile(ratio[self._beside(chain)], P99)) for chain in chains]
+        return [chain for chain, one in zip(chains, cost, strict=True) if one < 0.9 * max(cost)]
 
     @property
     def is_cylinder(self) -> bool:

@@ -22,9 +22,9 @@ LEAST_GROWTH = 0.1
 
 
 def boundary_direction(cmap: ConformalMap, lattice: Lattice, anchor: int) -> complex:
-    """Unit direction along the boundary, meaningful up to the symmetry ζ of the lattice, which g respects.
+    """Unit direction along the boundary, meaningful up to the rotations of the pattern, which g respects.
 
-    The mean of (boundary edge)^order over the boundary; where that cancels (round boundaries, none), the
+    The mean of (boundary edge)^fold over the boundary; where that cancels (round boundaries, none), the
     direction around the apex, or the middle, at the anchor.
     """
     corners, faces = cmap.corners(), cmap.surface.faces
@@ -33,9 +33,9 @@ def boundary_direction(cmap: ConformalMap, lattice: Lattice, anchor: int) -> com
     on_boundary = (cmap.surface.twin < 0).reshape(-1, 3) & on_ends[faces]
     edges = (np.roll(corners, -1, axis=1) - corners)[on_boundary]
     length = abs(edges)
-    mean = complex((length * (edges / length) ** lattice.order).sum() / max(length.sum(), 1e-300))
+    mean = complex((length * (edges / length) ** lattice.fold).sum() / max(length.sum(), 1e-300))
     if abs(mean) > 0.05:
-        return complex(np.exp(1j * np.angle(mean) / lattice.order))
+        return complex(np.exp(1j * np.angle(mean) / lattice.fold))
     stands = (
         corners.ravel()[np.flatnonzero(faces.ravel() == anchor)[0]] if cmap.kind == "net" else cmap.uv[anchor]
     )
@@ -64,9 +64,8 @@ def _frame(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings) -> _
     angle = edge_angle(lattice, settings)
     scale = lattice.edge / wanted_edge(cmap, lattice, settings, angle)
     along = boundary_direction(cmap, lattice, anchor_vertex(cmap))
-    step = complex(lattice.position(lattice.steps[0])) / lattice.edge
     return _Frame(
-        complex(scale * np.exp(-1j * angle) * step / along),
+        complex(scale * np.exp(-1j * angle) * lattice.forward / along),
         angle,
         width_per_cell(lattice, angle) * lattice.edge,
     )

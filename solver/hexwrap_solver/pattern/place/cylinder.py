@@ -82,7 +82,7 @@ def place_on_cylinder(
 
 def angle_taken(lattice: Lattice, along: complex, wanted: float) -> float:
     """Angle from the direction of g to an edge, of all equivalent ones the nearest to the wanted one."""
-    taken = float(np.angle(lattice.position(lattice.steps[0]) / along))
+    taken = float(np.angle(lattice.forward / along))
     return taken + lattice.quantum * round((wanted - taken) / lattice.quantum)
 
 
@@ -101,13 +101,13 @@ def _translations(
 ) -> tuple[Ints, int]:
     """(k, 2) translations of the tiling that g may become, the nearest to what is asked first, and by how
     many cells around they differ."""
-    toward = complex(np.exp(-1j * angle) * lattice.position(lattice.steps[0]) / lattice.edge)
+    toward = complex(np.exp(-1j * angle) * lattice.forward)
     edges = edges_around(cmap, lattice, settings, angle)
     wanted = edges * lattice.edge * toward
     if not is_straight(lattice, angle):
         if settings.around is None:
             return lattice.translation_near(wanted)[None], 1
-        return lattice.ring_near(settings.around, wanted)[None], 2 if lattice.kind == "triangle" else 1
+        return lattice.ring_near(settings.around, wanted)[None], lattice.counted
     row = lattice.shortest_towards(toward)
     count = abs(wanted) / abs(complex(lattice.position(row)))
     spread = 0.0 if settings.around is not None else size_spread(settings)

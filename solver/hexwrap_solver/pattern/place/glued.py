@@ -27,7 +27,7 @@ class Glued:
     @property
     def turn(self) -> Complexes:
         """(m, 3) as factors."""
-        return np.asarray(np.exp(1j * self.lattice.quantum * self.rows[..., 0]))
+        return np.asarray(np.exp(1j * self.lattice.step_angle * self.rows[..., 0]))
 
     @property
     def shift(self) -> Complexes:

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints
+from hexwrap_solver.arrays import Complexes, Floats, Ints
 from hexwrap_solver.conformal.net import Net
 from hexwrap_solver.conformal.types import ConformalMap, Deck, Unrolled
 from hexwrap_solver.errors import NotAdaptedError, PatternError
@@ -29,9 +29,11 @@ from hexwrap_solver.pattern.place.glued import Glued, around_vertices
 from hexwrap_solver.pattern.place.placement import (
     BEARABLE,
     NEARLY,
+    PARTS,
     Placement,
     anchor_vertex,
     edge_angle,
+    quantum_name,
 )
 from hexwrap_solver.pattern.place.polygons import Alignment, Polygons
 from hexwrap_solver.pattern.place.size import girth, size_spread, wanted_edge, width_per_cell
@@ -101,7 +103,7 @@ def _placed(
     angle = edge_angle(lattice, settings)
     scale = lattice.edge / wanted_edge(cmap, lattice, settings, angle)
     along = boundary_direction(cmap, lattice, anchor_vertex(cmap))
-    factor = complex(scale * np.exp(-1j * angle) * complex(lattice.position(lattice.steps[0])) / along)
+    factor = complex(scale * np.exp(-1j * angle) * lattice.forward / along)
     factor *= scale / abs(factor)
     if alignment is not None:
         factor = scale * alignment.unit / abs(alignment.unit)
@@ -182,16 +184,16 @@ def _phase(lattice: Lattice, settings: PatternSettings, angle: float) -> complex
 
 def _motions(cmap: ConformalMap, lattice: Lattice) -> Motions:
     net, faces, twin = cmap.net, cmap.surface.faces, cmap.surface.twin
-    steps = net.angle / lattice.quantum
+    steps, own = net.angle / lattice.step_angle, lattice.order // lattice.fold
     used = np.unique(net.crossing)
-    off = abs(steps - np.rint(steps))
-    if (off[used] * lattice.quantum > NEARLY).any():
+    off = abs(steps - own * np.rint(steps / own)) * lattice.step_angle
+    if (off[used] > NEARLY).any():
         worst = int(used[np.argmax(off[used])])
-        part = "π/3" if lattice.order == 6 else "π/2"
+        part = PARTS[lattice.fold]
         raise NotAdaptedError(
             f"A loop or singularity turns the domain by {net.angle[worst]:.8f} rad, but a {lattice.kind} "
             f"pattern closes up only where that is a multiple of {part}: choose boundary angles or "
-            f"singularities that add up to one, or boundary.quantum {lattice.kind}.",
+            f"singularities that add up to one, or boundary.quantum {quantum_name(lattice)}.",
             data={"cone_angle": float(net.angle[worst]), "quantum": lattice.quantum},
         )
     turn = np.rint(steps).astype(np.int64) % lattice.order
@@ -234,7 +236,10 @@ def _choices(
     fitted = cmap.fitted
     if fitted is not None and fitted.order == lattice.order:
         e1 = complex(lattice.position(lattice.basis[0]))
-        A, B = np.array([e1 * fitted.factor]), np.array([e1 * fitted.shift + _centre(lattice)])
+        A, B = (
+            np.array([e1 * fitted.factor]),
+            np.array([e1 * fitted.shift + lattice.position(np.array(lattice.centre))]),
+        )
         rows, misfit = _rounded(lattice, motions, A, B)
         if misfit[0] < NEARLY:
             return [(0.0, complex(A[0]), complex(B[0]), rows[0])]
@@ -291,7 +296,7 @@ def _rounded(
     worst is from its own translation, lattice units; infinite where a singularity would stand at no centre.
 
     along: (t, 2) of which translations must be multiples, 0 where they need not."""
-    zeta = np.exp(1j * lattice.quantum * motions.turn)
+    zeta = np.exp(1j * lattice.step_angle * motions.turn)
     wanted = A[:, None] * motions.translation + B[:, None] * (1 - zeta)
     rows = np.zeros((*wanted.shape, 4), dtype=np.int64)
     rows[..., 0] = motions.turn
@@ -335,38 +340,27 @@ def _rounded(
     misfit = abs(lattice.position(rows[..., 1:3]) - wanted).max(axis=1)
     for w, word in enumerate(motions.words):
         found = product(word)
-        right = is_centre(lattice, found) if w < cones else (found == goal[:, w]).all(axis=1)
+        right = (
+            lattice.is_centre(fixed_point(lattice, found)) if w < cones else (found == goal[:, w]).all(axis=1)
+        )
         misfit[~right] = np.inf
     return rows, np.asarray(misfit)
 
 
-def _centre(lattice: Lattice) -> int:
-    """Where a singularity may stand: the centre of a cell, among triangles a vertex."""
-    return 1 if lattice.kind == "quad" else 0  # the centres of quads are the coset 1
-
-
 def _about_centre(lattice: Lattice, k: int, wanted: Complexes) -> Ints:
-    """(…, 4) rotations by −k quanta, as going around a cone amounts to, about the centres of cells nearest to
-    the wanted places."""
-    offset = _centre(lattice)
-    centre = lattice.translations_near(wanted - offset) + np.array([offset, 0])
+    """(…, 4) rotations by −k quanta, as going around a cone amounts to, about the centres nearest to the
+    wanted places."""
+    offset = np.array(lattice.centre)
+    centre = lattice.translations_near(wanted - lattice.position(offset)) + offset
     rows = np.zeros((*centre.shape[:-1], 4), dtype=np.int64)
     rows[..., 0] = -k % lattice.order
     rows[..., 1:3] = centre - lattice.rotate(centre, -k)
     return rows
 
 
-def is_centre(lattice: Lattice, rotation: Ints) -> Bools:
-    """(…,) whether rotations (…, 4) are about centres of cells, among triangles also about vertices."""
-    centre = fixed_point(lattice, rotation)
-    point = np.rint(lattice.coordinates(centre)).astype(np.int64)
-    on_lattice = abs(lattice.position(point) - centre) < 1e-6
-    return np.asarray(on_lattice & (~lattice.is_node(point) | (lattice.kind == "triangle")))
-
-
 def fixed_point(lattice: Lattice, rotation: Ints) -> Complexes:
     """(…,) of rotations (…, 4)."""
-    zeta = np.exp(1j * lattice.quantum * rotation[..., 0])
+    zeta = np.exp(1j * lattice.step_angle * rotation[..., 0])
     return np.asarray(lattice.position(rotation[..., 1:3]) / (1 - zeta))
 
 

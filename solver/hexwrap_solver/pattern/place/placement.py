@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexwrap_solver.arrays import Complexes, Ints
-from hexwrap_solver.conformal.types import ConformalMap, Deck
+from hexwrap_solver.conformal.types import QUANTA, QUANTUM_OF, ConformalMap, Deck
 from hexwrap_solver.errors import NotAdaptedError, PatternError
 from hexwrap_solver.pattern.lattice import Isometry, Lattice
 from hexwrap_solver.pattern.place.glued import Glued
@@ -15,6 +15,8 @@ from hexwrap_solver.pattern.types import PatternSettings
 
 #: Largest |k| of a cone angle k·π/3 or k·π/2.
 MAX_TURNS = 12
+#: How quanta are written, by the fold of the pattern.
+PARTS = {6: "π/3", 4: "π/2", 2: "π"}
 #: Largest phase, cells.
 MAX_PHASE = 1e6
 #: A cone angle this near to such a multiple counts as one (angles typed with seven digits).
@@ -32,7 +34,7 @@ class Placement:
     glued: how the corners of the faces follow. isometries: (t, 4) what the motions of the net are on the
     lattice. rotation: angle from the boundary direction to an edge. around: cells once around (middle ring on
     cones, longest loop on nets). distortion: worst ratio of singular values − 1 of the stretch. step: around
-    is one of its multiples. motion: on annuli, what g is.
+    is one of its multiples. motion: on annuli, what g is. straight: features that lie on lattice lines.
     """
 
     place: Complexes
@@ -44,6 +46,7 @@ class Placement:
     notes: tuple[str, ...]
     step: int = 1
     motion: Isometry | None = None
+    straight: frozenset[int] = frozenset()
 
     @classmethod
     def on_annulus(
@@ -69,20 +72,26 @@ class Placement:
         return self.motion is None or self.motion.turns != 0
 
 
+def quantum_name(lattice: Lattice) -> str:
+    """What ``boundary.quantum`` is to be for a pattern."""
+    return lattice.kind if lattice.kind in QUANTA else QUANTUM_OF[lattice.kind]
+
+
 def quantum_turns(cmap: ConformalMap, lattice: Lattice) -> int:
-    """k of the cone angle K = k · quantum. Raises NotAdaptedError (paper, definition 2)."""
+    """The cone angle in turns by ζ. Raises NotAdaptedError where it is no multiple of the quantum (paper,
+    definition 2)."""
     quantum, K = lattice.quantum, cmap.deck.angle
     k = round(K / quantum)
     if abs(K - k * quantum) <= NEARLY and abs(k) <= MAX_TURNS:
-        return k
-    part = "π/3" if lattice.order == 6 else "π/2"
+        return k * (lattice.order // lattice.fold)
+    part = PARTS[lattice.fold]
     low = int(np.clip(np.floor(K / quantum), -MAX_TURNS, MAX_TURNS - 1))
     nearest = [low * quantum, (low + 1) * quantum]
     raise NotAdaptedError(
         f"The cone angle is {K:.8f} rad, but a {lattice.kind} pattern closes up only where it is a multiple "
         f"of {part}, up to {MAX_TURNS} of them; the nearest are {low}·{part} = {nearest[0]:.8f} and "
         f"{low + 1}·{part} = {nearest[1]:.8f} rad: choose boundary angles that add up to one of them, or "
-        f"boundary.quantum {lattice.kind} for an isometric boundary.",
+        f"boundary.quantum {quantum_name(lattice)} for an isometric boundary.",
         data={"cone_angle": K, "quantum": quantum, "nearest": nearest},
     )
 
@@ -90,7 +99,7 @@ def quantum_turns(cmap: ConformalMap, lattice: Lattice) -> int:
 def quantized(cmap: ConformalMap, lattice: Lattice) -> ConformalMap:
     """The map with exactly the multiple as its cone angle. Near a multiple of 2π even the last of seven
     digits would put an apex, far away, where there is only a translation."""
-    exact = quantum_turns(cmap, lattice) * lattice.quantum
+    exact = quantum_turns(cmap, lattice) * lattice.step_angle
     if abs(cmap.deck.angle - exact) <= EXACT:
         return cmap
     return cmap.with_domain(deck=Deck(exact, cmap.deck.translation))

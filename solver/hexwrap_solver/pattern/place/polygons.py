@@ -105,13 +105,8 @@ class Polygons:
 
     def unit(self, lattice: Lattice, zero: complex) -> complex:
         """The rotation after which directions are best those of the lattice, ``zero`` being one of them."""
-        mean = complex((self.length * self.direction**lattice.order).sum())
-        return zero / complex(np.exp(1j * np.angle(mean) / lattice.order))
-
-    def off(self, lattice: Lattice, zero: complex) -> float:
-        """The largest angle by which a side misses all directions of the lattice then, radians."""
-        steps = np.angle(self.direction * self.unit(lattice, zero) / zero) / lattice.quantum
-        return float(abs(steps - np.rint(steps)).max() * lattice.quantum)
+        mean = complex((self.length * self.direction**lattice.fold).sum())
+        return zero / complex(np.exp(1j * np.angle(mean) / lattice.fold))
 
     def normals(self, lattice: Lattice, zero: complex) -> Complexes:
         """(s,) inward, in the directions of the lattice."""
@@ -132,7 +127,7 @@ class Alignment:
 
     @classmethod
     def of(cls, polygons: Polygons, lattice: Lattice, angle: float, boundary: str) -> Alignment:
-        zero = complex(lattice.position(lattice.steps[0])) / lattice.edge * complex(np.exp(-1j * angle))
+        zero = complex(lattice.forward * np.exp(-1j * angle))
         rows = rows_along(lattice, angle, boundary)
         return cls(
             lattice,
@@ -184,7 +179,7 @@ class Alignment:
         side = np.tile(poly.side, 2)
         depth = (self.normal[side].conj() * lattice.carry(to_loop, place[vertex])).real
         line = self._nearest(np.bincount(side, depth) / np.bincount(side))[side]
-        turn = np.exp(1j * lattice.quantum * to_loop[:, 0])
+        turn = np.exp(1j * lattice.step_angle * to_loop[:, 0])
         normal = self.normal[side] / turn
         line = line - (self.normal[side].conj() * lattice.position(to_loop[:, 1:3])).real
         found, at = np.zeros((len(place), 2), dtype=complex), np.zeros((len(place), 2))

@@ -35,14 +35,14 @@ def with_rotation(
     along = parameter_directions(cmap, 0 if settings.rotation == "u" else 1)
     area, _ = face_areas(cmap)
     known = abs(along) > 0
-    mean = complex((area * along**lattice.order)[known].sum() / area[known].sum())
+    mean = complex((area * along**lattice.fold)[known].sum() / area[known].sum())
     if abs(mean) < AGREEMENT:
         raise PatternError(
             f"The {settings.rotation} direction of the surface turns too much in the domain to be followed "
             f"by the pattern (agreement {abs(mean):.2f} of 1): give rotation as edge, vertex or degrees.",
             field=("rotation",),
         )
-    followed = np.exp(1j * np.angle(mean) / lattice.order)
+    followed = np.exp(1j * np.angle(mean) / lattice.fold)
     boundary = boundary_direction(cmap, lattice, anchor_vertex(cmap))
     angle = float(np.angle(followed / boundary))
     angle -= lattice.quantum * round(angle / lattice.quantum)

@@ -1,8 +1,10 @@
-"""Straight sides of the domain's boundary, between corner vertices (paper, section 3.1; Figures 5 and 7)."""
+"""Straight lines in the domain that lattice lines shall follow: sides of the boundary, between its corners
+(paper, section 3.1; Figures 5 and 7), and features."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import reduce
 from itertools import pairwise
 
 import numpy as np
@@ -17,16 +19,18 @@ QUANTIZED = 0.02
 
 @dataclass(frozen=True)
 class Sides:
-    """Sides of the boundary, each from corner to corner, the domain on the left.
+    """Sides of the boundary, each from corner to corner, the domain on the left; and features.
 
     direction: (s,) unit complex, in the frame of the loop: the loop unrolled from its first corner on, in
-    that vertex's own sheet. length: (s,) in the domain. loop: (s,). vertex, side, sheet: (k,) the vertices
-    of all sides, both ends included, and the sheet on which the loop's frame shows them; place: (k,) where.
+    that vertex's own sheet. length: (s,) in the domain. loop: (s,), −1 for features, whose frame is that of
+    their first vertex. closed: (s,) whether the side is a closed line. vertex, side, sheet: (k,) the vertices
+    of all sides, both ends included, and the sheet on which the frame shows them; place: (k,) where.
     """
 
     direction: Complexes
     length: Floats
     loop: Ints
+    closed: Bools
     vertex: Ints
     side: Ints
     sheet: Ints
@@ -35,6 +39,11 @@ class Sides:
     @property
     def n(self) -> int:
         return len(self.length)
+
+    def and_also(self, other: Sides) -> Sides:
+        """Both, the other ones after these."""
+        fields = {k: np.concatenate([v, vars(other)[k]]) for k, v in vars(self).items() if k != "side"}
+        return Sides(**fields, side=np.concatenate([self.side, other.side + self.n]))
 
 
 def curvatures(cmap: ConformalMap, loop: int) -> Floats:
@@ -71,11 +80,13 @@ def corners_of(kappa: Floats, lattice: Lattice) -> Bools:
 def sides_of(cmap: ConformalMap, lattice: Lattice, loops: list[int]) -> Sides:
     """Sides of the given loops, each of which is a polygon with at least one corner or a closed line."""
     gained = _sheets_gained(cmap)
-    parts = [_sides_of_loop(cmap, lattice, loop, gained) for loop in loops]
-    start = np.cumsum([0] + [p.n for p in parts])
-    fields = {k: np.concatenate([vars(p)[k] for p in parts]) for k in vars(parts[0]) if k != "side"}
-    side = np.concatenate([p.side + s for p, s in zip(parts, start, strict=False)])
-    return Sides(**fields, side=side)
+    parts = [no_sides(), *(_sides_of_loop(cmap, lattice, loop, gained) for loop in loops)]
+    return reduce(Sides.and_also, parts)
+
+
+def no_sides() -> Sides:
+    none, nothing = np.zeros(0, dtype=np.int64), np.zeros(0)
+    return Sides(nothing + 0j, nothing, none, none > 0, none, none, none, nothing + 0j)
 
 
 def _sheets_gained(cmap: ConformalMap) -> Ints:
@@ -104,6 +115,7 @@ def _sides_of_loop(cmap: ConformalMap, lattice: Lattice, loop: int, gained: Ints
         step / abs(step),
         abs(step),
         np.full(len(step), loop),
+        np.full(len(step), len(step) == 1),
         vertices[index],
         side,
         sheet[index],
@@ -127,19 +139,23 @@ class Lines:
         of their loop."""
         zero = np.zeros((*self.sheet.shape, 2), dtype=np.int64)
         shift = motion.lattice.position(motion.apply(zero, self.sheet))
-        turn = np.exp(1j * motion.lattice.quantum * motion.rotation(self.sheet))
+        turn = np.exp(1j * motion.lattice.step_angle * motion.rotation(self.sheet))
         own = depth[self.side] - ((self.normal * turn).conj() * shift).real
         return np.asarray(np.where(self.side >= 0, own, 0.0))
 
 
 def lines_of(n: int, sides: Sides, normal: Complexes, motion: Isometry) -> Lines:
     """normal: (s,) of the sides in the frame of their loop. motion: any with the right rotation."""
-    own = normal[sides.side] / np.exp(1j * motion.lattice.quantum * motion.rotation(sides.sheet))
+    own = normal[sides.side] / np.exp(1j * motion.lattice.step_angle * motion.rotation(sides.sheet))
+    # Of the lines listed for a vertex each once: a closed one comes twice, one of several features again.
     order = np.argsort(sides.vertex, kind="stable")
     vertex = sides.vertex[order]
-    again = np.concatenate([[0], (vertex[1:] == vertex[:-1]).astype(np.int64)])
-    parallel = np.concatenate([[False], abs(own[order][1:] - own[order][:-1]) < 1e-9]) & (again == 1)
-    order, vertex, again = order[~parallel], vertex[~parallel], again[~parallel]
+    once = np.ones(len(order), dtype=bool)
+    for step in range(1, int(np.bincount(vertex).max(initial=1))):
+        same = vertex[step:] == vertex[:-step]
+        once[step:] &= ~(same & (abs(own[order][step:] - own[order][:-step]) < 1e-9))
+    order, vertex = order[once], vertex[once]
+    again = np.arange(len(vertex)) - np.searchsorted(vertex, vertex)
     normals, side, sheet = (
         np.zeros((n, 2), dtype=complex),
         np.full((n, 2), -1),

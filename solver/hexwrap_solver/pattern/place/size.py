@@ -23,7 +23,7 @@ DEFAULT_ON_NETS = 1000
 DEFAULT_OPEN = 0.01
 
 #: No cell is more than this many edges wide.
-EDGES_PER_CELL = 3.0
+EDGES_PER_CELL = 4.0
 
 
 def face_areas(cmap: ConformalMap) -> tuple[Floats, Floats]:
@@ -42,13 +42,9 @@ def mean_stretch(cmap: ConformalMap) -> float:
 
 def width_per_cell(lattice: Lattice, angle: float) -> float:
     """Length of a ring of edge-adjacent cells per cell, in edges, when edges are at an angle to the ring."""
-    direction = np.exp(-1j * angle) * lattice.position(lattice.steps[0]) / lattice.edge
+    direction = np.exp(-1j * angle) * lattice.forward
     x, y = lattice.coordinates(np.asarray(direction / lattice.position(lattice.basis[0])))
-    if lattice.kind == "quad":
-        cells = abs(x) + abs(y)
-    else:
-        cells = max(abs(x), abs(y), abs(x + y)) * (2 if lattice.kind == "triangle" else 1)
-    return float(1 / (cells * lattice.edge))
+    return float(1 / (lattice.cells_along(x, y) * lattice.edge))
 
 
 def wanted_edge(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings, angle: float) -> float:

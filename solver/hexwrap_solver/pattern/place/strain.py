@@ -54,10 +54,15 @@ class Strain:
         """Its fourth-power mean, which heeds the worst places more."""
         return float((self.area @ np.abs(self.response @ moved) ** 4) ** 0.25)
 
-    def nearest(self, moved: Floats, period: float, sides: int) -> Floats:
-        """Moves of the first ``sides`` columns changed by multiples of the period, as long as any single
+    def ratios(self, moved: Floats, scale: float) -> Floats:
+        """(m,) predicted ratios of singular values − 1."""
+        bent = abs(self.response @ moved)
+        return np.asarray(2 * bent / np.maximum(scale - bent, 1e-9 * scale))
+
+    def nearest(self, moved: Floats, period: Floats) -> Floats:
+        """Moves of the first columns, one per period, changed by multiples of them, as long as any single
         change lessens ``mean``."""
-        moved = moved.copy()
+        moved, sides = moved.copy(), len(period)
         own = period * period * np.diag(self.squares)[:sides]
         product = self.squares[:sides] @ moved
         for _ in range(4 * sides):
@@ -66,7 +71,7 @@ class Strain:
             k = int(np.argmin(gain))
             if gain[k] >= -1e-12 * own[k]:
                 break
-            change = -period * np.sign(slope[k])
+            change = -period[k] * np.sign(slope[k])
             moved[k] += change
             product += change * self.squares[:sides, k]
         return moved

@@ -39,7 +39,7 @@ class Points:
 class HalfEdges:
     """tail, head: points. isometry: (h, 4) from the head's own coordinates to the tail's. key: order around
     the tail. twin: the same edge the other way. outer: runs along the boundary outside of the domain. name:
-    order·node + direction of a pattern edge from a node, −1 for others."""
+    number of a pattern edge from a node, −1 for others. rim: runs along the boundary of the surface."""
 
     tail: Ints
     head: Ints
@@ -48,6 +48,7 @@ class HalfEdges:
     twin: Ints
     outer: Bools
     name: Ints
+    rim: Bools
 
     def without(self, gone: Bools) -> HalfEdges:
         keep = ~gone
@@ -69,37 +70,39 @@ class HalfEdges:
 
 def arrangement(
     layout: Layout, boundary: Boundary, nodes: Nodes, edges: PatternEdges, used: Bools
-) -> tuple[Points, HalfEdges]:
-    """Points and half-edges near the boundary: everything that does not bound a whole cell."""
-    lattice, order = layout.lattice, layout.lattice.order
+) -> tuple[Points, HalfEdges, BoundaryPoints]:
+    """Points and half-edges near the boundary, everything that does not bound a whole cell; and the points
+    that lie on it."""
+    lattice = layout.lattice
     leaving, chord = exits_of(layout, nodes, edges, boundary), chords(layout, boundary)
     at_node = nodes_on_boundary(layout, nodes, boundary)
     on_boundary, new = _points_on_boundary(layout, boundary, nodes.n, at_node, leaving, chord)
     turns = corners_of_boundary(layout, boundary)
     points = Points(
         np.concatenate([nodes.face[nodes.own], boundary.face[new.edge]]),
-        np.concatenate([lattice.position(nodes.point[nodes.own]), new.places(boundary)]),
+        np.concatenate([lattice.stand(nodes.point[nodes.own]), new.places(boundary)]),
         np.concatenate([np.zeros(nodes.n, dtype=bool), (new.t > 0) | ~turns[new.edge]]),
     )
-    key = _keys(layout, boundary, at_node, nodes.n)
+    key = _keys(layout, boundary, at_node, edges)
     near = np.zeros(nodes.n, dtype=bool)
-    near[np.flatnonzero((edges.head.ravel() >= 0) & ~used) // order] = True
+    near[np.flatnonzero((edges.head.ravel() >= 0) & ~used) // edges.width] = True
     near[leaving.node] = True
     near[at_node.point] = True
     end = nodes.n + np.arange(len(leaving.node))
-    name = leaving.node * order + leaving.direction
-    out_key, no_key = key[leaving.node, leaving.direction], np.zeros(len(end))
+    name = edges.number(leaving.node, leaving.slot)
+    out_key, no_key = key[leaving.node, leaving.slot], np.zeros(len(end))
     start = nodes.n + len(end) + np.arange(len(chord.edge))
     middle = np.zeros(len(start))
     unnamed = np.full(len(start), -1)
-    return points, _join(
+    halves = _join(
         [
-            _among_nodes(layout, edges, near, key),
+            _among_nodes(edges, near, key),
             _pairs(layout, leaving.node, end, leaving.isometry, out_key, no_key, name),
             _pairs(layout, start, start + len(start), chord.isometry, middle, middle, unnamed),
             _along_boundary(layout, boundary, on_boundary),
         ]
     )
+    return points, halves, on_boundary
 
 
 def _points_on_boundary(
@@ -122,29 +125,27 @@ def _points_on_boundary(
     ), new
 
 
-def _among_nodes(layout: Layout, edges: PatternEdges, near: Bools, key: Floats) -> HalfEdges:
+def _among_nodes(edges: PatternEdges, near: Bools, key: Floats) -> HalfEdges:
     """Pattern edges between nodes near the boundary. Those to other nodes have whole cells on both sides."""
-    lattice, order = layout.lattice, layout.lattice.order
-    slot = np.flatnonzero((edges.head >= 0).ravel() & np.repeat(near, order))
-    tail, way = slot // order, slot % order
-    kept = near[edges.head[tail, way]]
-    slot, tail, way = slot[kept], tail[kept], way[kept]
+    number = np.flatnonzero((edges.head >= 0).ravel() & np.repeat(near, edges.width))
+    tail, slot = number // edges.width, number % edges.width
+    kept = near[edges.head[tail, slot]]
+    number, tail, slot = number[kept], tail[kept], slot[kept]
     position = np.full(edges.head.size, -1, dtype=np.int64)
-    position[slot] = np.arange(len(slot))
-    twin = position[edges.reverse(lattice, tail, way)]
-    outer = np.zeros(len(slot), dtype=bool)
-    isometry = edges.isometry(tail, way)
-    return HalfEdges(tail, edges.head[tail, way], isometry, key[tail, way], twin, outer, slot)
+    position[number] = np.arange(len(number))
+    twin = position[edges.back[tail, slot]]
+    no = np.zeros(len(number), dtype=bool)
+    isometry = edges.isometry(tail, slot)
+    return HalfEdges(tail, edges.head[tail, slot], isometry, key[tail, slot], twin, no, number, no)
 
 
-def _keys(layout: Layout, boundary: Boundary, at_node: BoundaryPoints, n: int) -> Floats:
-    """(n, order) order of directions around each node; on the boundary counted from the boundary's own."""
-    order = layout.lattice.order
-    key = np.tile(np.arange(order, dtype=float), (n, 1))
+def _keys(layout: Layout, boundary: Boundary, at_node: BoundaryPoints, edges: PatternEdges) -> Floats:
+    """(n, width) order of edges around each node; on the boundary counted from the boundary's direction."""
+    key = np.tile(np.arange(edges.width, dtype=float), (len(edges.head), 1))
     along = (boundary.head - boundary.tail)[at_node.edge]
-    along = along * np.exp(1j * layout.lattice.quantum * at_node.isometry[:, 0])
-    heading = layout.lattice.position(layout.lattice.steps)
-    angle = np.mod(np.angle(heading[None] / along[:, None]), 2 * np.pi)
+    along = along * np.exp(1j * layout.lattice.step_angle * at_node.isometry[:, 0])
+    heading = layout.lattice.headings[edges.way[at_node.point]]
+    angle = np.mod(np.angle(heading / along[:, None]), 2 * np.pi)
     key[at_node.point] = np.where(angle > 2 * np.pi - 1e-6, 0.0, angle)
     return key
 
@@ -163,6 +164,7 @@ def _pairs(
         np.concatenate([number + k, number]),
         np.zeros(2 * k, dtype=bool),
         np.concatenate([name, np.full(k, -1)]),
+        np.zeros(2 * k, dtype=bool),
     )
 
 
@@ -196,7 +198,7 @@ def _along_boundary(layout: Layout, boundary: Boundary, on: BoundaryPoints) -> H
         np.full(k, BACK),
         np.full(k, -1),
     )
-    return replace(halves, outer=np.repeat([False, True], k))
+    return replace(halves, outer=np.repeat([False, True], k), rim=np.tile(boundary.rim[edge] >= 0, 2))
 
 
 def _join(parts: list[HalfEdges]) -> HalfEdges:

@@ -1,10 +1,16 @@
-"""The boundary loops of the domain, and the points of the pattern that lie on them."""
+"""The boundary loops of the domain, and the points of the pattern that lie on them.
+
+Where the surface is folded, the domain is cut open along the folds: these are boundary, too, with an edge on
+either side.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints
 from hexwrap_solver.domain.locate import runs
@@ -23,15 +29,16 @@ class Boundary:
     """Boundary edges, loop after loop in their order, the domain on the left.
 
     face, edge: (b,) where each lies. number: (m, 3) the boundary edge at a face's edge, −1 inside.
-    loop: (b,) number of its loop. following: (b,) the next boundary edge. step: (b, 4) isometry from the
-    coordinates of the next edge's face to those of this one's. tail, head: (b,) complex, in the face's
-    coordinates.
+    loop: (b,) number of its loop. rim: (b,) loop of the surface that it is of, −1 along a fold. following:
+    (b,) the next boundary edge. step: (b, 4) isometry from the coordinates of the next edge's face to those
+    of this one's. tail, head: (b,) complex, in the face's coordinates.
     """
 
     face: Ints
     edge: Ints
     number: Ints
     loop: Ints
+    rim: Ints
     following: Ints
     step: Ints
     tail: Complexes
@@ -39,27 +46,65 @@ class Boundary:
 
 
 def boundary_of(surface: Surface, layout: Layout) -> Boundary:
-    """The boundary of the layout of a surface."""
-    faces = surface.faces
+    """The boundary of the layout of a surface; along folds, where the layout is cut open, of both sides.
+
+    Loops begin, and are sorted, as those of the surface; loops of folds alone come last.
+    """
+    faces, m = surface.faces, len(surface.faces)
     face, edge = np.nonzero(layout.across < 0)
-    by_tail = np.full(len(surface.vertices), -1, dtype=np.int64)
-    by_tail[faces[face, edge]] = np.arange(len(face))
-    order = by_tail[np.concatenate([*surface.loops, np.zeros(0, dtype=np.int64)])]
-    face, edge = face[order], edge[order]
-    lengths = np.array([len(loop) for loop in surface.loops], dtype=np.int64)
     b = len(face)
-    following = np.arange(1, b + 1)
-    following[np.cumsum(lengths) - 1] = np.cumsum(lengths) - lengths
+    number = np.full(3 * m, -1, dtype=np.int64)
+    number[3 * face + edge] = np.arange(b)
+    inner = surface.twin[3 * face + edge] >= 0
+    place = np.full(len(surface.vertices), -1, dtype=np.int64)
+    of_vertex = np.zeros(len(surface.vertices), dtype=np.int64)
+    place[surface.boundary] = np.arange(len(surface.boundary))
+    of_vertex[surface.boundary] = np.repeat(
+        np.arange(len(surface.loops)), [len(loop) for loop in surface.loops]
+    )
+    tail = faces[face, edge]
+    step, reached = _around_heads(layout, face, edge)
+    following = number[reached]
+    order, loop = _in_cycles(following, np.where(inner, len(place) + np.arange(b), place[tail]))
+    renumber = np.argsort(order)
+    face, edge = face[order], edge[order]
     number = np.full(faces.shape, -1, dtype=np.int64)
     number[face, edge] = np.arange(b)
-    step = _around_heads(layout, face, edge)
-    tail, head = layout.corners[face, edge], layout.corners[face, (edge + 1) % 3]
-    loop = np.repeat(np.arange(len(lengths)), lengths)
-    return Boundary(face, edge, number, loop, following, step, tail, head)
+    return Boundary(
+        face,
+        edge,
+        number,
+        loop,
+        np.where(inner, -1, of_vertex[tail])[order],
+        renumber[following[order]],
+        step[order],
+        layout.corners[face, edge],
+        layout.corners[face, (edge + 1) % 3],
+    )
 
 
-def _around_heads(layout: Layout, face: Ints, edge: Ints) -> Ints:
-    """(b, 4) the isometries met on the way from each boundary edge around its head to the next one."""
+def _in_cycles(following: Ints, priority: Ints) -> tuple[Ints, Ints]:
+    """Order of the elements of a permutation, cycle after cycle, each from its element of least priority on
+    and sorted by that; and (b,) which cycle each element then is of."""
+    b = len(following)
+    graph = coo_array((np.ones(b), (np.arange(b), following)), shape=(b, b))
+    n, cycle = connected_components(graph, directed=False)
+    least = np.full(n, np.iinfo(np.int64).max)
+    np.minimum.at(least, cycle, priority)
+    first = priority == least[cycle]
+    # Steps back to the first element, by pointers that reach twice as far in each round.
+    before = np.argsort(following)
+    before[first] = np.flatnonzero(first)
+    steps = (~first).astype(np.int64)
+    while not first[before].all():
+        steps, before = steps + steps[before], before[before]
+    order = np.lexsort((steps, least[cycle]))
+    return order, np.unique(least[cycle][order], return_inverse=True)[1]
+
+
+def _around_heads(layout: Layout, face: Ints, edge: Ints) -> tuple[Ints, Ints]:
+    """(b, 4) the isometries met on the way from each boundary edge around its head to the next one, and (b,)
+    that one, as 3·face + edge."""
     step = np.zeros((len(face), 4), dtype=np.int64)
     at = 3 * face + (edge + 1) % 3
     turning = np.arange(len(face))
@@ -71,7 +116,7 @@ def _around_heads(layout: Layout, face: Ints, edge: Ints) -> Ints:
         step[glued] = layout.lattice.compose(step[glued], layout.isometries[crossing[crossing != 0]])
         beyond = layout.twin[at[turning]]
         at[turning] = beyond - beyond % 3 + (beyond + 1) % 3
-    return step
+    return step, at
 
 
 @dataclass(frozen=True)
@@ -125,7 +170,7 @@ def corners_of_boundary(layout: Layout, boundary: Boundary) -> Bools:
     """(b,) whether the boundary turns at the tail of each boundary edge."""
     along = boundary.head - boundary.tail
     turned = along[boundary.following] * np.exp(
-        1j * layout.lattice.quantum * boundary.step[:, 0]
+        1j * layout.lattice.step_angle * boundary.step[:, 0]
     )  # the next edge in this one's coordinates
     bend = np.zeros(len(along), dtype=bool)
     bend[boundary.following] = abs(np.angle(turned / along)) > STRAIGHT
@@ -134,11 +179,11 @@ def corners_of_boundary(layout: Layout, boundary: Boundary) -> Bools:
 
 @dataclass(frozen=True)
 class Exits:
-    """Edges of the pattern that leave the domain: from a node in a direction to a place (edge, t) on the
+    """Edges of the pattern that leave the domain: from a node by a slot to a place (edge, t) on the
     boundary. isometry: (k, 4) from the coordinates of the face there to the node's own."""
 
     node: Ints
-    direction: Ints
+    slot: Ints
     edge: Ints
     t: Floats
     isometry: Ints
@@ -147,17 +192,18 @@ class Exits:
 def exits_of(layout: Layout, nodes: Nodes, edges: PatternEdges, boundary: Boundary) -> Exits:
     """Where edges that start at a node inside meet the boundary."""
     lattice = layout.lattice
-    node, direction = np.nonzero((edges.exits >= 0) & (edges.head < 0))
-    exits, isometry = edges.exits[node, direction], edges.isometry(node, direction)
+    node, slot = np.nonzero((edges.exits >= 0) & (edges.head < 0))
+    exits, isometry = edges.exits[node, slot], edges.isometry(node, slot)
     edge = boundary.number[exits // 3, exits % 3]
     own, into = nodes.point[nodes.own[node]], lattice.invert(isometry)
-    start = lattice.position(lattice.apply(into, own))
-    heading = lattice.position(lattice.apply(into, own + lattice.steps[direction])) - start
+    start = lattice.stand(lattice.apply(into, own))
+    way = edges.way[node, slot] - isometry[:, 0] * lattice.steps_per_turn
+    heading = lattice.edge * lattice.headings[way % lattice.directions]
     t = _meeting(boundary, edge, start, heading)
     away = abs(boundary.tail[edge] + t * (boundary.head - boundary.tail)[edge] - start)
     kept = (edge >= 0) & (away > 16 * layout.tolerance)
     place = snap(layout, boundary, edge[kept], t[kept], isometry[kept], 4 * layout.tolerance)
-    return Exits(node[kept], direction[kept], *place)
+    return Exits(node[kept], slot[kept], *place)
 
 
 def _meeting(boundary: Boundary, edge: Ints, start: Complexes, heading: Complexes) -> Floats:
@@ -187,16 +233,16 @@ def chords(layout: Layout, boundary: Boundary) -> Chords:
     """Pattern edges that come in through the boundary and go out again without reaching a node."""
     lattice, tolerance = layout.lattice, layout.tolerance
     edge, start, direction = _edges_across(layout, boundary)
-    found = trace(layout, boundary.face[edge], lattice.position(start), start + lattice.steps[direction])
+    found = trace(layout, boundary.face[edge], lattice.stand(start), start + lattice.steps[direction])
     out = found.exit >= 0
     edge, start, direction = edge[out], start[out], direction[out]
     isometry = found.isometry[out]
     end_edge = boundary.number[found.face[out], found.exit[out]]
-    here, way = lattice.position(start), lattice.position(lattice.steps[direction])
+    here, way = lattice.stand(start), lattice.edge * lattice.headings[direction]
     t = _meeting(boundary, edge, here, way)
     into = lattice.invert(isometry)
-    there = lattice.position(lattice.apply(into, start))
-    way_there = lattice.position(lattice.apply(into, start + lattice.steps[direction])) - there
+    there = lattice.stand(lattice.apply(into, start))
+    way_there = way * lattice.turns[into[:, 0]]
     end_t = _meeting(boundary, end_edge, there, way_there)
     came = abs(boundary.tail[edge] + t * (boundary.head - boundary.tail)[edge] - here)
     went = abs(boundary.tail[end_edge] + end_t * (boundary.head - boundary.tail)[end_edge] - there)
@@ -230,17 +276,19 @@ def _edges_across(layout: Layout, boundary: Boundary) -> tuple[Ints, Ints, Ints]
     start = low[edge] + np.stack([step % wide[edge, 0], step // wide[edge, 0]], axis=1)
     along = (boundary.head - boundary.tail)[edge]
     along = along / abs(along)
-    depth = ((lattice.position(start) - boundary.tail[edge]) * along.conj()).imag
+    depth = ((lattice.stand(start) - boundary.tail[edge]) * along.conj()).imag
     near = lattice.is_node(start) & (depth < -layout.tolerance) & (depth > -lattice.edge - layout.tolerance)
     edge, start, depth = edge[near], start[near], depth[near]
-    direction = np.tile(np.arange(lattice.order), len(edge))
-    edge, start, depth = (np.repeat(x, lattice.order, axis=0) for x in (edge, start, depth))
-    heading = lattice.position(lattice.steps[direction])
+    ways = lattice.ways[lattice.residue(start)]
+    node, slot = np.nonzero(ways >= 0)
+    direction = ways[node, slot]
+    edge, start, depth = edge[node], start[node], depth[node]
+    heading = lattice.edge * lattice.headings[direction]
     along = (boundary.head - boundary.tail)[edge]
     length = abs(along)
     rise = (heading * along.conj()).imag / length
-    crosses = lattice.has_edge(start, direction) & (depth + rise > layout.tolerance)
-    foot = ((lattice.position(start) - boundary.tail[edge]) * along.conj()).real / length
+    crosses = depth + rise > layout.tolerance
+    foot = ((lattice.stand(start) - boundary.tail[edge]) * along.conj()).real / length
     at = foot - depth * (heading * along.conj()).real / length / np.where(rise == 0, 1.0, rise)
     crosses &= (at > -4 * layout.tolerance) & (at < length + 4 * layout.tolerance)
     return edge[crosses], start[crosses], direction[crosses]

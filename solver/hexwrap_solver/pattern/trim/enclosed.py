@@ -28,8 +28,10 @@ def met_by_pattern(layout: Layout, nodes: Nodes, edges: PatternEdges, boundary: 
     return met
 
 
-def around_enclosed(layout: Layout, boundary: Boundary, nodes: Nodes, met: Bools) -> Ints:
-    """Numbers order·node + direction of pattern edges with the cell on their left that holds a loop not met.
+def around_enclosed(
+    layout: Layout, boundary: Boundary, nodes: Nodes, edges: PatternEdges, met: Bools
+) -> Ints:
+    """Numbers of pattern edges with the cell on their left that holds a loop not met.
 
     From a place of the loop, the straight line to the nearest lattice node stays inside the cell of the
     tiling that holds the place. It ends at that node, a corner of the cell, or at another loop, which then
@@ -52,22 +54,21 @@ def around_enclosed(layout: Layout, boundary: Boundary, nodes: Nodes, met: Bools
     group = connected_components(graph, directed=False)[1]
     near = lattice.carry(lattice.invert(found.isometry), place)[arrived]
     arrival, mine = arrival[arrived], mine[arrived]
-    heading = np.angle(near - lattice.position(found.target[arrived]))
-    heading = heading + lattice.quantum * nodes.isometry[arrival, 0]
-    first = float(np.angle(lattice.position(lattice.steps[0])))
-    direction = np.floor((heading - first) / lattice.quantum).astype(np.int64) % lattice.order
+    heading = np.angle(near - lattice.stand(found.target[arrived]))
+    heading = heading + lattice.step_angle * nodes.isometry[arrival, 0] - np.angle(lattice.headings[0])
     node = nodes.node[arrival]
-    has = lattice.has_edge(nodes.point[nodes.own[node]], direction)
-    direction = np.where(has, direction, (direction - 1) % lattice.order)
+    slot = edges.slot_before(node, heading / (2 * np.pi) * lattice.directions)
     _, once = np.unique(group[mine], return_index=True)
-    return np.asarray((node * lattice.order + direction)[once])
+    return edges.number(node[once], slot[once])
 
 
 def nearest_node(lattice: Lattice, place: Complexes) -> Ints:
     """(k, 2) the node of the tiling nearest to each place."""
     start = np.floor(lattice.coordinates(place)).astype(np.int64)
-    around = np.stack(np.meshgrid(np.arange(-1, 3), np.arange(-1, 3)), axis=-1).reshape(-1, 2)
-    near = start[:, None] + around
-    distance = abs(lattice.position(near) - place[:, None])
+    largest = max(float(abs(outline - outline.mean()).max()) for outline in lattice.outlines.values())
+    far = int(np.ceil(largest * lattice.edge / lattice.unit.imag))
+    window = np.arange(-far, far + 2)
+    near = start[:, None] + np.stack(np.meshgrid(window, window), axis=-1).reshape(-1, 2)
+    distance = abs(lattice.stand(near) - place[:, None])
     distance[~lattice.is_node(near)] = np.inf
     return np.asarray(np.take_along_axis(near, distance.argmin(axis=1)[:, None, None], axis=1)[:, 0])

@@ -36,9 +36,12 @@ from hexwrap_solver.pattern.lay.cells import Cells, WholeCells, sides_by_edge
 from hexwrap_solver.pattern.lay.edges import PatternEdges
 from hexwrap_solver.pattern.lay.layout import Layout
 from hexwrap_solver.pattern.lay.nodes import Nodes
+from hexwrap_solver.pattern.place.glued import Glued
 from hexwrap_solver.pattern.trim.arrangement import HalfEdges, Points, arrangement
 from hexwrap_solver.pattern.trim.boundary import Boundary, met_by_chords
 from hexwrap_solver.pattern.trim.enclosed import around_enclosed
+from hexwrap_solver.pattern.trim.folds import Seams, seams, sewn, without_ends
+from hexwrap_solver.surface.features import FeatureEdges
 
 #: Pieces smaller than this part of a cell are joined to a cut neighbour, or dropped where there is none.
 SLIVER = 0.05
@@ -56,7 +59,7 @@ class TooCoarse(Exception):
 class Trimmed:
     """cells with points as corners; whole: (c,) not cut; points; dropped: area left out, in cells; joined and
     lost: how many pieces were joined to a neighbour or dropped; holed: how many cells were left out because
-    an opening lies inside them."""
+    an opening lies inside them. seams: which of the points on folds are one, None where there is no fold."""
 
     cells: Cells
     whole: Bools
@@ -65,22 +68,46 @@ class Trimmed:
     joined: int = 0
     lost: int = 0
     holed: int = 0
+    seams: Seams | None = None
+
+
+@dataclass(frozen=True)
+class Folded:
+    """Of a layout that is cut open along features. faces: (m, 3) of the surface."""
+
+    faces: Ints
+    glued: Glued
+    features: FeatureEdges
 
 
 def trim(
-    layout: Layout, boundary: Boundary, met: Bools, nodes: Nodes, edges: PatternEdges, cells: WholeCells
+    layout: Layout,
+    boundary: Boundary,
+    met: Bools,
+    nodes: Nodes,
+    edges: PatternEdges,
+    cells: WholeCells,
+    folded: Folded | None = None,
+    *,
+    rim: bool = True,
 ) -> Trimmed:
     """Whole cells and the cells that the boundary cuts.
 
-    met: (loops,) those that the pattern meets, or that no cell may enclose.
+    met: (loops,) those that the pattern meets, or that no cell may enclose. folded: with features. rim:
+    whether cells that the boundary of the surface cuts are kept, too, and not only those along folds.
 
     Raises TooCoarse where a face goes around the surface.
     """
     lattice = layout.lattice
-    side_of_edge = sides_by_edge(lattice, edges, cells)
+    side_of_edge = sides_by_edge(edges, cells)
     used = side_of_edge >= 0
-    points, half_edges = arrangement(layout, boundary, nodes, edges, used)
+    points, half_edges, on = arrangement(layout, boundary, nodes, edges, used)
+    seam = None
+    if folded is not None:
+        seam = seams(layout, folded.faces, folded.glued, folded.features, boundary, on, len(points.face))
     faces = _trace(layout, half_edges, used)
+    if not rim:
+        faces = faces.without_rim(half_edges)
     area = _areas(layout, points, faces)
     nothing, sliver = NOTHING * layout.tolerance * lattice.edge, SLIVER * lattice.cell_area
     gone = _slivers(half_edges, faces, area, (nothing, sliver), _lengths(layout, points, half_edges))
@@ -89,19 +116,30 @@ def trim(
         joined = int(((area > nothing) & (area < sliver)).sum())
         half_edges = half_edges.without(gone)
         faces = _trace(layout, half_edges, used)
+        if not rim:
+            faces = faces.without_rim(half_edges)
         linked = np.bincount(half_edges.tail[~half_edges.outer], minlength=len(points.face)) > 1
+        if seam is not None:
+            linked = seam.any_of(linked)
         faces = faces.entries(~points.straight[faces.corner] | linked[faces.corner])
         area = _areas(layout, points, faces)
     small = area < sliver
     lost = int((small & (area > nothing)).sum())
     kept = faces.part(~small)
-    together = _together(layout, cells, side_of_edge, kept, half_edges, edges)
+    together = _together(cells, side_of_edge, kept, half_edges, edges)
     whole = np.arange(together.n) < cells.n
     dropped = float(area[small & (area > 0)].sum() / lattice.cell_area)
-    holed = around_enclosed(layout, boundary, nodes, met_by_chords(met, layout, boundary))
+    holed = around_enclosed(layout, boundary, nodes, edges, met_by_chords(met, layout, boundary))
     keep = ~_left_of(holed, cells, side_of_edge, kept, half_edges)
+    together = together.part(keep)
+    if seam is not None:
+        together, had = without_ends(lattice, sewn(lattice, together, seam))
+        # What only a fold's end had reached into is whole again.
+        on_node = np.add.reduceat(together.corner.values < nodes.n, together.corner.offsets[:-1])
+        full = (on_node == lattice.sides) & (together.corner.lengths == lattice.sides)
+        whole[keep] |= had & full
     return Trimmed(
-        together.part(keep), whole[keep], points, dropped, max(joined - lost, 0), lost, int((~keep).sum())
+        together, whole[keep], points, dropped, max(joined - lost, 0), lost, int((~keep).sum()), seam
     )
 
 
@@ -130,6 +168,12 @@ class _Faces:
         offsets = np.concatenate([[0], np.cumsum(self.half_edge.lengths[keep])])
         half_edge = Ragged(self.half_edge.values[entry], offsets)
         return _Faces(half_edge, self.isometry[entry], self.corner[entry])
+
+    def without_rim(self, edges: HalfEdges) -> _Faces:
+        """Those that do not come to the boundary of the surface."""
+        at_rim = np.zeros(self.half_edge.n_rows, dtype=bool)
+        at_rim[self.half_edge.row[edges.rim[self.half_edge.values]]] = True
+        return self.part(~at_rim)
 
     def entries(self, keep: Bools) -> _Faces:
         """All faces with some of their corners; the side before a corner left out goes on to the next."""
@@ -221,7 +265,6 @@ def _slivers(
 
 
 def _together(
-    layout: Layout,
     whole: WholeCells,
     side_of_edge: Ints,
     cut: _Faces,
@@ -229,14 +272,14 @@ def _together(
     edges: PatternEdges,
 ) -> Cells:
     """Whole and cut cells in one; twins are found by half-edges, or by the pattern edges they run along."""
-    lattice, size = layout.lattice, len(whole.direction)
+    size = len(whole.slot)
     half_edge = cut.half_edge.values
     side_of_half = np.full(len(half_edges.tail), -1, dtype=np.int64)
     side_of_half[half_edge] = size + np.arange(len(half_edge))
     side_of_edge = side_of_edge.copy()
     name = half_edges.name[half_edge]
     side_of_edge[name[name >= 0]] = side_of_half[half_edge[name >= 0]]
-    reverse = edges.reverse(lattice, whole.corner.values.astype(np.int64), whole.direction)
+    reverse = edges.back[whole.corner.values, whole.slot]
     twin_cut = side_of_half[half_edges.twin[half_edge]]
     twin_name = half_edges.name[half_edges.twin[half_edge]]
     twin_cut = np.where((twin_cut < 0) & (twin_name >= 0), side_of_edge[twin_name], twin_cut)
@@ -248,4 +291,5 @@ def _together(
         ),
         np.concatenate([whole.isometry, cut.isometry]),
         np.concatenate([side_of_edge[reverse], twin_cut]),
+        np.concatenate([whole.index, np.zeros(cut.half_edge.n_rows, dtype=np.int64)]),
     )

@@ -20,6 +20,7 @@ from hexwrap_solver.surface.mesh_sizes import ROW, cumulated
 from hexwrap_solver.surface.nurbs import evaluate_points, tangents
 from hexwrap_solver.surface.projection import project
 from hexwrap_solver.surface.topology import edge_lengths, half_edges, sum_rows, twins
+from hexwrap_solver.tolerances import TINY
 
 #: Points inside keep away from the boundary by this part of its edges' lengths, which are looked at in so
 #: many places each.
@@ -89,8 +90,14 @@ def polygon_of(uv: Floats, loops: Ints) -> shapely.Polygon:
     return shapely.Polygon(rings[0], rings[1:])
 
 
-def piece_of(patch: Patch, outline: Outline, field: Field, sizes: Sizes, most: int, name: int) -> Piece:
-    """Triangles inside the outline; no inner edge longer than wanted. Raises TrimError."""
+def piece_of(
+    patch: Patch, outline: Outline, field: Field, sizes: Sizes, most: int, name: int, taken: set[int]
+) -> Piece:
+    """Triangles inside the outline; no inner edge longer than wanted, none a second one between two vertices.
+
+    taken: keys (see ``key_of``) of edges that the mesh has already, those of the face's own outline included;
+    its inner edges between vertices of the outline are added. Raises TrimError.
+    """
     chart = Chart.of(field)
     inner = _inner(patch, chart, outline)
     uv = np.concatenate([outline.uv, inner])
@@ -122,7 +129,38 @@ def piece_of(patch: Patch, outline: Outline, field: Field, sizes: Sizes, most: i
     piece = Piece(uv, points, faces, lines, loose, fixed)
     for _ in range(SMOOTHINGS):
         piece = _smoothed(patch, piece)
-    return _split_long(patch, piece, sizes, most)
+    return _without_doubles(patch, _split_long(patch, piece, sizes, most), outline.id, taken)
+
+
+def key_of(one: Ints, two: Ints) -> Ints:
+    """(k,) one number for each edge between mesh vertices, in either direction."""
+    return np.asarray(np.minimum(one, two) << 32 | np.maximum(one, two))
+
+
+def _without_doubles(patch: Patch, piece: Piece, id: Ints, taken: set[int]) -> Piece:
+    """Inner edges between two mesh vertices that another edge joins, too, are halved.
+
+    Such come where a face is only a few triangles wide around a pole or a seam, whose two sides are the same
+    vertices, and where faces have chords between the same corners.
+    """
+    own = np.array(sorted(taken), dtype=np.int64)
+    for _ in range(ROUNDS):
+        n = len(piece.points)
+        label = np.concatenate([id, np.full(n - len(id), -1)])
+        inside = label < 0
+        label[inside] = (1 << 31) + np.flatnonzero(inside)
+        twin = twins(piece.faces, n)
+        start, end = half_edges(piece.faces)
+        h = np.flatnonzero(twin > np.arange(len(twin)))
+        key = key_of(label[start[h]], label[end[h]])
+        _, place, count = np.unique(key, return_inverse=True, return_counts=True)
+        chord = ~inside[start[h]] & ~inside[end[h]]
+        double = (count[place] > 1) | (chord & np.isin(key, own))
+        if not double.any():
+            taken.update(key[chord].tolist())
+            break
+        piece = _halved(patch, piece, h[double])
+    return piece
 
 
 def _one_per_pole(outline: Outline, points: Floats, n: int) -> Ints:
@@ -205,7 +243,7 @@ def _unevenness(rise: Floats, inside: Bools) -> float:
     weight = np.where(inside, 1.0, 1e-3)
     mean = (rise * weight).sum(axis=1) / weight.sum(axis=1)
     spread = (np.abs(rise - mean[:, None]) * weight).sum(axis=1) / weight.sum(axis=1)
-    return float((spread / np.maximum(mean, 1e-300)).mean())
+    return float((spread / np.maximum(mean, TINY)).mean())
 
 
 def _inner(patch: Patch, chart: Chart, outline: Outline) -> Floats:
@@ -268,7 +306,7 @@ def _smoothed(patch: Patch, piece: Piece, fresh: Bools | None = None) -> Piece:
     at, du, dv = tangents(patch.opened, piece.uv[move])
     away = middle[move] - at
     e, f, g, p, q = (dot(a, b) for a, b in ((du, du), (du, dv), (dv, dv), (away, du), (away, dv)))
-    determinant = np.maximum(e * g - f * f, 1e-12 * np.maximum(e * g, 1e-300))
+    determinant = np.maximum(e * g - f * f, 1e-12 * np.maximum(e * g, TINY))
     step = np.stack([g * p - f * q, e * q - f * p], axis=1) / determinant[:, None]
     uv, points = piece.uv.copy(), piece.points.copy()
     uv[move] += step
@@ -293,7 +331,7 @@ def _least_angles(points: Floats, faces: Ints) -> Floats:
     """(m,) the smallest angle of each triangle, radians, between its longer sides."""
     length = np.sort(edge_lengths(points, faces), axis=1)
     area = np.linalg.norm(face_normals(points, faces), axis=1)
-    sine = area / np.maximum(length[:, 1] * length[:, 2], 1e-300)
+    sine = area / np.maximum(length[:, 1] * length[:, 2], TINY)
     return np.asarray(np.arcsin(np.clip(sine, 0.0, 1.0)))
 
 

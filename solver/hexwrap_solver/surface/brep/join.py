@@ -14,6 +14,7 @@ from hexwrap_solver.arrays import Floats, Ints
 from hexwrap_solver.geometry import dot
 from hexwrap_solver.surface.brep.curves import evaluate_curve, places
 from hexwrap_solver.surface.brep.types import Brep, Edge, Face, Trim
+from hexwrap_solver.tolerances import TINY
 
 #: Each step between two places of a curve is sampled at this many points.
 FINER = 4
@@ -64,7 +65,7 @@ def nearest_on(edge: Edge, points: Floats) -> tuple[Floats, Floats]:
         speed = dot(tangent, tangent)
         second = speed + dot(off, bend)
         second = np.where(second > 0.1 * speed, second, speed)
-        best = np.clip(best - slope / np.maximum(second, 1e-300), low, high)
+        best = np.clip(best - slope / np.maximum(second, TINY), low, high)
     return best, np.linalg.norm(evaluate_curve(edge.curve, best)[0] - points, axis=1)
 
 

@@ -20,6 +20,7 @@ from hexwrap_solver.surface.brep.sizes import Field, bilinear
 from hexwrap_solver.surface.mesh_sizes import cumulated
 from hexwrap_solver.surface.nurbs import evaluate, evaluate_points
 from hexwrap_solver.surface.types import NurbsSurface
+from hexwrap_solver.tolerances import TINY
 
 #: Normals that turn by more than this across a knot make a kink, radians.
 KINK = np.deg2rad(1.0)
@@ -119,7 +120,7 @@ def kink_lines(
     if not kinks:
         return outline
     uv = outline.uv.copy()
-    speeds = [max(float(s.mean()), 1e-300) for s in (field.speed_u, field.speed_v)]
+    speeds = [max(float(s.mean()), TINY) for s in (field.speed_u, field.speed_v)]
     for d, x in kinks:
         near = np.abs(uv[:, d] - x) <= np.maximum(2 * tolerance / speeds[d], ON_LINE * patch.width[d])
         uv[near, d] = x

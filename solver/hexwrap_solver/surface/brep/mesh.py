@@ -16,7 +16,7 @@ import shapely
 from hexwrap_solver.arrays import Floats, Ints
 from hexwrap_solver.geometry import angles_between, dot, normalize, quarter_turn
 from hexwrap_solver.surface.brep.curves import corners, curvature, evaluate_curve, places
-from hexwrap_solver.surface.brep.face import Outline, Piece, piece_of, polygon_of
+from hexwrap_solver.surface.brep.face import Outline, Piece, key_of, piece_of, polygon_of
 from hexwrap_solver.surface.brep.kinks import crossings, kink_lines, kinks_of
 from hexwrap_solver.surface.brep.pull import Patch, free, lifted, patch_of, pull
 from hexwrap_solver.surface.brep.sizes import Field, Sizes, field_of, meeting, sized
@@ -26,6 +26,7 @@ from hexwrap_solver.surface.mesh_sizes import GRADE, ROW, check_settings
 from hexwrap_solver.surface.nurbs import evaluate
 from hexwrap_solver.surface.topology import sum_rows
 from hexwrap_solver.surface.types import MeshSettings
+from hexwrap_solver.tolerances import TINY
 
 #: Normals of two faces that differ by more than this along their edge make a crease, radians.
 CREASE = np.deg2rad(5.0)
@@ -225,7 +226,7 @@ def _refined(edge: Edge, t: Floats, sizes: Sizes) -> Floats:
         chord = np.diff(point, axis=0)
         length = np.linalg.norm(chord, axis=1)
         offset = evaluate_curve(edge.curve, middle)[0] - (point[1:] + point[:-1]) / 2
-        along = dot(offset, chord) / np.maximum(length, 1e-300) ** 2
+        along = dot(offset, chord) / np.maximum(length, TINY) ** 2
         height = np.linalg.norm(offset - along[:, None] * chord, axis=1)
         bad = (length > sizes.longest) | (height > sizes.height)
         if not bad.any():
@@ -249,10 +250,11 @@ def _sewn(
     faces, names, uvs, around = [], [], [], []
     flanks: dict[int, list[Floats]] = {}
     creases, folds = [], []
+    taken = {key for d in divided.values() for key in key_of(d.id[:-1], d.id[1:]).tolist()}
     for name, side in enumerate(sides):
         outline, trims = _outline(side, divided, first, brep)
         outline = kink_lines(side.patch, side.kinks, side.field, outline, brep.tolerance)
-        piece = piece_of(side.patch, outline, side.field, sizes, most, name)
+        piece = piece_of(side.patch, outline, side.field, sizes, most, name, taken)
         label = np.concatenate([outline.id, np.full(len(piece.uv) - len(outline.id), -1)])
         fresh = label < 0
         label[fresh] = total + np.arange(int(fresh.sum()))

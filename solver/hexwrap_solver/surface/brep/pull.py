@@ -24,6 +24,8 @@ from hexwrap_solver.surface.types import NurbsSurface
 LINES, MOST_LINES = 16, 160
 #: This many grid points are tried where the nearest one leads astray.
 ATTEMPTS = 6
+#: Points far off are pulled again from their neighbours in so many rounds.
+FOLLOWED = 8
 #: A parameter whose whole range moves a point by less than this part of the surface's size is free there.
 POLE = 1e-6
 #: Edges may lie off a face by this many times the file's tolerance; further off, the face is refused.
@@ -87,7 +89,29 @@ def pull(
         trial = np.linalg.norm(points[again] - foot, axis=1)
         better = trial < distance[again]
         uv[again[better]], distance[again[better]] = other[better], trial[better]
+    _follow(patch, points, uv, distance, tolerance)
     return uv, distance
+
+
+def _follow(patch: Patch, points: Floats, uv: Floats, distance: Floats, tolerance: float) -> None:
+    """Points (k, 3) of a curve that are far off the surface are pulled again, in place, from where their
+    neighbours along the curve came to lie."""
+    k = len(points)
+    for _ in range(FOLLOWED):
+        before = distance.copy()
+        for step in (1, -1):
+            again = np.flatnonzero(distance > tolerance)
+            beside = (again + step) % max(k, 1)
+            closer = distance[beside] < distance[again]
+            again, beside = again[closer], beside[closer]
+            if len(again) == 0:
+                continue
+            foot, other, _ = project(patch.surface, points[again], uv[beside])
+            trial = np.linalg.norm(points[again] - foot, axis=1)
+            better = trial < distance[again]
+            uv[again[better]], distance[again[better]] = other[better], trial[better]
+        if np.array_equal(before, distance):
+            break
 
 
 def lifted(
@@ -115,7 +139,9 @@ def lifted(
                 f"(file tolerance {tolerance:.3g}): run ExtractBadSrf in Rhino, or rebuild that face.",
                 data={"face": name},
             )
-        _settle_poles(patch, uv, np.cumsum([0, *map(len, solid)]))
+        first = np.cumsum([0, *map(len, solid)])
+        _settle_ends(patch, np.concatenate(solid), uv, first, FAR * tolerance)
+        _settle_poles(patch, uv, first)
         pieces = iter(np.split(uv, np.cumsum([len(t) for t in solid])[:-1]))
         loops.append(_chained(patch, [None if t is None else next(pieces) for t in trims], name))
     return loops
@@ -126,6 +152,27 @@ def free(patch: Patch, uv: Floats) -> Bools:
     jet = evaluate(patch.opened, patch.low + np.mod(uv - patch.low, patch.width * (1 + 1e-12)))
     moves = np.stack([np.linalg.norm(jet.du, axis=1), np.linalg.norm(jet.dv, axis=1)], axis=1)
     return np.asarray(moves * patch.width <= POLE * patch.size)
+
+
+def _settle_ends(patch: Patch, points: Floats, uv: Floats, first: Floats, allowed: float) -> None:
+    """Ends of trims lie on the side of a slit that the trim comes from, in place.
+
+    Where a surface almost closes, by more than the tolerance, its two ends are equally near.
+    """
+    ends = np.concatenate([first[:-1], first[1:] - 1])
+    inward = np.concatenate([first[:-1] + 1, first[1:] - 2])
+
+    def jumps(own: Floats, beside: Floats) -> Bools:
+        return np.asarray(((np.abs(own - beside) > patch.width / 2) & ~closed).any(axis=1))
+
+    closed = np.array(patch.surface.closed)
+    torn = jumps(uv[ends], uv[inward])
+    ends, inward = ends[torn], inward[torn]
+    if len(ends) == 0:
+        return
+    foot, other, _ = project(patch.surface, points[ends], uv[inward])
+    good = (np.linalg.norm(points[ends] - foot, axis=1) <= allowed) & ~jumps(other, uv[inward])
+    uv[ends[good]] = other[good]
 
 
 def _settle_poles(patch: Patch, uv: Floats, first: Floats) -> None:

@@ -6,24 +6,51 @@ have a mesher of their own, whose rows have no seam.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from hexwrap_solver.arrays import Ragged
+from hexwrap_solver.errors import SurfaceError
 from hexwrap_solver.surface.brep.kinks import is_smooth
 from hexwrap_solver.surface.brep.mesh import mesh_brep
 from hexwrap_solver.surface.brep.types import Brep
 from hexwrap_solver.surface.brep.whole import brep_of_surface
-from hexwrap_solver.surface.errors import NotClosedError, PoleError
+from hexwrap_solver.surface.errors import (
+    NonManifoldEdgeError,
+    NonManifoldVertexError,
+    NotClosedError,
+    PoleError,
+    TrimError,
+)
 from hexwrap_solver.surface.intake import surface_from_mesh
 from hexwrap_solver.surface.meshing import surface_from_nurbs
 from hexwrap_solver.surface.nurbs_checks import TOLERANCE, check_data, check_pinches, checked
+from hexwrap_solver.surface.pieces import joined, together
 from hexwrap_solver.surface.types import NurbsSurface, SentMesh, Surface, SurfaceSettings
 
 
 def surface_from_brep(brep: Brep, settings: SurfaceSettings | None = None) -> Surface:
-    """input_vertex numbers the vertices of the mesh. Raises SurfaceError."""
+    """input_vertex numbers the vertices of the mesh. Where faces have trims that cannot be meshed, the meshes
+    that came with them are taken, which repairs says. Raises SurfaceError."""
     settings = settings or SurfaceSettings()
-    return surface_from_mesh(sent_of_brep(brep, settings), settings)
+    try:
+        return surface_from_mesh(sent_of_brep(brep, settings), settings)
+    except (TrimError, NonManifoldEdgeError, NonManifoldVertexError) as error:
+        render = [face.render for face in brep.faces if face.render is not None]
+        if len(render) < len(brep.faces):
+            raise
+        try:
+            mesh, _, joint = joined(together(render)[0], brep.tolerance)
+            surface = surface_from_mesh(mesh, settings)
+        except SurfaceError:
+            raise error from None
+        reason = error.detail.partition(": ")[0]
+        sentence = (
+            f"The file's own render meshes of {len(render)} faces were taken, joined with gaps of up to "
+            f"{joint.gap:.3g}. {reason}."
+        )
+        return replace(surface, repairs=(sentence, *surface.repairs)).knowing(surface)
 
 
 def surface_from_patch(

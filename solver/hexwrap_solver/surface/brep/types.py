@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hexwrap_solver.arrays import Floats
-from hexwrap_solver.surface.types import NurbsSurface
+from hexwrap_solver.surface.types import NurbsSurface, SentMesh
 
 
 @dataclass(frozen=True)
@@ -54,12 +54,14 @@ class Face:
     """A NURBS surface inside its loops of trims.
 
     loops: each closed, with the face on its left in the parameters' plane; the outer one first.
-    reversed: whether the outside is opposite to ∂u × ∂v.
+    reversed: whether the outside is opposite to ∂u × ∂v. render: a mesh of the face that came with it, its
+    faces looking outwards; only used where we cannot make one.
     """
 
     surface: NurbsSurface
     loops: tuple[tuple[Trim, ...], ...]
     reversed: bool
+    render: SentMesh | None = None
 
 
 @dataclass(frozen=True)
@@ -88,6 +90,7 @@ class Brep:
                 face,
                 surface=replace(face.surface, control_points=moved(face.surface.control_points)),
                 reversed=face.reversed != mirrored,
+                render=face.render and face.render.transformed(matrix),
             )
             for face in self.faces
         )

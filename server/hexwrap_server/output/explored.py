@@ -1,0 +1,107 @@
+"""An exploration as it goes over the wire, and as a table."""
+
+from __future__ import annotations
+
+import csv
+import io
+from typing import Any
+
+import numpy as np
+import orjson
+
+from hexwrap_server.jobs import codec
+from hexwrap_solver.explore.front import best_of, front_of, within
+from hexwrap_solver.explore.types import Figures, Limits
+
+Json = dict[str, Any]
+#: Columns of ``explore.csv`` after the number of the variant.
+CHOICES = ("boundary", "singularities", "kind", "rotation", "around", "edge_length", "sizes", "joint")
+FORESEEN = ("uncovered", "panels", "types", "cost")
+MEASURED = (*FORESEEN, "gap_max")
+
+
+def variant(request: Json, seen: Figures) -> Json:
+    """Before anything is measured. problem: why it could not be solved."""
+    predicted = {name: getattr(seen, name) for name in FORESEEN}
+    return {"request": request, "predicted": predicted, "measured": None, "front": False, "problem": None}
+
+
+def figures(found: Figures) -> Json:
+    return {name: getattr(found, name) for name in MEASURED}
+
+
+def summary(documents: list[Json], limits: Limits, refused: list[str]) -> Json:
+    """The whole result: which are on the front, which one is proposed, and what there is to say. refused: why
+    further variants cannot be made."""
+    solved = [i for i, one in enumerate(documents) if one["measured"] is not None]
+    found = {i: Figures(**documents[i]["measured"]) for i in solved}
+    kept = [i for i in solved if within(found[i], limits, documents[i]["request"]["panels"]["sizes"])]
+    notes = [
+        f"{len(documents)} variants were foreseen from their maps, {len(solved)} of them solved and measured."
+    ]
+    front = [kept[p] for p in np.flatnonzero(front_of([found[i] for i in kept]))]
+    for i in front:
+        documents[i]["front"] = True
+    best = None
+    if front:
+        best = front[best_of([found[i] for i in front])]
+    elif solved:
+        best = min(solved, key=lambda i: _excess(found[i], documents[i], limits))
+        notes.append("No variant that was solved keeps all limits; the best of them exceeds them least.")
+    problems = refused + [one["problem"] for one in documents if one["problem"]]
+    if problems:
+        notes.append(f"{len(problems)} variants cannot be made. {max(problems, key=problems.count)}")
+    return {"variants": documents, "front": front, "best": best, "notes": notes}
+
+
+def _excess(found: Figures, document: Json, limits: Limits) -> float:
+    """Relative, of all limits together."""
+    sizes = document["request"]["panels"]["sizes"]
+    pairs = ((sizes, limits.sizes), (found.gap_max, limits.max_gap), (found.panels, limits.panels))
+    return sum(max(has / max(most, 1e-12) - 1, 0.0) for has, most in pairs if has and most is not None)
+
+
+def packed(document: Json) -> bytes:
+    """The result as a file of the store."""
+    return codec.encode({"explored": result_json(document).decode()})
+
+
+def kept(data: bytes) -> Json:
+    """What ``packed`` has written. Raises CodecError."""
+    found: Json = orjson.loads(codec.decode(data)["explored"])
+    return found
+
+
+def result_json(document: Json) -> bytes:
+    return orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY)
+
+
+def explore_csv(document: Json) -> bytes:
+    """A row per variant: its choices, what was foreseen, what was measured (empty where nothing was)."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\r\n")  # RFC 4180
+    heads = [f"predicted_{name}" for name in FORESEEN] + [f"measured_{name}" for name in MEASURED]
+    writer.writerow(["variant", *CHOICES, *heads, "front", "best", "problem"])
+    for i, one in enumerate(document["variants"]):
+        predicted, measured = one["predicted"] or {}, one["measured"] or {}
+        writer.writerow(
+            [
+                i,
+                *choices(one["request"]),
+                *(predicted.get(name, "") for name in FORESEEN),
+                *("" if measured.get(name) is None else measured[name] for name in MEASURED),
+                int(one["front"]),
+                int(i == document["best"]),
+                one["problem"] or "",
+            ]
+        )
+    return text.getvalue().encode()
+
+
+def choices(request: Json) -> list[Any]:
+    """As ``CHOICES`` names them; empty text where nothing is asked."""
+    pattern, panels = request["pattern"], request["panels"]
+    asked = request["singularities"] or {}
+    row = [request["boundary"]["mode"], len(asked.get("at", ())), pattern["kind"], pattern["rotation"]]
+    row += [pattern["around"], pattern["edge_length"], panels["sizes"], panels["joint"]]
+    return ["" if value is None else value for value in row]

@@ -1,0 +1,170 @@
+"""What panels will come to, foreseen from the map and the place of the lattice on it, without a pattern.
+
+The cell that would stand at a point has an edge in proportion to e^−u, so that over the surface the sizes of
+the cells are known, and how many there are of each. Their largest regular panels are smaller for one reason
+that the map tells: where u has a gradient, the cell is no regular polygon. To first order the map carries the
+polygon P around 0 by z + a z²/2, where |a| is the gradient of u; its edges turn, and the largest regular
+polygon between them is shorter by ``FLOOR``·|a|·ℓ of its edge ℓ. With these lengths the exact programme over
+the size classes (``partition_by_area``) says how much is left uncovered.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from hexwrap_solver.arrays import Floats, Progress, no_progress
+from hexwrap_solver.conformal.types import ConformalMap
+from hexwrap_solver.panels.sizes import partition_by_area
+from hexwrap_solver.pattern.lattice import LATTICES
+from hexwrap_solver.pattern.place.choose import Placing
+from hexwrap_solver.pattern.place.rotation import with_rotation
+from hexwrap_solver.pattern.types import PatternSettings
+
+#: By sides. The linear programme for the polygon inside, at first order in a = |a|·e^iθ, has the value
+#: 1 − |a|·ℓ·c·max_k cos(θ − θ_k), the θ_k being spread evenly: c = 1/2 for hexagons (6 directions) and for
+#: squares (4), 1/3 for triangles (6). The mean over θ of the greatest cosine is (m/π)·sin(π/m).
+FLOOR = {
+    sides: c * m / np.pi * np.sin(np.pi / m) for sides, c, m in ((6, 1 / 2, 6), (4, 1 / 2, 4), (3, 1 / 3, 6))
+}
+#: Half a row of cells, in edges, where every other cell of a row stands half a cell higher.
+ROW = {6: np.sqrt(3) / 4, 4: 0.0, 3: 0.0}
+#: Cells that a boundary cuts, per cell of area that is left of them: those whose middle is nearer to it than
+#: they reach, on either side, of which half the area is inside.
+TRIMMED = 2.0
+#: Points on each edge of the boundary from which distances are taken.
+FINE = 4
+#: Cells whose sizes differ by less than this (relatively) count as one.
+ALIKE = 1e-3
+
+
+@dataclass(frozen=True)
+class Foreseen:
+    """Cells of one pattern. uncovered: share of their area that is left open. panels: their number. types:
+    different lengths, and panels with another number of sides. area, perimeter: of all panels, model units.
+    """
+
+    uncovered: float
+    panels: int
+    types: int
+    area: float
+    perimeter: float
+
+
+@dataclass(frozen=True)
+class Outlook:
+    """The cells that a map and a placed lattice lead to.
+
+    sides: of a regular cell. number: (n,) whole cells around each vertex of the mesh, a fraction mostly.
+    size: (n,) edge of a regular polygon as large as such a cell, model units; limit: (n,) edge of its largest
+    panel without a joint. Whole cells are those whose middle is as far from the boundary as they reach, on
+    the average over all directions (perimeter/2π); along a loop that is a line of the pattern, what the first
+    row of middles stands for begins half a row from the loop. special: cells with another number of sides,
+    and trimmed: cut at the boundary; rest: the area of both, which their panels are taken to cover.
+    """
+
+    sides: int
+    number: Floats
+    size: Floats
+    limit: Floats
+    special: int = 0
+    trimmed: int = 0
+    rest: float = 0.0
+
+    def foresee(self, sizes: int | None, joint: float = 0.0) -> Foreseen:
+        """With so many size classes (None: a length for each panel) and joints at least so wide."""
+        limit = np.maximum(self.limit - joint * np.tan(np.pi / self.sides), 0.0)
+        unit = self.sides / (4 * np.tan(np.pi / self.sides))
+        roomy = (limit > 0) & (self.number > 0)
+        limit, number = limit[roomy], self.number[roomy]
+        others = self.special + self.trimmed
+        if not len(limit):
+            return Foreseen(1.0, 0, 0, 0.0, 0.0)
+        length, count = _levels(limit, number)
+        used = min(len(length), round(float(count.sum())))
+        if sizes is not None:
+            made = partition_by_area(length, sizes, count)
+            start = made.start[-1]
+            length = np.repeat(length[start], np.diff(np.append(start, len(length))))
+            used = len(start)
+        area = unit * float(count @ length**2) + self.rest
+        cells = unit * float(self.number @ self.size**2) + self.rest
+        # a piece of a cell is as compact as the cell, more or less
+        around = float(np.sqrt(others * self.rest / unit)) * self.sides
+        return Foreseen(
+            1 - area / cells,
+            round(float(count.sum())) + others,
+            used + others,
+            area,
+            self.sides * float(count @ length) + around,
+        )
+
+
+def outlook(cmap: ConformalMap, settings: PatternSettings, progress: Progress = no_progress) -> Outlook:
+    """The lattice is placed as for the pattern itself, but no cell is made.
+
+    Raises NotAdaptedError, PatternError as ``lay_pattern`` does where no lattice fits.
+    """
+    lattice = LATTICES[settings.kind]
+    settings, _ = with_rotation(cmap, lattice, settings)
+    placing = Placing.of(cmap, lattice, settings)
+    progress(0.5, "placing the lattice")
+    placement = placing.at(settings)
+    surface = cmap.surface
+    p, q, r = placement.glued.corners(surface.faces, placement.place).T
+    cells = abs(((q - p).conj() * (r - p)).imag) / (2 * lattice.cell_area)
+    a, b, c = (surface.vertices[corner] for corner in surface.faces.T)
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+    number = np.bincount(surface.faces.ravel(), np.repeat(cells, 3) / 3, len(surface.vertices))
+    unit = lattice.sides / (4 * np.tan(np.pi / lattice.sides))
+    size = np.exp(-(cmap.log_scale - cmap.log_scale.mean()))
+    size *= np.sqrt(area.sum() / (unit * float(number @ size**2)))
+    slope = np.bincount(surface.faces.ravel(), np.repeat(area * _slope(cmap, area), 3))
+    slope /= np.maximum(np.bincount(surface.faces.ravel(), np.repeat(area, 3)), 1e-300)
+    shorter = np.minimum(FLOOR[lattice.sides] * slope * size, 1.0)
+    reach = lattice.sides / (2 * np.pi) * size
+    spread = np.sqrt(np.bincount(surface.faces.ravel(), np.repeat(area, 3) / 3, len(size)))
+    regular, rest, alone, cut = number, 0.0, 0, 0
+    if len(cmap.cones):
+        away = cKDTree(surface.vertices[cmap.cones.vertex]).query(surface.vertices)[0]
+        regular = regular * _beyond(away, reach, spread)
+        alone, rest = len(cmap.cones), unit * float((number - regular) @ size**2)
+    whole = regular
+    for i, loop in enumerate(surface.loops):
+        least = ROW[lattice.sides] * size if i in placing.loops else reach
+        whole = whole * _beyond(_distance(surface.vertices, surface.vertices[loop]), least, spread)
+    if settings.boundary == "trim":
+        rest += unit * float((regular - whole) @ size**2)
+        cut = round(TRIMMED * float((regular - whole).sum()))
+    return Outlook(lattice.sides, whole, size, size * (1 - shorter), alone, cut, rest)
+
+
+def _beyond(distance: Floats, least: Floats, spread: Floats) -> Floats:
+    """(n,) which part of what stands around each vertex, within half of ``spread``, is farther away."""
+    return np.asarray(np.clip((distance - least) / spread + 0.5, 0.0, 1.0))
+
+
+def _distance(points: Floats, rim: Floats) -> Floats:
+    """(n,) to a closed polyline, all but."""
+    along = np.roll(rim, -1, axis=0) - rim
+    fine = rim[:, None] + np.linspace(0, 1, FINE, endpoint=False)[:, None] * along[:, None]
+    return np.asarray(cKDTree(fine.reshape(-1, 3)).query(points)[0])
+
+
+def _slope(cmap: ConformalMap, area: Floats) -> Floats:
+    """(m,) |∇u| on each triangle, per length of the model."""
+    surface = cmap.surface
+    corner = surface.vertices[surface.faces]
+    opposite = np.roll(corner, -2, axis=1) - np.roll(corner, -1, axis=1)  # of corner k: from k+1 to k+2
+    turned = (cmap.log_scale[surface.faces][..., None] * opposite).sum(axis=1)  # the gradient, turned by 90°
+    return np.asarray(np.linalg.norm(turned, axis=1) / np.maximum(2 * area, 1e-300))
+
+
+def _levels(length: Floats, number: Floats) -> tuple[Floats, Floats]:
+    """Lengths ascending that differ by ``ALIKE`` at least, and how many cells have each."""
+    level = np.floor(np.log(length / length.min()) / ALIKE).astype(np.int64)
+    total, whole = np.bincount(level, number), np.bincount(level, number * length**2)
+    there = total > 0
+    return np.sqrt(whole[there] / total[there]), total[there]

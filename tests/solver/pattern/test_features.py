@@ -1,0 +1,76 @@
+"""Patterns along creases: no cell crosses a fold, and lines of the pattern follow it where they can."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from hexwrap_solver.conformal import conformal_map
+from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap
+from hexwrap_solver.panels.polygons import best_plane_distances, fan_areas
+from hexwrap_solver.pattern import lay_pattern
+from hexwrap_solver.pattern.lattice import LATTICES
+from hexwrap_solver.pattern.place.choose import Placing
+from hexwrap_solver.pattern.place.deform import distortion_of
+from hexwrap_solver.pattern.types import Kind, Pattern, PatternSettings
+from tests.solver.pattern.folded import ELL, RECTANGLE, prism
+
+PLANS = {"box": RECTANGLE, "ell": ELL}
+
+
+@cache
+def solved(plan: str, twist: float = 0.0) -> ConformalMap:
+    return conformal_map(prism(PLANS[plan], edge=2.0, twist=twist), BoundaryCondition("straight"))
+
+
+def euler(pattern: Pattern) -> int:
+    edges = (len(pattern.faces.values) + int((pattern.neighbours.values < 0).sum())) // 2
+    return len(pattern.vertices) - edges + pattern.n_cells
+
+
+@pytest.mark.parametrize("plan", ["box", "ell"])
+@pytest.mark.parametrize("kind", ["hex", "triangle", "quad"])
+@pytest.mark.parametrize("rotation", ["edge", "vertex", 10.0])
+def test_no_cell_crosses_a_fold_and_nothing_is_lost(plan: str, kind: Kind, rotation: float) -> None:
+    """Aligned or not: cells lie in the planes of the walls, meet across folds and cover the whole."""
+    cmap = solved(plan)
+    pattern = lay_pattern(cmap, PatternSettings(kind, around=37, rotation=rotation, boundary="trim"))
+    assert abs(best_plane_distances(pattern.cells)).max() < 1e-12 * 60
+    assert euler(pattern) == 0
+    area = fan_areas(pattern.cells)
+    assert (area > 0).all()
+    sides = np.array(PLANS[plan])
+    wall = 60 * np.linalg.norm(np.roll(sides, -1, axis=0) - sides, axis=1).sum()
+    assert area.sum() == pytest.approx(wall, rel=2e-3)  # slivers left out, or joined around a corner
+
+
+@pytest.mark.parametrize("kind", ["hex", "triangle", "quad"])
+@pytest.mark.parametrize("rotation", ["edge", "vertex"])
+def test_creases_lie_on_lines_and_cut_cells_into_exact_parts(kind: Kind, rotation: str) -> None:
+    cmap = solved("box")
+    settings = PatternSettings(kind, around=60, rotation=rotation, boundary="trim")
+    lattice = LATTICES[kind]
+    placement = Placing.of(cmap, lattice, settings).at(settings)
+    assert placement.straight == {0, 1, 2, 3}
+    assert np.isfinite(distortion_of(cmap, placement.glued, placement.place))  # no triangle turned over
+    assert placement.distortion < 0.012
+    along = complex(lattice.position(np.array(placement.motion.shift)))
+    for feature in cmap.surface.features:
+        offset = (placement.place[feature.vertices] * np.conj(along)).real / abs(along)
+        period = lattice.period_along(along) / lattice.edge
+        apart = (offset - offset[0]) / (lattice.edge * period)
+        assert abs(apart - np.rint(apart)).max() < 1e-9  # one line, up to turns around
+    pattern = lay_pattern(cmap, settings)
+    part = fan_areas(pattern.cells)[~pattern.whole] / np.median(fan_areas(pattern.cells)[pattern.whole])
+    assert abs(4 * part - np.rint(4 * part)).max(initial=0.0) < 1e-6
+
+
+@pytest.mark.parametrize("kind", ["hex", "quad"])
+def test_leaning_creases_are_followed_at_the_price_of_their_lean(kind: Kind) -> None:
+    cmap = solved("box", np.deg2rad(20.0))
+    pattern = lay_pattern(cmap, PatternSettings(kind, around=60, boundary="trim"))
+    lean = np.deg2rad(4.05)
+    assert 0.5 * (1 / np.tan(np.pi / 4 - lean / 2) - 1) < pattern.distortion < 0.15
+    assert euler(pattern) == 0
