@@ -273,6 +273,32 @@ def test_choosing_a_number_of_sizes_on_the_curve_recomputes(browser, server: Ser
         assert page.complaints == []
 
 
+def test_a_variant_is_taken_from_the_front(browser, server: Server) -> None:
+    vary = {"around": [12, 12], "singularities": [0], "sizes": [1, 6]}
+    body = {"name": "front", "surface": obj_surface(tube()), "vary": vary, "variants": 4}
+    job = httpx.post(f"{server.url}/v1/explore", json=body, timeout=PATIENCE, trust_env=False).json()
+    until(lambda: fetched(server, f"/v1/jobs/{job['id']}")["status"] == "done", "the exploration")
+    found = fetched(server, f"/v1/jobs/{job['id']}/result")
+    with opened(browser, server) as page:
+        page.locator(f"#jobs [data-job='{job['id']}']").click()
+        spots = page.locator("svg.front .variant")
+        spots.first.wait_for(timeout=MOMENT)
+        measured = [i for i, one in enumerate(found["variants"]) if one["measured"]]
+        assert sorted(int(spot.get_attribute("data-variant")) for spot in spots.all()) == measured
+        slider = page.locator("[data-limit='types']")
+        slider.focus()
+        page.keyboard.press("Home")  # the fewest types: all others fade
+        types = [found["variants"][i]["measured"]["types"] for i in measured]
+        assert page.locator("svg.front .out").count() == sum(n > min(types) for n in types)
+        page.locator(f"svg.front [data-variant='{found['best']}']").focus()
+        page.keyboard.press("Enter")
+        taken = fetched(server, f"/v1/jobs/{shown(page)}/result?include=quality")
+        assert 1 - taken["quality"]["coverage"] == pytest.approx(
+            found["variants"][found["best"]]["measured"]["uncovered"]
+        )
+        assert page.complaints == []
+
+
 def test_singularities_are_chosen_on_their_curve_and_dragged(browser, server: Server) -> None:
     with opened(browser, server) as page:
         page.select_option("#sample", "singular")

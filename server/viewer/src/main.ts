@@ -4,6 +4,7 @@ import { api, FILES, ProblemError, UnreachableError, type BoundaryAngle, type Jo
 import { flatOutline, histogram, singularityCurve, tradeOff } from "./charts";
 import { colour, MODES, number, RAMP_CSS, type Legend, type Mode } from "./colors";
 import { DomainView } from "./domain";
+import { Explorer } from "./explore";
 import { element, Form, type Json, type Schema, type Settings } from "./form";
 import { View3D } from "./view3d";
 
@@ -30,6 +31,20 @@ const state: State = {
 };
 const space = new View3D($("view3d"));
 const domain = new DomainView($("domain"));
+
+/** Variants of the surface that is worked on, with what of the settings does not vary. */
+const explorer = new Explorer($("variants"), () => {
+  if (!state.surface) {
+    note("Choose a sample or drop a file first.", true);
+    return null;
+  }
+  const { name, surface, pattern, panels } = currentRequest();
+  const split = panels && (panels as Settings).mode === "split" ? { panels } : {};
+  return { name, surface, ...(pattern ? { pattern: { ...pattern, around: null, edge_length: null } } : {}), ...split };
+}, (request) => {
+  adopt(request);
+  void solve();
+});
 
 // ---------------------------------------------------------------- settings and submission
 
@@ -203,6 +218,7 @@ function present(job: Job, result: Result, keepView: boolean): void {
 async function takeFile(file: File): Promise<void> {
   const turn = ++state.turn;
   state.surface = null;
+  explorer.clear();
   setEntries([]);
   drawAngles();
   state.name = file.name.replace(/\.[^.]*$/, "");
@@ -240,6 +256,7 @@ async function takeSample(name: string): Promise<void> {
   try {
     const request = await api.sample(name);
     if (turn !== state.turn) return;
+    explorer.clear();
     adopt({ ...request, name: request.name ?? name });
     await solve();
   } catch (error) {
@@ -252,6 +269,7 @@ async function openJob(id: string): Promise<void> {
   try {
     const [job, request] = await Promise.all([api.job(id), api.request(id)]);
     if (turn !== state.turn) return;
+    if (job.kind === "explore") return await explorer.follow(job);
     state.request = request;
     adopt(request);
     await follow(job, turn, false);
