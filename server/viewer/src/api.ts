@@ -13,6 +13,7 @@ export interface Problem {
   vertices?: number[];
   faces?: number[];
   edges?: [number, number][];
+  objects?: FileObject[];
 }
 
 export interface Job {
@@ -24,6 +25,23 @@ export interface Job {
   created: string;
   timings: Record<string, number>;
   problem: Problem | null;
+  kind?: "solve" | "explore";
+}
+
+export interface Figures {
+  uncovered: number;
+  panels: number;
+  types: number;
+  cost: number;
+  gap_max: number | null;
+}
+
+/** What an exploration found. */
+export interface Variants {
+  variants: { request: Request; predicted: Figures; measured: Figures | null; front: boolean }[];
+  front: number[];
+  best: number | null;
+  notes: string[];
 }
 
 export interface BoundaryAngle {
@@ -42,6 +60,17 @@ export interface TradeOff {
   sizes: number[];
   uncovered: number[];
   worst_gap: number[];
+}
+
+/** What numbers of singularities leave uncovered; at: where they would stand. */
+export interface SingularityCurve {
+  sizes: number;
+  taken: number;
+  coarse: boolean;
+  number: number[];
+  uncovered: number[];
+  scale_ratio: number[];
+  at: { point: Vec3; index: number }[][];
 }
 
 export interface Result {
@@ -96,7 +125,7 @@ export interface Result {
   } | null;
   sizes?: { size: number; edge_length: number; count: number; color: string }[] | null;
   support?: { nodes: Vec3[]; axes: Vec3[]; edges: [number, number][]; strips: Vec3[][] } | null;
-  quality: Record<string, any> & { trade_off?: TradeOff | null };
+  quality: Record<string, any> & { trade_off?: TradeOff | null; singularity_curve?: SingularityCurve | null };
   timings?: Record<string, number>;
 }
 
@@ -148,11 +177,17 @@ const post = (body: unknown): RequestInit => ({
   body: JSON.stringify(body),
 });
 
+/** An object of an uploaded file, as POST /v1/surfaces lists them. */
+export interface FileObject { id: string; name: string; layer: string; kind: string; visible: boolean; size: Vec3; used: boolean }
+export interface Stored { id: string; vertices: number; faces: number; repairs: string[]; unit?: string | null; objects?: FileObject[] }
+
 export const api = {
   health: () => json<{ status: string; version: string }>("/health"),
   jobs: () => json<{ jobs: Job[] }>("/v1/jobs?limit=50").then((answer) => answer.jobs),
   job: (id: string, wait = 0) => json<Job>(`/v1/jobs/${id}${wait ? `?wait=${wait}` : ""}`),
   submit: (request: Request) => json<Job>("/v1/jobs", post(request)),
+  explore: (body: Request) => json<Job>("/v1/explore", post(body)),
+  variants: (id: string) => json<Variants>(`/v1/jobs/${id}/result`),
   /** The finished work as a file, through the token where there is one. */
   file: (id: string, name: string) => call(`/v1/jobs/${id}/files/${name}`).then((answer) => answer.blob()),
   cancel: (id: string) => call(`/v1/jobs/${id}`, { method: "DELETE" }),
@@ -163,11 +198,13 @@ export const api = {
   sample: (name: string) => json<Request>(`/v1/samples/${name}`),
   /** The file's mesh as it stands, unchecked: to have something to point at when it is refused. */
   preview: (file: File) => json<{ vertices: Vec3[]; faces: number[][] }>("/v1/surfaces/preview", upload(file)),
-  surface: (file: File) => json<{ id: string; vertices: number; faces: number; repairs: string[] }>("/v1/surfaces", upload(file)),
+  /** object: id of the one that is meant, where the file holds several. */
+  surface: (file: File, object?: string) => json<Stored>("/v1/surfaces", upload(file, object)),
 };
 
-function upload(file: File): RequestInit {
+function upload(file: File, object?: string): RequestInit {
   const form = new FormData();
+  if (object !== undefined) form.append("object", object);
   form.append("file", file, file.name);
   return { method: "POST", body: form };
 }

@@ -1,9 +1,10 @@
 // The page: reads settings, submits jobs, shows results. All state stands in one object; draw functions read it.
 import { balance, choices, close, loopOf, type Corner } from "./angles";
-import { api, FILES, ProblemError, UnreachableError, type BoundaryAngle, type Job, type Problem, type Request, type Result, type Vec3 } from "./api";
-import { flatOutline, histogram, tradeOff } from "./charts";
+import { api, FILES, ProblemError, UnreachableError, type BoundaryAngle, type FileObject, type Job, type Problem, type Request, type Result, type Vec3 } from "./api";
+import { flatOutline, histogram, singularityCurve, tradeOff } from "./charts";
 import { colour, MODES, number, RAMP_CSS, type Legend, type Mode } from "./colors";
 import { DomainView } from "./domain";
+import { Explorer } from "./explore";
 import { element, Form, type Json, type Schema, type Settings } from "./form";
 import { View3D } from "./view3d";
 
@@ -31,6 +32,20 @@ const state: State = {
 const space = new View3D($("view3d"));
 const domain = new DomainView($("domain"));
 
+/** Variants of the surface that is worked on, with what of the settings does not vary. */
+const explorer = new Explorer($("variants"), () => {
+  if (!state.surface) {
+    note("Choose a sample or drop a file first.", true);
+    return null;
+  }
+  const { name, surface, pattern, panels } = currentRequest();
+  const split = panels && (panels as Settings).mode === "split" ? { panels } : {};
+  return { name, surface, ...(pattern ? { pattern: { ...pattern, around: null, edge_length: null } } : {}), ...split };
+}, (request) => {
+  adopt(request);
+  void solve();
+});
+
 // ---------------------------------------------------------------- settings and submission
 
 /** All settings, those of the surface beside it. */
@@ -52,6 +67,7 @@ function meanEdge(): number {
 
 /** Takes over a whole request: what it does not say has its default. */
 function adopt(request: Request): void {
+  $("objects").hidden = true;
   const { surface, name, ...settings } = request;
   const known = description.properties!.surface;
   const own = Object.keys(known.anyOf?.find((part) => part.properties)?.properties ?? {});
@@ -200,25 +216,45 @@ function present(job: Job, result: Result, keepView: boolean): void {
 
 // ---------------------------------------------------------------- surfaces: files and samples
 
-async function takeFile(file: File): Promise<void> {
+async function takeFile(file: File, object?: string): Promise<void> {
   const turn = ++state.turn;
+  if (object === undefined) drawObjects(file, []);
   state.surface = null;
+  explorer.clear();
   setEntries([]);
   drawAngles();
   state.name = file.name.replace(/\.[^.]*$/, "");
   ($("sample") as HTMLSelectElement).value = "";
   note(`Reading ${file.name} …`);
   try {
-    const stored = await api.surface(file);
+    const stored = await api.surface(file, object);
     if (turn !== state.turn) return;
     state.surface = { id: stored.id };
+    drawObjects(file, stored.objects ?? [], stored.unit);
     note(`${stored.vertices} vertices, ${stored.faces} faces. ${stored.repairs.join(" ")}`);
     await solve();
   } catch (error) {
     if (turn !== state.turn) return;
     report(error);
-    if (error instanceof ProblemError) await showFaults(file, error.problem, turn);
+    if (error instanceof ProblemError) {
+      if (error.problem.objects) drawObjects(file, error.problem.objects);
+      await showFaults(file, error.problem, turn);
+    }
   }
+}
+
+/** What a file holds, where that is more than one object: a click takes it alone. */
+function drawObjects(file: File, objects: FileObject[], unit?: string | null): void {
+  const list = $("objects");
+  list.hidden = objects.length < 2;
+  list.replaceChildren(...objects.map((object, i) => {
+    const size = object.size.map((x) => number(x, 4)).join(" × ") + (unit ? ` ${unit}` : "");
+    const where = [object.kind, object.layer, object.visible ? "" : "hidden or locked"].filter(Boolean).join(", ");
+    const button = element("button", { class: object.visible ? "" : "dim", "aria-pressed": String(object.used), "data-object": object.id },
+      element("span", {}, object.name || `object ${i}`), element("small", {}, `${where}: ${size}`));
+    button.addEventListener("click", () => void takeFile(file, object.id));
+    return element("li", {}, button);
+  }));
 }
 
 /** The dropped mesh as it was sent, with the faulty vertices, edges and faces in red. */
@@ -240,6 +276,7 @@ async function takeSample(name: string): Promise<void> {
   try {
     const request = await api.sample(name);
     if (turn !== state.turn) return;
+    explorer.clear();
     adopt({ ...request, name: request.name ?? name });
     await solve();
   } catch (error) {
@@ -252,6 +289,7 @@ async function openJob(id: string): Promise<void> {
   try {
     const [job, request] = await Promise.all([api.job(id), api.request(id)]);
     if (turn !== state.turn) return;
+    if (job.kind === "explore") return await explorer.follow(job);
     state.request = request;
     adopt(request);
     await follow(job, turn, false);
@@ -386,6 +424,47 @@ function drawCharts(): void {
   $("histogram").replaceChildren(...(result?.sizes?.length ? [histogram(result.sizes)] : []));
   const sizes = result?.sizes?.length ?? null;
   $("curve").replaceChildren(...(result?.quality.trade_off ? [tradeOff(result.quality.trade_off, sizes, chooseSizes)] : []));
+  drawSingularities();
+}
+
+/** What other numbers of singularities would leave, where they were looked at or stand where they were put. */
+function drawSingularities(): void {
+  const { result } = state;
+  const curve = result?.quality.singularity_curve;
+  const several = curve && curve.number.length > 1 ? curve : null;
+  const put = ((form.get("singularities") as Settings | null)?.at as Json[] | undefined)?.length ?? 0;
+  $("singular").hidden = !several && !result?.map.cones.length;
+  $("singular-curve").replaceChildren(...(several ? [singularityCurve(several, chooseSingularities)] : []));
+  const note = $("singular-note");
+  note.replaceChildren();
+  if (several?.coarse) note.append("Roughly, with ends that are free.");
+  else if (result?.map.cones.length) note.append("Drag one on the surface to another place; it then closes there again. ");
+  if (put) {
+    const button = element("button", { type: "button", id: "singular-auto" }, "Place them automatically");
+    button.addEventListener("click", () => setSingularities({ count: "auto", at: [] }));
+    note.append(button);
+  }
+}
+
+function setSingularities(change: Settings): void {
+  const before = form.get("singularities") as Settings | null;
+  form.set("singularities", { ...before, ...change });
+  drawForm();
+  void solve();
+}
+
+function chooseSingularities(n: number): void {
+  // The rough curve is of free ends; straight ones keep most of what it promises from coming true.
+  if (state.result?.quality.singularity_curve?.coarse && form.get("boundary.mode") === "straight") form.set("boundary.mode", "isometric");
+  setSingularities({ count: n, at: [] });
+}
+
+/** All stay where they are but the one that was dragged. */
+function moveSingularity(i: number, to: Vec3): void {
+  const { result } = state;
+  if (!result) return;
+  const at = result.map.cones.map(({ vertex, index }, k) => ({ point: k === i ? to : result.mesh.vertices[vertex], index }));
+  setSingularities({ count: null, at });
 }
 
 function chooseSizes(k: number): void {
@@ -536,6 +615,7 @@ function clickInSpace(x: number, y: number): void {
 }
 
 pointer($("view3d"), (x, y) => space.pick(x, y), clickInSpace);
+space.onDrag = moveSingularity;
 pointer($("domain"), (x, y) => domain.pick(x, y), (x, y) => select(domain.pick(x, y)));
 
 page.addEventListener("submit", (event) => {

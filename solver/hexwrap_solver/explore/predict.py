@@ -83,7 +83,7 @@ class Outlook:
         if not len(limit):
             return Foreseen(1.0, 0, 0, 0.0, 0.0)
         length, count = _levels(limit, number)
-        used = len(length)
+        used = min(len(length), round(float(count.sum())))
         if sizes is not None:
             made = partition_by_area(length, sizes, count)
             start = made.start[-1]

@@ -170,12 +170,18 @@ def sliders_send_settings_only():
 def modes_reach_the_server():
     spy = world.Spy(PORT)
     for mode, expected in (
+        ("auto", {"mode": "auto"}),
         ("straight", {"mode": "straight"}),
         ("isometric", {"mode": "isometric"}),
         ("isometric optimal", {"mode": "isometric", "spread": "optimal"}),
     ):
         settle(sender(Port=spy.port, Mode=mode), 2)
         assert json.loads(spy.bodies("POST", "/v1/jobs")[-1].decode("utf-8"))["boundary"] == expected
+    assert "unit" not in json.loads(spy.bodies("POST", "/v1/jobs")[-1].decode("utf-8"))["surface"]
+    document()
+    settle(sender(Port=spy.port), 2)
+    Rhino.RhinoDoc.ActiveDoc = None
+    assert json.loads(spy.bodies("POST", "/v1/jobs")[-1].decode("utf-8"))["surface"]["unit"] == "mm"
     spy.close()
     assert "no angles came" in sender(Mode="angles").said("error")[0]
     assert "straight, angles" in sender(Mode="bent").said("error")[0]
