@@ -422,6 +422,20 @@ def circles_and_lines_are_lifted():
     assert loop.IsClosed and len(piece.points) == 41
 
 
+def the_front_can_be_sent():
+    send = done(Pattern=None)
+    explore = Component("Explore").set(Job=send.Job, MaxSizes=2, Variants=3, Run=True)
+    pump([explore], lambda: explore.Requests or explore.said("error"))
+    assert not explore.said("error"), explore.messages
+    numbers = (explore.Uncovered, explore.Types, explore.PanelCount, explore.Gap, explore.Cost)
+    assert explore.Requests and all(len(list(row)) == len(list(explore.Requests)) for row in numbers)
+    again = done(Pattern=list(explore.Requests)[0], Angles=None, Panels=None)
+    request = world.ask(PORT, "GET", "/v1/jobs/%s/request" % again.Job.rpartition("/")[2])[1]
+    assert request["panels"]["sizes"] <= 2
+    explore.set(MaxSizes=0)
+    assert "1 or more" in explore.said("error")[0]
+
+
 def circles_sent_as_surfaces_are_refused():
     made = sender(Mesh=Circle(0.0, 0.0, 1.0))
     assert made.said("error") == ["Mesh must be a mesh or a surface, not Circle."] and made.Job is None
@@ -623,6 +637,7 @@ world.run([
     domain_with_corners,
     curves_are_lifted_across_the_cut,
     circles_and_lines_are_lifted,
+    the_front_can_be_sent,
     circles_sent_as_surfaces_are_refused,
     umlauts_reach_the_server,
     address_on_the_canvas,
