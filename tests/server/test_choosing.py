@@ -196,6 +196,20 @@ def test_strays_are_left_out_and_told_with_their_place() -> None:
     assert "(500.1, 500.1, 0)" in chosen.told[0]
 
 
+@pytest.mark.parametrize("at", [0, len(VERTICES) // 2])
+def test_a_fin_is_called_one(at: int) -> None:
+    """It hangs at a vertex of the rim, or of the inside; its other corners touch nothing."""
+    fin = VERTICES[at] + np.array([[0.05, 0, 0], [0, 0.05, 0]])
+    n = len(VERTICES)
+    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in np.vstack([VERTICES, fin]).tolist()]
+    faces = [*QUADS.tolist(), [at, n, n + 1]]
+    lines += ["f " + " ".join(str(v + 1) for v in face) for face in faces]
+    sent = sent_surface("\n".join(lines).encode(), "fin.obj", SurfaceSettings(), 10_000).sent
+    assert sent.mesh is not None
+    assert len(surface_from_mesh(sent.mesh).loops) == 2
+    assert sent.told[0].startswith("1 fin of 1 face in all left out, at (")
+
+
 def parts(shift: float) -> Model:
     """A tube in two meshes, the second moved."""
     at = VERTICES[QUADS].mean(axis=1)

@@ -134,6 +134,17 @@ def opened(browser, server: Server, path: str = "/") -> Iterator[Page]:
         page.close()
 
 
+#: Looks from outside, horizontally, at a point of a model that stands about the vertical axis.
+TURNED_TO = """([x, y, z]) => {
+    const { space } = window.hexwrapViewer;
+    const reach = space.camera.position.distanceTo(space.controls.target), far = Math.hypot(x, y);
+    const target = space.controls.target;
+    space.camera.position.set(target.x + reach * x / far, target.y + reach * y / far, target.z + 0.2);
+    space.controls.update();
+    space.render();
+}"""
+
+
 def shown(page: Page, before: str | None = None, timeout: int = MOMENT) -> str:
     """Waits until another result than ``before`` is on the screen; its job."""
     page.wait_for_function(
@@ -259,6 +270,64 @@ def test_choosing_a_number_of_sizes_on_the_curve_recomputes(browser, server: Ser
         result = fetched(server, f"/v1/jobs/{job}/result?include=sizes")
         assert len(result["sizes"]) == 5
         assert page.locator("#histogram rect").count() == 5
+        assert page.complaints == []
+
+
+def test_a_variant_is_taken_from_the_front(browser, server: Server) -> None:
+    vary = {"around": [12, 12], "singularities": [0], "sizes": [1, 6]}
+    body = {"name": "front", "surface": obj_surface(tube()), "vary": vary, "variants": 4}
+    job = httpx.post(f"{server.url}/v1/explore", json=body, timeout=PATIENCE, trust_env=False).json()
+    until(lambda: fetched(server, f"/v1/jobs/{job['id']}")["status"] == "done", "the exploration")
+    found = fetched(server, f"/v1/jobs/{job['id']}/result")
+    with opened(browser, server) as page:
+        page.locator(f"#jobs [data-job='{job['id']}']").click()
+        spots = page.locator("svg.front .variant")
+        spots.first.wait_for(timeout=MOMENT)
+        measured = [i for i, one in enumerate(found["variants"]) if one["measured"]]
+        assert sorted(int(spot.get_attribute("data-variant")) for spot in spots.all()) == measured
+        slider = page.locator("[data-limit='types']")
+        slider.focus()
+        page.keyboard.press("Home")  # the fewest types: all others fade
+        types = [found["variants"][i]["measured"]["types"] for i in measured]
+        assert page.locator("svg.front .out").count() == sum(n > min(types) for n in types)
+        page.locator(f"svg.front [data-variant='{found['best']}']").focus()
+        page.keyboard.press("Enter")
+        taken = fetched(server, f"/v1/jobs/{shown(page)}/result?include=quality")
+        assert 1 - taken["quality"]["coverage"] == pytest.approx(
+            found["variants"][found["best"]]["measured"]["uncovered"]
+        )
+        assert page.complaints == []
+
+
+def test_singularities_are_chosen_on_their_curve_and_dragged(browser, server: Server) -> None:
+    with opened(browser, server) as page:
+        page.select_option("#sample", "singular")
+        before = shown(page)
+        assert page.locator("#singular-curve .spot.current").get_attribute("data-k") == "3"
+        page.locator("#singular-curve .spot[data-k='1']").focus()
+        page.keyboard.press("Enter")
+        job = shown(page, before)
+        one = fetched(server, f"/v1/jobs/{job}/result?include=map,quality,mesh")
+        assert len(one["map"]["cones"]) == 1
+        curve = one["quality"]["singularity_curve"]
+        assert curve["number"][curve["taken"]] == 1
+        page.evaluate(TURNED_TO, one["mesh"]["vertices"][one["map"]["cones"][0]["vertex"]])
+        x, y = on_screen(page, "mesh.vertices", one["map"]["cones"][0]["vertex"])
+        page.mouse.move(x, y)
+        page.mouse.down()
+        page.mouse.move(x + 10, y + 15)
+        page.mouse.move(x + 12, y + 40)
+        page.mouse.up()
+        job2 = shown(page, job)
+        moved = fetched(server, f"/v1/jobs/{job2}/result?include=map,mesh,pattern")
+        cones = moved["map"]["cones"]
+        assert [cone["index"] for cone in cones] == [one["map"]["cones"][0]["index"]]
+        was, there = (np.array(r["mesh"]["vertices"][r["map"]["cones"][0]["vertex"]]) for r in (one, moved))
+        assert np.linalg.norm(there - was) > 2 * moved["pattern"]["edge_length"]
+        assert sum(k != 0 for k in moved["pattern"]["index"]) == 1
+        page.locator("#singular-auto").click()
+        again = fetched(server, f"/v1/jobs/{shown(page, job2)}/result?include=map")
+        assert len(again["map"]["cones"]) == 3
         assert page.complaints == []
 
 

@@ -44,15 +44,17 @@ def coarse_numbers(geometry: Geometry, tolerance: float | None) -> list[str]:
 
 
 def strays(strays: Sequence[Piece]) -> list[str]:
-    if not strays:
-        return []
-    places = ", ".join(point((piece.low + piece.high) / 2) for piece in strays[:SHOWN])
-    more = f" and {len(strays) - SHOWN} more" if len(strays) > SHOWN else ""
-    faces = sum(len(piece.faces) for piece in strays)
-    noun = "piece" if len(strays) == 1 else "pieces"
-    return [
-        f"{len(strays)} stray {noun} of {faces} face{'s' * (faces > 1)} in all left out, at {places}{more}."
-    ]
+    """A sentence for small pieces that hang at a vertex or an edge of a larger one, another for the rest."""
+    fins, others = ([piece for piece in strays if piece.is_fin is fin] for fin in (True, False))
+    return [_left_out(noun, some) for noun, some in (("fin", fins), ("stray piece", others)) if some]
+
+
+def _left_out(noun: str, some: Sequence[Piece]) -> str:
+    places = ", ".join(point((piece.low + piece.high) / 2) for piece in some[:SHOWN])
+    more = f" and {len(some) - SHOWN} more" if len(some) > SHOWN else ""
+    faces = sum(len(piece.faces) for piece in some)
+    count = f"{len(some)} {noun}{'s' * (len(some) > 1)} of {faces} face{'s' * (faces > 1)} in all"
+    return f"{count} left out, at {places}{more}."
 
 
 def others(content: FileContent, used: Sequence[Found]) -> tuple[str, ...]:

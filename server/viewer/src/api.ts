@@ -24,6 +24,23 @@ export interface Job {
   created: string;
   timings: Record<string, number>;
   problem: Problem | null;
+  kind?: "solve" | "explore";
+}
+
+export interface Figures {
+  uncovered: number;
+  panels: number;
+  types: number;
+  cost: number;
+  gap_max: number | null;
+}
+
+/** What an exploration found. */
+export interface Variants {
+  variants: { request: Request; predicted: Figures; measured: Figures | null; front: boolean }[];
+  front: number[];
+  best: number | null;
+  notes: string[];
 }
 
 export interface BoundaryAngle {
@@ -42,6 +59,17 @@ export interface TradeOff {
   sizes: number[];
   uncovered: number[];
   worst_gap: number[];
+}
+
+/** What numbers of singularities leave uncovered; at: where they would stand. */
+export interface SingularityCurve {
+  sizes: number;
+  taken: number;
+  coarse: boolean;
+  number: number[];
+  uncovered: number[];
+  scale_ratio: number[];
+  at: { point: Vec3; index: number }[][];
 }
 
 export interface Result {
@@ -96,7 +124,7 @@ export interface Result {
   } | null;
   sizes?: { size: number; edge_length: number; count: number; color: string }[] | null;
   support?: { nodes: Vec3[]; axes: Vec3[]; edges: [number, number][]; strips: Vec3[][] } | null;
-  quality: Record<string, any> & { trade_off?: TradeOff | null };
+  quality: Record<string, any> & { trade_off?: TradeOff | null; singularity_curve?: SingularityCurve | null };
   timings?: Record<string, number>;
 }
 
@@ -153,6 +181,8 @@ export const api = {
   jobs: () => json<{ jobs: Job[] }>("/v1/jobs?limit=50").then((answer) => answer.jobs),
   job: (id: string, wait = 0) => json<Job>(`/v1/jobs/${id}${wait ? `?wait=${wait}` : ""}`),
   submit: (request: Request) => json<Job>("/v1/jobs", post(request)),
+  explore: (body: Request) => json<Job>("/v1/explore", post(body)),
+  variants: (id: string) => json<Variants>(`/v1/jobs/${id}/result`),
   /** The finished work as a file, through the token where there is one. */
   file: (id: string, name: string) => call(`/v1/jobs/${id}/files/${name}`).then((answer) => answer.blob()),
   cancel: (id: string) => call(`/v1/jobs/${id}`, { method: "DELETE" }),

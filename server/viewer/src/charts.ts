@@ -1,10 +1,10 @@
 // Two small charts: how many panels of each size, and what each number of sizes would leave uncovered.
-import type { Result, TradeOff } from "./api";
+import type { Result, SingularityCurve, TradeOff } from "./api";
 import { number } from "./colors";
 
 const NS = "http://www.w3.org/2000/svg";
 
-function svg(tag: string, attributes: Record<string, string | number>, ...children: (Node | string)[]): SVGElement {
+export function svg(tag: string, attributes: Record<string, string | number>, ...children: (Node | string)[]): SVGElement {
   const element = document.createElementNS(NS, tag);
   for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, String(value));
   element.append(...children);
@@ -36,34 +36,76 @@ export function histogram(sizes: NonNullable<Result["sizes"]>): SVGElement {
   return root;
 }
 
-export function tradeOff(curve: TradeOff, current: number | null, choose: (k: number) => void): SVGElement {
-  const root = svg("svg", { viewBox: `0 0 ${W} ${H}`, class: "curve", "aria-label": "Uncovered area for each number of sizes" });
-  const n = curve.sizes.length;
-  const top = Math.max(...curve.uncovered, 1e-9);
-  const x = (i: number) => PAD.left + ((W - PAD.left - PAD.right) * (i + 0.5)) / n;
+/** One number that may be chosen: where it stands along the curve, and what it leaves uncovered. */
+interface Choice {
+  value: number;
+  uncovered: number;
+  current: boolean;
+  marked: boolean;
+  label: string;
+  title: string;
+  /** what clicking it does; null: nothing is gained by it */
+  choose: (() => void) | null;
+}
+
+/** The uncovered area for each number of something. */
+function curveOf(choices: Choice[], label: string): SVGElement {
+  const root = svg("svg", { viewBox: `0 0 ${W} ${H}`, class: "curve", "aria-label": label });
+  const n = choices.length;
+  const width = (W - PAD.left - PAD.right) / n;
+  const top = Math.max(...choices.map((c) => c.uncovered), 1e-9);
+  const x = (i: number) => PAD.left + width * (i + 0.5);
   const y = (u: number) => H - PAD.bottom - ((H - PAD.top - PAD.bottom) * u) / top;
   root.append(
     svg("line", { x1: PAD.left, x2: W - PAD.right, y1: H - PAD.bottom, y2: H - PAD.bottom, class: "axis" }),
     svg("text", { x: PAD.left - 5, y: PAD.top + 8, "text-anchor": "end" }, `${number(100 * top, 2)} %`),
     svg("text", { x: PAD.left - 5, y: H - PAD.bottom, "text-anchor": "end" }, "0"),
-    svg("polyline", { points: curve.uncovered.map((u, i) => `${x(i)},${y(u)}`).join(" "), class: "line" }),
+    svg("polyline", { points: choices.map((c, i) => `${x(i)},${y(c.uncovered)}`).join(" "), class: "line" }),
   );
-  curve.sizes.forEach((k, i) => {
-    const spot = svg("g", { class: k === current ? "spot current" : "spot", tabindex: 0, role: "button", "data-k": k,
-      "aria-label": `${k} sizes: ${number(100 * curve.uncovered[i], 3)} % uncovered` });
+  choices.forEach((c, i) => {
+    const open: Record<string, string | number> = c.choose ? { tabindex: 0, role: "button" } : { "aria-disabled": "true" };
+    const spot = svg("g", { class: `spot${c.current ? " current" : ""}${c.choose ? "" : " closed"}`, ...open, "data-k": c.value, "aria-label": c.label });
     spot.append(
-      svg("rect", { x: x(i) - (W - PAD.left - PAD.right) / n / 2, y: 0, width: (W - PAD.left - PAD.right) / n, height: H, fill: "transparent" }),
-      svg("circle", { cx: x(i), cy: y(curve.uncovered[i]), r: k === current ? 5 : 2.6 }),
-      svg("title", {}, `${k} sizes: ${number(100 * curve.uncovered[i], 3)} % uncovered, worst gap ${number(curve.worst_gap[i])}`),
+      svg("rect", { x: x(i) - width / 2, y: 0, width, height: H, fill: "transparent" }),
+      svg("circle", { cx: x(i), cy: y(c.uncovered), r: c.current ? 5 : 2.6 }),
+      svg("title", {}, c.title),
     );
-    spot.addEventListener("click", () => choose(k));
-    spot.addEventListener("keydown", (event) => {
-      if ((event as KeyboardEvent).key === "Enter" || (event as KeyboardEvent).key === " ") choose(k);
-    });
+    if (c.choose) {
+      const choose = c.choose;
+      spot.addEventListener("click", choose);
+      spot.addEventListener("keydown", (event) => {
+        if ((event as KeyboardEvent).key === "Enter" || (event as KeyboardEvent).key === " ") choose();
+      });
+    }
     root.append(spot);
-    if (k === 1 || k % 10 === 0 || k === current) root.append(svg("text", { x: x(i), y: H - 8, "text-anchor": "middle" }, String(k)));
+    if (c.marked) root.append(svg("text", { x: x(i), y: H - 8, "text-anchor": "middle" }, String(c.value)));
   });
   return root;
+}
+
+export function tradeOff(curve: TradeOff, current: number | null, choose: (k: number) => void): SVGElement {
+  const choices = curve.sizes.map((k, i): Choice => {
+    const label = `${k} sizes: ${number(100 * curve.uncovered[i], 3)} % uncovered`;
+    return {
+      value: k, uncovered: curve.uncovered[i], current: k === current, marked: k === 1 || k % 10 === 0 || k === current,
+      label, title: `${label}, worst gap ${number(curve.worst_gap[i])}`, choose: () => choose(k),
+    };
+  });
+  return curveOf(choices, "Uncovered area for each number of sizes");
+}
+
+/** Numbers that leave no less than a smaller one cannot be chosen. */
+export function singularityCurve(curve: SingularityCurve, choose: (n: number) => void): SVGElement {
+  const choices = curve.number.map((n, i): Choice => {
+    const current = i === curve.taken;
+    const better = curve.uncovered.slice(0, i).every((u) => u > curve.uncovered[i]);
+    const label = `${n} singularities: ${current ? "" : "about "}${number(100 * curve.uncovered[i], 3)} % uncovered`;
+    return {
+      value: n, uncovered: curve.uncovered[i], current, marked: true, label,
+      title: `${label} in ${curve.sizes} sizes`, choose: better && !current ? () => choose(n) : null,
+    };
+  });
+  return curveOf(choices, "Uncovered area for each number of singularities");
 }
 
 /** A panel laid flat, as a small outline with its edge lengths. */

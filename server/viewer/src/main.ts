@@ -1,9 +1,10 @@
 // The page: reads settings, submits jobs, shows results. All state stands in one object; draw functions read it.
 import { balance, choices, close, loopOf, type Corner } from "./angles";
 import { api, FILES, ProblemError, UnreachableError, type BoundaryAngle, type Job, type Problem, type Request, type Result, type Vec3 } from "./api";
-import { flatOutline, histogram, tradeOff } from "./charts";
+import { flatOutline, histogram, singularityCurve, tradeOff } from "./charts";
 import { colour, MODES, number, RAMP_CSS, type Legend, type Mode } from "./colors";
 import { DomainView } from "./domain";
+import { Explorer } from "./explore";
 import { element, Form, type Json, type Schema, type Settings } from "./form";
 import { View3D } from "./view3d";
 
@@ -30,6 +31,20 @@ const state: State = {
 };
 const space = new View3D($("view3d"));
 const domain = new DomainView($("domain"));
+
+/** Variants of the surface that is worked on, with what of the settings does not vary. */
+const explorer = new Explorer($("variants"), () => {
+  if (!state.surface) {
+    note("Choose a sample or drop a file first.", true);
+    return null;
+  }
+  const { name, surface, pattern, panels } = currentRequest();
+  const split = panels && (panels as Settings).mode === "split" ? { panels } : {};
+  return { name, surface, ...(pattern ? { pattern: { ...pattern, around: null, edge_length: null } } : {}), ...split };
+}, (request) => {
+  adopt(request);
+  void solve();
+});
 
 // ---------------------------------------------------------------- settings and submission
 
@@ -203,6 +218,7 @@ function present(job: Job, result: Result, keepView: boolean): void {
 async function takeFile(file: File): Promise<void> {
   const turn = ++state.turn;
   state.surface = null;
+  explorer.clear();
   setEntries([]);
   drawAngles();
   state.name = file.name.replace(/\.[^.]*$/, "");
@@ -240,6 +256,7 @@ async function takeSample(name: string): Promise<void> {
   try {
     const request = await api.sample(name);
     if (turn !== state.turn) return;
+    explorer.clear();
     adopt({ ...request, name: request.name ?? name });
     await solve();
   } catch (error) {
@@ -252,6 +269,7 @@ async function openJob(id: string): Promise<void> {
   try {
     const [job, request] = await Promise.all([api.job(id), api.request(id)]);
     if (turn !== state.turn) return;
+    if (job.kind === "explore") return await explorer.follow(job);
     state.request = request;
     adopt(request);
     await follow(job, turn, false);
@@ -386,6 +404,47 @@ function drawCharts(): void {
   $("histogram").replaceChildren(...(result?.sizes?.length ? [histogram(result.sizes)] : []));
   const sizes = result?.sizes?.length ?? null;
   $("curve").replaceChildren(...(result?.quality.trade_off ? [tradeOff(result.quality.trade_off, sizes, chooseSizes)] : []));
+  drawSingularities();
+}
+
+/** What other numbers of singularities would leave, where they were looked at or stand where they were put. */
+function drawSingularities(): void {
+  const { result } = state;
+  const curve = result?.quality.singularity_curve;
+  const several = curve && curve.number.length > 1 ? curve : null;
+  const put = ((form.get("singularities") as Settings | null)?.at as Json[] | undefined)?.length ?? 0;
+  $("singular").hidden = !several && !result?.map.cones.length;
+  $("singular-curve").replaceChildren(...(several ? [singularityCurve(several, chooseSingularities)] : []));
+  const note = $("singular-note");
+  note.replaceChildren();
+  if (several?.coarse) note.append("Roughly, with ends that are free.");
+  else if (result?.map.cones.length) note.append("Drag one on the surface to another place; it then closes there again. ");
+  if (put) {
+    const button = element("button", { type: "button", id: "singular-auto" }, "Place them automatically");
+    button.addEventListener("click", () => setSingularities({ count: "auto", at: [] }));
+    note.append(button);
+  }
+}
+
+function setSingularities(change: Settings): void {
+  const before = form.get("singularities") as Settings | null;
+  form.set("singularities", { ...before, ...change });
+  drawForm();
+  void solve();
+}
+
+function chooseSingularities(n: number): void {
+  // The rough curve is of free ends; straight ones keep most of what it promises from coming true.
+  if (state.result?.quality.singularity_curve?.coarse && form.get("boundary.mode") === "straight") form.set("boundary.mode", "isometric");
+  setSingularities({ count: n, at: [] });
+}
+
+/** All stay where they are but the one that was dragged. */
+function moveSingularity(i: number, to: Vec3): void {
+  const { result } = state;
+  if (!result) return;
+  const at = result.map.cones.map(({ vertex, index }, k) => ({ point: k === i ? to : result.mesh.vertices[vertex], index }));
+  setSingularities({ count: null, at });
 }
 
 function chooseSizes(k: number): void {
@@ -536,6 +595,7 @@ function clickInSpace(x: number, y: number): void {
 }
 
 pointer($("view3d"), (x, y) => space.pick(x, y), clickInSpace);
+space.onDrag = moveSingularity;
 pointer($("domain"), (x, y) => domain.pick(x, y), (x, y) => select(domain.pick(x, y)));
 
 page.addEventListener("submit", (event) => {

@@ -28,6 +28,10 @@ export class View3D {
   private normals: THREE.LineSegments | null = null;
   private supports: THREE.Object3D | null = null;
   private boundary: THREE.Points | null = null;
+  private cones: THREE.Points | null = null;
+  private solid: THREE.Mesh | null = null;
+  /** Called when singularity i was dragged to another point of the surface. */
+  onDrag: ((i: number, to: Vec3) => void) | null = null;
   private labelText: { text: string[]; centers: Vec3[]; normals: Vec3[] } | null = null;
   private shown: Toggles = { edges: true, labels: false, normals: false, supports: false, mesh: false };
   private box = new THREE.Box3(new THREE.Vector3(-1, -1, -1), new THREE.Vector3(1, 1, 1));
@@ -56,6 +60,8 @@ export class View3D {
     this.camera.add(this.headlight);
     new ResizeObserver(() => this.resize()).observe(element);
     canvas.addEventListener("keydown", (event) => this.key(event));
+    // In the capturing phase, before the controls begin to turn the camera.
+    canvas.addEventListener("pointerdown", (event) => this.grab(event), { capture: true });
     this.resize();
     const frame = () => {
       this.controls.update();
@@ -122,7 +128,7 @@ export class View3D {
     this.layer?.dispose();
     this.layer = null;
     for (const child of [...this.content.children]) dispose(child);
-    this.mesh = this.normals = this.supports = this.boundary = null;
+    this.mesh = this.normals = this.supports = this.boundary = this.cones = this.solid = null;
     this.labelText = null;
     this.invalidate();
   }
@@ -145,8 +151,93 @@ export class View3D {
       this.supports = this.stripObject(support.strips);
       this.content.add(this.supports);
     }
+    this.showCones(result);
     this.toggle(this.shown);
     if (!keepView) this.fit();
+  }
+
+  /** Singularities as dots that can be dragged along the surface. */
+  private showCones(result: Result): void {
+    const { mesh, map } = result;
+    if (!map.cones.length) return;
+    this.cones = this.dots(map.cones.map(({ vertex }) => mesh.vertices[vertex]), 0x6a3fa0, 11);
+    this.content.add(this.cones);
+    const geometry = new THREE.BufferGeometry();
+    geometry.setAttribute("position", new THREE.Float32BufferAttribute(mesh.vertices.flatMap((v) => this.local(v)), 3));
+    geometry.setIndex(mesh.faces.flat());
+    this.solid = new THREE.Mesh(geometry, new THREE.MeshBasicMaterial({ side: THREE.DoubleSide })); // for rays only
+  }
+
+  /** Where a ray through a pixel first meets the surface, in drawn coordinates. */
+  private surfaceAt(x: number, y: number): THREE.Vector3 | null {
+    if (!this.solid) return null;
+    const { clientWidth: w, clientHeight: h } = this.element;
+    const ray = new THREE.Raycaster();
+    ray.setFromCamera(new THREE.Vector2((2 * x) / w - 1, 1 - (2 * y) / h), this.camera);
+    return ray.intersectObject(this.solid)[0]?.point ?? null;
+  }
+
+  /** The singularity within 12 pixels of (x, y), not behind the surface, or null. */
+  pickCone(x: number, y: number): number | null {
+    if (!this.cones) return null;
+    const position = this.cones.geometry.getAttribute("position") as THREE.BufferAttribute;
+    const { clientWidth: w, clientHeight: h } = this.element;
+    const p = new THREE.Vector3();
+    for (let i = 0; i < position.count; i++) {
+      p.fromBufferAttribute(position, i);
+      const seen = this.surfaceAt(...this.screen(p.clone(), w, h));
+      const hidden = seen && seen.distanceTo(this.camera.position) < 0.98 * p.distanceTo(this.camera.position);
+      const [px, py] = this.screen(p, w, h);
+      if (!hidden && Math.hypot(px - x, py - y) < 12) return i;
+    }
+    return null;
+  }
+
+  private screen(p: THREE.Vector3, w: number, h: number): [number, number] {
+    p.project(this.camera);
+    return [((p.x + 1) / 2) * w, ((1 - p.y) / 2) * h];
+  }
+
+  /** Drags a singularity instead of turning the camera, where one is under the pointer. */
+  private grab(event: PointerEvent): void {
+    const canvas = this.renderer.domElement;
+    const here = (e: PointerEvent): [number, number] => {
+      const box = canvas.getBoundingClientRect();
+      return [e.clientX - box.left, e.clientY - box.top];
+    };
+    const start = here(event);
+    const i = event.button === 0 && this.onDrag ? this.pickCone(...start) : null;
+    if (i === null || !this.cones) return;
+    const cones = this.cones;
+    const position = cones.geometry.getAttribute("position") as THREE.BufferAttribute;
+    const from = new THREE.Vector3().fromBufferAttribute(position, i);
+    this.controls.enabled = false;
+    let to: THREE.Vector3 | null = null;
+    const move = (e: PointerEvent) => {
+      const [x, y] = here(e);
+      const met = Math.hypot(x - start[0], y - start[1]) < 4 ? null : this.surfaceAt(x, y);
+      if (!met) return;
+      to = met;
+      position.setXYZ(i, met.x, met.y, met.z);
+      position.needsUpdate = true;
+      this.invalidate();
+    };
+    const end = (e: PointerEvent) => {
+      canvas.ownerDocument.removeEventListener("pointermove", move, true);
+      canvas.ownerDocument.removeEventListener("pointerup", end, true);
+      canvas.ownerDocument.removeEventListener("pointercancel", end, true);
+      this.controls.enabled = true;
+      if (to && e.type === "pointerup" && this.cones === cones) {
+        this.onDrag?.(i, [to.x + this.origin.x, to.y + this.origin.y, to.z + this.origin.z]);
+      } else {
+        position.setXYZ(i, from.x, from.y, from.z);
+        position.needsUpdate = true;
+        this.invalidate();
+      }
+    };
+    canvas.ownerDocument.addEventListener("pointermove", move, true);
+    canvas.ownerDocument.addEventListener("pointerup", end, true);
+    canvas.ownerDocument.addEventListener("pointercancel", end, true);
   }
 
   /** Shows a mesh that has not been solved (or was refused), with the faults of the problem in red. */

@@ -80,10 +80,6 @@ WEIGHTS_NOTE = ("Weights were given, so that the energies were minimised, as wit
 #: Corners farther from their panel's plane than this fraction of its mean edge: it did not become flat.
 FLAT = 1e-9
 
-#: Patterns in which four panels meet at each node. Where only three meet, flat convex panels follow no
-#: saddle: their angles would have to sum up to more than 2π (Li, Liu and Wang 2015).
-FOUR_AT_A_NODE = ("quad", "diamond", "trihexagonal", "rhombitrihexagonal")
-
 #: An energy above this that no step lowers is worth a note.
 MINIMAL = 1e-12
 STUCK_NOTE = ("No step lowered the energy: the corners stand where the pattern has them.",)
@@ -121,7 +117,7 @@ class _Group:
 
     @property
     def sides(self) -> int:
-        return self.at.shape[1]
+        return int(self.at.shape[1])
 
     @property
     def spokes(self) -> Ragged:
@@ -290,17 +286,19 @@ def _convex_note(shapes: Ragged, normal: Floats, pattern: Pattern, surface: Surf
     count = int(np.sum(~convex(shapes, normal)))
     if not count:
         return ()
+    # Where three panels meet at each node, flat convex ones follow no saddle (Li, Liu and Wang 2015).
     saddle = saddle_share(surface)
-    if saddle > 0 and pattern.kind not in FOUR_AT_A_NODE:
+    best = "trihexagonal" if saddle > 0 else "hex"
+    if pattern.kind == best:
+        better = "smaller cells leave fewer"
+    elif saddle > 0:
         better = (
-            f"; {max(saddle, 0.01):.0%} of the surface is curved like a saddle, where only patterns with four"
-            " panels at each node can be flat and convex: ask for kind trihexagonal"
+            f"{max(saddle, 0.01):.0%} of the surface is curved like a saddle, which flat convex panels follow"
+            " with kind trihexagonal"
         )
-    elif saddle == 0 and pattern.kind != "hex":
-        better = "; on this surface, which is nowhere a saddle, ask for kind hex"
     else:
-        better = "; smaller cells leave fewer"
-    return (f"Watertight panels that are not convex: {count} of {shapes.n_rows}{better}.",)
+        better = "on this surface, which is nowhere curved like a saddle, ask for kind hex"
+    return (f"Watertight panels that are not convex: {count} of {shapes.n_rows}; {better}.",)
 
 
 def collapsed_note(shapes: Ragged) -> tuple[str, ...]:

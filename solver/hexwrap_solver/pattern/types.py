@@ -47,7 +47,8 @@ class PatternSettings:
         ),
     ] = "edge"
     align: Annotated[
-        Literal["none", "first", "both"], Setting("on which loops a line of the pattern lies exactly")
+        Literal["none", "first", "both"],
+        Setting("on which loops a line of the pattern lies exactly; both: all that can be"),
     ] = "both"
     boundary: Annotated[
         Literal["whole", "trim"], Setting("keep whole cells only, or trim cells at the boundary")

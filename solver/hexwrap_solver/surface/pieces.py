@@ -26,7 +26,7 @@ ROUNDS = 16
 class Piece:
     """Faces that hang together across edges, ascending; loops: the number of their boundary curves.
 
-    rim: (k, 3) the vertices on these.
+    rim: (k, 3) the vertices on these. is_fin: whether it shares a vertex with a larger piece.
     """
 
     faces: Ints
@@ -35,6 +35,7 @@ class Piece:
     low: Floats
     high: Floats
     rim: Floats
+    is_fin: bool = False
 
 
 @dataclass(frozen=True)
@@ -69,6 +70,11 @@ def pieces(mesh: SentMesh) -> list[Piece]:
     n = len(mesh.vertices)
     joined = coo_array((np.ones(len(rim), dtype=np.int8), (start, end)), shape=(n, n))
     _, loop = connected_components(joined, directed=False)
+    rank = np.zeros(count, dtype=np.int64)
+    rank[np.argsort(-area, kind="stable")] = np.arange(count)
+    largest = np.full(n, count)
+    np.minimum.at(largest, welded.faces, rank[piece][:, None])
+    attached = np.bincount(piece, (largest[welded.faces] < rank[piece][:, None]).any(axis=1), count) > 0
     found = []
     by_piece = np.argsort(piece[first], kind="stable")
     ends = np.searchsorted(piece[first][by_piece], np.arange(count + 1))
@@ -89,6 +95,7 @@ def pieces(mesh: SentMesh) -> list[Piece]:
                 points.min(axis=0),
                 points.max(axis=0),
                 mesh.vertices[np.unique(start[own])],
+                bool(attached[k]),
             )
         )
     return sorted(found, key=lambda piece: -piece.area)

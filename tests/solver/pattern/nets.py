@@ -8,7 +8,13 @@ import numpy as np
 
 from hexwrap_solver.arrays import Ragged
 from hexwrap_solver.conformal import conformal_map
-from hexwrap_solver.conformal.types import BoundaryAngle, BoundaryCondition, Cones, ConformalMap
+from hexwrap_solver.conformal.types import (
+    BoundaryAngle,
+    BoundaryCondition,
+    Cones,
+    ConformalMap,
+    LoopCondition,
+)
 from hexwrap_solver.surface import surface_from_mesh, with_openings
 from hexwrap_solver.surface.holes import fill_openings
 from hexwrap_solver.surface.types import SentMesh, Surface
@@ -95,6 +101,22 @@ def tower(holes: int, kind: str = "hex", wide: int = 4) -> ConformalMap:
     a, b = i + n * j, (i + 1) % n + n * j
     found = surface(points, _quads(a, b, b + n, a + n))
     return conformal_map(found, BoundaryCondition("isometric", quantum=kind))
+
+
+@cache
+def doors(count: int) -> ConformalMap:
+    """A tower whose foot is straight, with rectangular doors: four corners of 270° each."""
+    found = tower(count).surface
+    conditions = [LoopCondition("straight", loop=0)]
+    for b in range(2, 2 + count):
+        points = found.vertices[found.loops[b]]
+        turn, up = np.unwrap(np.arctan2(points[:, 1], points[:, 0])), points[:, 2]
+        extreme = [abs(x - (x.min() + x.max()) / 2) > 0.499 * np.ptp(x) for x in (turn, up)]
+        ends = found.input_vertex[found.loops[b][extreme[0] & extreme[1]]]
+        corners = tuple(BoundaryAngle(1.5 * np.pi, vertex=int(v)) for v in ends)
+        assert len(corners) == 4
+        conditions.append(LoopCondition("angles", loop=b, angles=corners))
+    return conformal_map(found, BoundaryCondition("isometric", quantum="quad", loops=tuple(conditions)))
 
 
 @cache

@@ -12,12 +12,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hexwrap_solver.arrays import Ragged
 from hexwrap_solver.conformal.net import Net
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.domain import flatten, lift
 from hexwrap_solver.errors import NotAdaptedError
 from hexwrap_solver.pattern import lay_pattern
+from hexwrap_solver.pattern.lattice import LATTICES
+from hexwrap_solver.pattern.place.choose import place_lattice
 from hexwrap_solver.pattern.types import Pattern, PatternSettings
+from hexwrap_solver.surface.topology import next_half_edge
 from tests.solver.pattern import annuli, nets
 
 SIDES = {"hex": 6, "triangle": 3, "quad": 4}
@@ -39,6 +43,12 @@ def euler(pattern: Pattern) -> int:
     inner = np.count_nonzero(pattern.neighbours.values >= 0)
     edges = len(pattern.faces.values) - inner // 2
     return len(pattern.vertices) - edges + pattern.n_cells
+
+
+def area_vectors(points: np.ndarray, faces: Ragged) -> np.ndarray:
+    """(f, 3)"""
+    tail, head = points[faces.values], points[faces.values[faces.next()]]
+    return np.add.reduceat(np.cross(tail, head), faces.offsets[:-1], axis=0) / 2
 
 
 def on_boundary(pattern: Pattern) -> np.ndarray:
@@ -102,6 +112,35 @@ def test_a_rectangular_roof_is_filled_by_quads_up_to_its_four_sides():
     away = np.linalg.norm(whole.vertices[None] - cmap.surface.vertices[corners][:, None], axis=2)
     assert away.min(axis=1).max() < 1e-9
     assert whole.distortion < 0.05
+
+
+@pytest.mark.parametrize("doors", [1, 2])
+def test_frames_of_doors_are_lattice_lines(doors):
+    """Every boundary edge runs along a row of nodes, around each door the motions are a translation of the
+    lattice, and quads fill the wall up to its ends and frames."""
+    cmap, lattice = nets.doors(doors), LATTICES["quad"]
+    settings = PatternSettings(kind="quad", around=40)
+    placed = place_lattice(cmap, lattice, settings)
+    assert placed.distortion < 0.2
+    z = placed.glued.corners(cmap.surface.faces, placed.place).ravel()
+    rim = np.flatnonzero(cmap.surface.twin < 0)
+    along = z[next_half_edge(rim)] - z[rim]
+    steps = np.angle(along / lattice.forward) / lattice.quantum
+    assert np.abs(steps - np.rint(steps)).max() < 1e-9
+    row = (np.conj(1j * along / abs(along)) * z[rim]).real / lattice.edge
+    assert np.abs(row - np.rint(row)).max() < 1e-9
+    assert (placed.isometries[:, 0] == 0).all()
+    pattern = lay_pattern(cmap, settings)
+    check_theorems(cmap, pattern)
+    area = np.linalg.norm(area_vectors(pattern.vertices, pattern.faces), axis=1).sum()
+    assert area / cmap.surface.areas.sum() > 0.99
+
+
+def test_frames_that_would_cost_too_much_are_told():
+    """Cells as large as the door."""
+    pattern = lay_pattern(nets.doors(1), PatternSettings(kind="quad", around=5))
+    assert pattern.distortion <= 0.5
+    assert any("smaller cells" in note for note in pattern.notes)
 
 
 @pytest.mark.parametrize("case", ["dome", "pentagon", "opening"])

@@ -37,12 +37,10 @@ from hexwrap_solver.surface.types import Surface
 #: Weights of the plane distances, stage by stage; the surface weighs 1.
 FLATNESS = (1.0, 1e2, 1e4)
 
-#: Most Gauss–Newton steps in a stage.
-STEPS_PER_STAGE = 5
-
-#: A stage ends when a step lowers its energy by less than this fraction: the next one goes on. Nothing
-#: comes after the only stage where nothing is to become flat.
-DECREASE, ONLY_DECREASE = 5e-2, 1e-4
+#: Most Gauss–Newton steps in a stage, and the fraction of its energy that a step takes away if another one is
+#: to follow. What a stage leaves undone, the next does along with its own work; nothing comes after the last,
+#: nor after the only one where nothing is to become flat.
+STEPS, LAST_STEPS, ONLY_STEPS = (1, 1.0), (3, 0.2), (15, 1e-4)
 
 #: Weight of the planes in Newton's method at the end, so large that the rest only chooses among flat meshes.
 DECISIVE = 1e9
@@ -124,18 +122,18 @@ def minimise_watertight(
     weights, factor = bounded(aims.weights)
     problem = _Problem(pattern, length, replace(aims, weights=weights), surface)
     stages = FLATNESS if aims.flat else (0.0,)
-    enough = DECREASE if aims.flat else ONLY_DECREASE
     points = pattern.vertices
     curve: list[float] = []
     if aims.flat and problem.bend(points) >= FLAT:
         points = points + NUDGE * pattern.edge_length * _nudges(pattern)
     for stage, flatness in enumerate(stages):
-        for step in range(STEPS_PER_STAGE if aims.flat else 3 * STEPS_PER_STAGE):
+        most, enough = STEPS if stage < len(stages) - 1 else LAST_STEPS if aims.flat else ONLY_STEPS
+        for step in range(most):
             state = problem.linearise(points, flatness)
             if not curve:
                 curve.append(state.asked)
-            done = (stage + step / STEPS_PER_STAGE) / (len(stages) + 1)
-            progress(min(done, 1.0), f"flatness weight {flatness:.0e}, energy {state.energy:.3e}")
+            done = (stage + step / most) / (len(stages) + 1)
+            progress(done, f"flatness weight {flatness:.0e}, energy {state.energy:.3e}")
             found = _search(problem, state)
             if found is None:
                 break

@@ -83,7 +83,7 @@ class Placing:
         cmap, lattice, loops = self.cmap, self.lattice, self.loops
         along, told = self._along_features(settings)
         if cmap.kind == "net":
-            placement = place_on_net(cmap, lattice, settings)
+            placement = place_on_net(cmap, lattice, settings, loops)
         elif along is not None:
             placement = along
         elif self.is_cylinder and not any(has_corners(cmap, lattice, loop) for loop in loops):
@@ -276,12 +276,15 @@ def loops_to_align(
         ]
     wanted = wanted[: len(cmap.surface.loops)]
     if cmap.kind == "net":
-        return [], [
-            "The pattern is not aligned: sides are aligned on cylinders, cones and disks."
-        ] if wanted and cmap.fitted is None else []
+        if cmap.fitted is not None:
+            return [], []
+        if settings.align == "both":  # all that can be
+            wanted = list(range(len(cmap.surface.loops)))
     loops = [loop for loop in wanted if is_polygon(cmap, lattice, loop)]
     if len(loops) == len(wanted):
         return loops, []
+    if cmap.kind == "net" and not loops:
+        return [], []
     curved = " and on ".join(f"loop {loop}" for loop in wanted if loop not in loops)
     return loops, [
         f"The pattern is not aligned on {curved}: only a boundary of straight sides with corners of "

@@ -6,6 +6,10 @@ equations tie the motions together: around a vertex inside, their product is the
 singularity of index k it is the rotation by −k quanta about its place, which must be a centre of that
 symmetry. What rounding leaves over is made up for by the least deformation (``deform``), which is told as
 distortion; nothing is left over where the singularities were moved beforehand until all motions are exact.
+
+Loops that are polygons of quantized corners, as the frames of doors and windows, or closed straight lines,
+may be asked to lie on lattice lines (``polygons``). The place of the lattice is chosen so that they are near
+to some, and the same deformation brings them there.
 """
 
 from __future__ import annotations
@@ -23,6 +27,7 @@ from hexwrap_solver.pattern.place.cone import boundary_direction
 from hexwrap_solver.pattern.place.deform import System, deform, distortion_of
 from hexwrap_solver.pattern.place.glued import Glued, around_vertices
 from hexwrap_solver.pattern.place.placement import (
+    BEARABLE,
     NEARLY,
     PARTS,
     Placement,
@@ -30,11 +35,14 @@ from hexwrap_solver.pattern.place.placement import (
     edge_angle,
     quantum_name,
 )
+from hexwrap_solver.pattern.place.polygons import Alignment, Polygons
 from hexwrap_solver.pattern.place.size import girth, size_spread, wanted_edge, width_per_cell
 from hexwrap_solver.pattern.types import PatternSettings
 
 #: Sizes and directions tried, from one end of what is admissible to the other.
 SCALES, DIRECTIONS = 41, 24
+#: Where the lattice is free to move, so many offsets along either basis vector.
+OFFSETS = 12
 #: Cost of a size off the wanted one by its whole spread, beside the misfit in lattice units.
 COST_OF_SIZE = 0.1
 #: Misfit of all motions together, in lattice units, below which nothing needs to be deformed.
@@ -60,9 +68,36 @@ class Motions:
     index: Ints
 
 
-def place_on_net(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings) -> Placement:
-    """Raises NotAdaptedError where a motion turns by no multiple of the quantum, PatternError where no place
+def place_on_net(
+    cmap: ConformalMap, lattice: Lattice, settings: PatternSettings, loops: list[int] | None = None
+) -> Placement:
+    """loops: polygons that are to lie on lattice lines, which they do where that is bearable.
+
+    Raises NotAdaptedError where a motion turns by no multiple of the quantum, PatternError where no place
     of the lattice suits all singularities."""
+    polygons = Polygons.of(cmap, lattice, loops or [])
+    if not polygons.n:
+        return _placed(cmap, lattice, settings, None)
+    angle = edge_angle(lattice, settings)
+    aligned = _placed(cmap, lattice, settings, Alignment.of(polygons, lattice, angle, settings.boundary))
+    if aligned.distortion <= BEARABLE:
+        return aligned
+    names = " and ".join(f"loop {loop}" for loop in polygons.loops)
+    cost = f"distort cells by {aligned.distortion:.2f}, more than {BEARABLE:g}"
+    if not np.isfinite(aligned.distortion):
+        cost = "fold the layout over"
+    told = f"To align {names} at this size would {cost}: smaller cells, or corners elsewhere, fit better."
+    ends = [loop for loop in polygons.loops if loop < 2]
+    if ends and len(ends) < len(polygons.loops):
+        fewer = place_on_net(cmap, lattice, settings, ends)
+    else:
+        fewer = _placed(cmap, lattice, settings, None)
+    return replace(fewer, notes=(told, *fewer.notes))
+
+
+def _placed(
+    cmap: ConformalMap, lattice: Lattice, settings: PatternSettings, alignment: Alignment | None
+) -> Placement:
     net, faces = cmap.net, cmap.surface.faces
     motions = _motions(cmap, lattice)
     angle = edge_angle(lattice, settings)
@@ -70,19 +105,23 @@ def place_on_net(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings
     along = boundary_direction(cmap, lattice, anchor_vertex(cmap))
     factor = complex(scale * np.exp(-1j * angle) * lattice.forward / along)
     factor *= scale / abs(factor)
+    if alignment is not None:
+        factor = scale * alignment.unit / abs(alignment.unit)
     phase = _phase(lattice, settings, angle)
     rows = np.zeros((len(net.angle), 4), dtype=np.int64)
-    if not len(motions.words) and not np.any(net.crossing):
+    if alignment is None and not len(motions.words) and not np.any(net.crossing):
         own = _home(cmap)
         place = factor * (own - own[anchor_vertex(cmap)]) + phase
         return _placement(cmap, lattice, settings, rows, place, factor, angle, 0.0)
     tried, system = [], None
-    for misfit, A, B, rows in _choices(cmap, lattice, settings, motions, factor, phase):
+    for misfit, A, B, rows in _choices(cmap, lattice, settings, motions, factor, phase, alignment):
         glued_rows, corner = around_vertices(lattice, net, cmap.surface.twin, rows, faces)
         place = A * net.corners.ravel()[corner] + B
         glued = Glued(lattice, glued_rows)
         normal = np.zeros((len(place), 2), dtype=complex)
         depth = np.zeros((len(place), 2))
+        if alignment is not None:
+            normal, depth = alignment.lines(rows, glued_rows, place, faces)
         _pin(cmap, lattice, rows, corner, normal, depth)
         if misfit > EXACT:
             system = system or System(cmap, glued, normal)  # rotations and lines are the same for all
@@ -191,6 +230,7 @@ def _choices(
     motions: Motions,
     factor: complex,
     phase: complex,
+    alignment: Alignment | None,
 ) -> list[tuple[float, complex, complex, Ints]]:
     """(misfit, A, B, rows) of the places of the lattice that fit best, the best first."""
     fitted = cmap.fitted
@@ -209,9 +249,14 @@ def _choices(
     A = (factor * (1 + size_spread(settings) * size)[:, None] * np.exp(1j * turn)).ravel()
     off = np.repeat(abs(size), len(turn))
     centres, shift = _centres(cmap, motions, phase)
-    A, at, off = np.tile(A, len(centres)), np.repeat(centres, len(A)), np.tile(off, len(centres))
-    B = shift - A * at
-    rows, misfit = _rounded(lattice, motions, A, B)
+    if alignment is not None and not len(motions.centre) and not motions.turn.any():
+        shift = _cell(lattice)  # free to choose
+    A, at, off = (x.ravel() for x in np.broadcast_arrays(A, centres[:, None], off))
+    A, B, off = (x.ravel() for x in np.broadcast_arrays(A, shift[:, None] - A * at, off))
+    along = None if alignment is None else alignment.rows_of(len(motions.turn))
+    rows, misfit = _rounded(lattice, motions, A, B, along)
+    if alignment is not None:
+        misfit = misfit + alignment.misfit(A, B)
     cost = misfit + COST_OF_SIZE * off
     best = np.argsort(cost, kind="stable")[:DEFORMED]
     best = best[np.isfinite(cost[best])]
@@ -223,23 +268,34 @@ def _choices(
     return [(float(misfit[i]), complex(A[i]), complex(B[i]), rows[i]) for i in best]
 
 
-def _centres(cmap: ConformalMap, motions: Motions, phase: complex) -> tuple[Complexes, complex]:
+def _cell(lattice: Lattice) -> Complexes:
+    """(k,) places of the origin spread over all that differ."""
+    share = np.arange(OFFSETS) / OFFSETS
+    e1, e2 = lattice.position(lattice.basis)
+    return np.asarray((e1 * share[:, None] + e2 * share).ravel())
+
+
+def _centres(cmap: ConformalMap, motions: Motions, phase: complex) -> tuple[Complexes, Complexes]:
     """Places that may become the origin of the lattice, and where it is shifted to: singularities, else the
     fixed points of motions that turn, which are exact then, else the anchor."""
     if len(motions.centre):
-        return motions.centre, 0j
+        return motions.centre, np.zeros(1, dtype=complex)
     zeta = np.exp(1j * cmap.net.angle)
     turning = np.flatnonzero(motions.turn)
     if len(turning):
-        return np.asarray(motions.translation[turning] / (1 - zeta[turning])), 0j
+        fixed = motions.translation[turning] / (1 - zeta[turning])
+        return np.asarray(fixed), np.zeros(1, dtype=complex)
     anchor = np.flatnonzero(cmap.surface.faces.ravel() == anchor_vertex(cmap))[0]
-    return cmap.corners().ravel()[[anchor]], phase
+    return cmap.corners().ravel()[[anchor]], np.array([phase])
 
 
-def _rounded(lattice: Lattice, motions: Motions, A: Complexes, B: Complexes) -> tuple[Ints, Floats]:
+def _rounded(
+    lattice: Lattice, motions: Motions, A: Complexes, B: Complexes, along: Ints | None = None
+) -> tuple[Ints, Floats]:
     """For k places of the lattice at once: rows (k, t, 4) of isometries for all motions, and (k,) how far the
     worst is from its own translation, lattice units; infinite where a singularity would stand at no centre.
-    """
+
+    along: (t, 2) of which translations must be multiples, 0 where they need not."""
     zeta = np.exp(1j * lattice.step_angle * motions.turn)
     wanted = A[:, None] * motions.translation + B[:, None] * (1 - zeta)
     rows = np.zeros((*wanted.shape, 4), dtype=np.int64)
@@ -274,6 +330,12 @@ def _rounded(lattice: Lattice, motions: Motions, A: Complexes, B: Complexes) -> 
             i = int(np.flatnonzero(~known)[0])
             turn = np.full((len(A), 1), motions.turn[i])
             nearest = lattice.translations_near(wanted[:, i])
+            if along is not None and along[i].any():
+                row = along[i]
+                step = complex(lattice.position(row))
+                many = np.rint((wanted[:, i] / step).real).astype(np.int64)
+                nearest = np.where(many == 0, np.sign((wanted[:, i] / step).real), many)[:, None] * row
+                nearest = nearest.astype(np.int64)
             enter(i, np.concatenate([turn, nearest, 0 * turn], axis=1))
     misfit = abs(lattice.position(rows[..., 1:3]) - wanted).max(axis=1)
     for w, word in enumerate(motions.words):

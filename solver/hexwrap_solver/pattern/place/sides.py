@@ -53,13 +53,13 @@ def curvatures(cmap: ConformalMap, loop: int) -> Floats:
 
 def has_corners(cmap: ConformalMap, lattice: Lattice, loop: int) -> bool:
     """Whether a loop has corners of quantized angles."""
-    return bool(_corners(curvatures(cmap, loop), lattice).any())
+    return bool(corners_of(curvatures(cmap, loop), lattice).any())
 
 
 def is_polygon(cmap: ConformalMap, lattice: Lattice, loop: int) -> bool:
     """Whether a loop is straight but for corners of quantized angles, so that lattice lines can bound it."""
     kappa = curvatures(cmap, loop)
-    corner = _corners(kappa, lattice)
+    corner = corners_of(kappa, lattice)
     if not corner.any():
         return bool(abs(np.cumsum(kappa)).max() < QUANTIZED)
     kappa = np.roll(kappa, -int(np.argmax(corner)))
@@ -71,7 +71,8 @@ def is_polygon(cmap: ConformalMap, lattice: Lattice, loop: int) -> bool:
     return bool(drift < QUANTIZED and not sharp.any())
 
 
-def _corners(kappa: Floats, lattice: Lattice) -> np.ndarray:
+def corners_of(kappa: Floats, lattice: Lattice) -> Bools:
+    """(k,) which vertices of a loop, of these curvatures, are quantized corners."""
     steps = np.rint(kappa / lattice.quantum)
     return np.asarray((steps != 0) & (abs(kappa - steps * lattice.quantum) < QUANTIZED))
 
@@ -98,7 +99,7 @@ def _sheets_gained(cmap: ConformalMap) -> Ints:
 
 
 def _sides_of_loop(cmap: ConformalMap, lattice: Lattice, loop: int, gained: Ints) -> Sides:
-    corner = _corners(curvatures(cmap, loop), lattice)
+    corner = corners_of(curvatures(cmap, loop), lattice)
     shift = int(np.argmax(corner))
     vertices = np.roll(cmap.surface.loops[loop], -shift)
     corner = np.roll(corner, -shift)

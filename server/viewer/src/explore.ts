@@ -1,0 +1,146 @@
+// Variants of the surface: a scatter of what they cost against what they leave open, with sliders for limits.
+import { api, type Figures, type Job, type Request, type Variants } from "./api";
+import { svg } from "./charts";
+import { number } from "./colors";
+import { element } from "./form";
+
+const W = 340;
+const H = 220;
+const PAD = { left: 40, right: 10, top: 12, bottom: 28 };
+
+/** What a variant may be at most, to be shown as one that will do. */
+const LIMITS: { name: "types" | "gap_max" | "panels"; label: string }[] = [
+  { name: "types", label: "Types" },
+  { name: "gap_max", label: "Joint" },
+  { name: "panels", label: "Panels" },
+];
+
+export class Explorer {
+  private found: Variants | null = null;
+  private chosen: number | null = null;
+  private turn = 0;
+  private job: Job | null = null;
+  private readonly limits: Partial<Record<(typeof LIMITS)[number]["name"], number>> = {};
+
+  /** take: shows a variant. */
+  constructor(private readonly root: HTMLElement, private readonly start: () => Request | null, private readonly take: (request: Request) => void) {
+    this.draw();
+  }
+
+  /** Another surface: what was found is not of it. */
+  clear(): void {
+    this.turn++;
+    this.found = this.job = this.chosen = null;
+    this.draw();
+  }
+
+  async run(): Promise<void> {
+    const body = this.start();
+    if (body) await this.follow(await api.explore(body));
+  }
+
+  async follow(job: Job): Promise<void> {
+    const turn = ++this.turn;
+    this.found = this.chosen = null;
+    while (true) {
+      this.job = job;
+      this.draw();
+      if (job.status !== "queued" && job.status !== "running") break;
+      job = await api.job(job.id, 1);
+      if (turn !== this.turn) return;
+    }
+    if (job.status !== "done") return;
+    const found = await api.variants(job.id);
+    if (turn !== this.turn) return;
+    this.found = found;
+    for (const { name } of LIMITS) delete this.limits[name];
+    this.draw();
+  }
+
+  private measured(): { index: number; figures: Figures }[] {
+    return (this.found?.variants ?? []).flatMap((one, index) => (one.measured ? [{ index, figures: one.measured }] : []));
+  }
+
+  private fits(figures: Figures): boolean {
+    return LIMITS.every(({ name }) => (figures[name] ?? 0) <= (this.limits[name] ?? Infinity) * (1 + 1e-9));
+  }
+
+  private draw(): void {
+    const busy = this.job?.status === "queued" || this.job?.status === "running";
+    const button = element("button", { type: "button", id: "explore" }, busy ? "Stop" : "Explore variants");
+    button.addEventListener("click", () => {
+      if (busy) void api.cancel(this.job!.id).finally(() => this.clear());
+      else void this.run().catch((error: Error) => (this.root.lastElementChild!.textContent = error.message));
+    });
+    const parts: (Node | string)[] = [element("div", { class: "buttons" }, button)];
+    if (this.found) parts.push(this.scatter(), ...this.sliders());
+    parts.push(element("p", { class: "note", role: "status" }, this.said(busy)));
+    this.root.replaceChildren(...parts);
+  }
+
+  private said(busy: boolean): string {
+    if (busy) return `${this.job!.stage || "queued"} · ${Math.round(100 * this.job!.progress)} %`;
+    if (this.job?.status === "failed") return this.job.problem?.detail ?? "The exploration failed.";
+    return this.found ? this.found.notes.join(" ") : "Tries boundaries, singularities, sizes and their numbers, and shows what pays.";
+  }
+
+  private scatter(): SVGElement {
+    const spots = this.measured();
+    const root = svg("svg", { viewBox: `0 0 ${W} ${H}`, class: "front", "aria-label": "Variants: uncovered area over cost" });
+    const costs = spots.map((s) => s.figures.cost);
+    const open = spots.map((s) => Math.log(Math.max(s.figures.uncovered, 1e-5)));
+    const [c0, c1, u0, u1] = [Math.min(...costs), Math.max(...costs), Math.min(...open), Math.max(...open)];
+    const most = Math.max(...spots.map((s) => s.figures.types), 1);
+    const x = (cost: number) => PAD.left + ((W - PAD.left - PAD.right) * (cost - c0)) / (c1 - c0 || 1);
+    const y = (u: number) => H - PAD.bottom - ((H - PAD.top - PAD.bottom) * (u - u0)) / (u1 - u0 || 1);
+    root.append(
+      svg("line", { x1: PAD.left, x2: W - PAD.right, y1: H - PAD.bottom + 8, y2: H - PAD.bottom + 8, class: "axis" }),
+      svg("text", { x: PAD.left - 5, y: PAD.top + 4, "text-anchor": "end" }, `${number(100 * Math.exp(u1), 2)} %`),
+      svg("text", { x: PAD.left - 5, y: H - PAD.bottom + 4, "text-anchor": "end" }, `${number(100 * Math.exp(u0), 2)} %`),
+      svg("text", { x: PAD.left, y: H - 6 }, `cost ${Math.round(c0).toLocaleString("en")}`),
+      svg("text", { x: W - PAD.right, y: H - 6, "text-anchor": "end" }, Math.round(c1).toLocaleString("en")),
+    );
+    spots.forEach(({ index, figures }, i) => {
+      const one = this.found!.variants[index];
+      const hue = 250 - (200 * figures.types) / most;
+      const words = `${number(100 * figures.uncovered, 3)} % uncovered, ${figures.types} types, ${figures.panels} panels, cost ${Math.round(figures.cost).toLocaleString("en")}`;
+      const state = [index === this.chosen && "current", index === this.found!.best && "best", !this.fits(figures) && "out"].filter(Boolean).join(" ");
+      const spot = svg("circle", {
+        cx: x(figures.cost), cy: y(open[i]), r: one.front ? 6 : 3.2, fill: `hsl(${hue} 65% 52%)`, class: `variant ${state}`,
+        tabindex: 0, role: "button", "data-variant": index, "aria-label": words,
+      });
+      spot.append(svg("title", {}, words));
+      const take = () => {
+        this.chosen = index;
+        this.draw();
+        this.take(one.request);
+      };
+      spot.addEventListener("click", take);
+      spot.addEventListener("keydown", (event) => {
+        if ((event as KeyboardEvent).key === "Enter" || (event as KeyboardEvent).key === " ") take();
+      });
+      root.append(spot);
+    });
+    return root;
+  }
+
+  private sliders(): HTMLElement[] {
+    return LIMITS.flatMap(({ name, label }) => {
+      const values = this.measured().map((s) => s.figures[name] ?? 0);
+      const [low, high] = [Math.min(...values), Math.max(...values)];
+      if (!(high > low)) return [];
+      const whole = name !== "gap_max";
+      const now = this.limits[name] ?? high;
+      const slider = element("input", {
+        type: "range", min: String(low), max: String(high), step: whole ? "1" : "any", value: String(now), "data-limit": name,
+      }) as HTMLInputElement;
+      const shown = element("output", {}, `≤ ${number(now)}`);
+      slider.addEventListener("input", () => {
+        this.limits[name] = slider.valueAsNumber;
+        shown.textContent = `≤ ${number(slider.valueAsNumber)}`;
+        this.root.querySelector("svg.front")!.replaceWith(this.scatter());
+      });
+      return [element("label", { class: "row" }, `${label} `, slider, shown)];
+    });
+  }
+}
