@@ -203,11 +203,20 @@ def _singularities(c: Canvas) -> None:
     c.ring(five, 1.5, INK)
 
 
+def _explore(c: Canvas) -> None:
+    c.line([(3.5, 3), (3.5, 20.5), (21.5, 20.5)], 1.6, INK)
+    for x, y, colour in ((7, 6, SKY), (9.5, 11.5, SKY), (14, 14.5, AMBER), (19, 16.5, SKY)):
+        corner = [(x + 2.9 * np.cos(a), y + 2.9 * np.sin(a)) for a in np.deg2rad(np.arange(6) * 60)]
+        c.polygon(corner, colour)
+        c.ring(corner, 1.1, INK)
+
+
 DRAWINGS = {
     "Bake": _bake,
     "BoundaryAngles": _angles,
     "Collect": _collect,
     "Domain": _domain,
+    "Explore": _explore,
     "Lift": _lift,
     "Panels": _panels,
     "Pattern": _pattern,

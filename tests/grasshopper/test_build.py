@@ -21,8 +21,8 @@ from grasshopper.components import FORMS, RHINO7, RHINO8, Component, Form
 
 FOLDERS = components.folders()
 NAMES = [
-    "Bake", "BoundaryAngles", "Collect", "Domain", "Lift", "Panels", "Pattern", "Send", "Singularities",
-    "StartServer", "Support",
+    "Bake", "BoundaryAngles", "Collect", "Domain", "Explore", "Lift", "Panels", "Pattern", "Send",
+    "Singularities", "StartServer", "Support",
 ]  # fmt: skip
 
 

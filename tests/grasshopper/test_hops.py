@@ -235,7 +235,7 @@ def test_surfaces_that_cannot_be_mapped_are_refused(client: Live) -> None:
 def test_inputs_that_were_left_out_have_their_defaults() -> None:
     values, branch = read_inputs(COMPONENTS[PANELS].inputs[1:], [])
     expected = {"Mode": None, "Points": [], "Angles": [], "Kind": "hex"}
-    assert values == expected | {"Around": 0, "Sizes": 11, "Target": "inscribed"}
+    assert values == expected | {"Around": 0, "Sizes": 11, "Target": "inscribed", "Unit": None}
     assert branch == [0]
     with pytest.raises(HopsError, match="list of parameters"):
         read_inputs(COMPONENTS[PANELS].inputs, "values")

@@ -342,6 +342,33 @@ def test_a_dropped_file_is_solved(browser, server: Server, tmp_path: Path) -> No
         assert page.complaints == []
 
 
+def test_objects_of_a_file_are_listed_and_one_is_taken_by_a_click(
+    browser, server: Server, tmp_path: Path
+) -> None:
+    parts = []
+    for name, at in (("north", 0), ("south", 50)):
+        rows = [line.split() for line in tube().splitlines()]
+        count = sum(row[0] == "v" for row in rows)
+        parts.append(f"g {name}")
+        for kind, *rest in rows:
+            if kind == "v":
+                parts.append(f"v {float(rest[0]) + at} {rest[1]} {rest[2]}")
+            else:  # from the end, so that both groups count alike
+                parts.append("f " + " ".join(str(int(v) - 1 - count) for v in rest))
+    path = tmp_path / "two.obj"
+    path.write_text("\n".join(parts) + "\n")
+    with opened(browser, server) as page:
+        page.set_input_files("#file", str(path))
+        page.wait_for_selector("#objects button >> nth=1")
+        assert "could be meant" in page.locator("#banner").inner_text()
+        page.click("#objects button >> nth=1")
+        job = shown(page)
+        chosen = page.locator("#objects button[aria-pressed=true]").inner_text()
+        assert "south" in chosen
+        mesh = fetched(server, f"/v1/jobs/{job}/result?include=mesh")["mesh"]
+        assert min(x for x, _, _ in mesh["vertices"]) > 30
+
+
 def test_faults_are_shown_in_red_where_they_are(browser, server: Server, tmp_path: Path) -> None:
     path = tmp_path / "torus.obj"
     path.write_text(torus())

@@ -7,7 +7,7 @@ and edges of the mesh that are at fault.
 # include: wire canvas choices meshes
 
 
-MODES = ["straight", "angles", "isometric", "isometric optimal"]
+MODES = ["auto", "straight", "angles", "isometric", "isometric optimal"]
 
 
 def part_of_request(text, name):
@@ -22,8 +22,9 @@ def part_of_request(text, name):
 
 
 def request_body(mode, parts, name):
-    """Everything of the request but the surface. parts: (text, key of the request). Raises Refusal."""
-    body = {"name": TEXT(name) if name else "grasshopper"}
+    """The request but for the geometry. parts: (text, key of the request). Raises Refusal."""
+    unit = model_unit()
+    body = {"name": TEXT(name) if name else "grasshopper", "surface": {"unit": unit} if unit else {}}
     for text, key in parts:
         if text:
             body.update(part_of_request(text, key))
@@ -66,14 +67,14 @@ def surface_id(token, slot, server, key, geometry):
 def post(token, slot, server, key, geometry, body):
     """Name of the job. A server that forgot the mesh gets it once more."""
     request = dict(body)
-    request["surface"] = {"id": surface_id(token, slot, server, key, geometry)}
+    request["surface"] = dict(body["surface"], id=surface_id(token, slot, server, key, geometry))
     try:
         return call_json(server, "POST", "/v1/jobs", request, timeout=SLOW)["id"]
     except Refusal as refused:
         if not any(fault.get("pointer") == "/surface/id" for fault in refused.problem.get("errors") or []):
             raise
     slot["surface"] = None
-    request["surface"] = {"id": surface_id(token, slot, server, key, geometry)}
+    request["surface"] = dict(body["surface"], id=surface_id(token, slot, server, key, geometry))
     return call_json(server, "POST", "/v1/jobs", request, timeout=SLOW)["id"]
 
 

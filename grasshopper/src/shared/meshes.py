@@ -2,6 +2,15 @@
 # Numbers are written by repr alone: the decimal comma of a locale never gets into them.
 
 
+UNITS = {"Meters": "m", "Centimeters": "cm", "Millimeters": "mm", "Feet": "ft", "Inches": "in"}
+
+
+def model_unit():
+    """The open document's unit as the server writes it; None where there is no document or no such unit."""
+    document = Rhino.RhinoDoc.ActiveDoc
+    return UNITS.get(str(getattr(document, "ModelUnitSystem", None)).split(".")[-1])
+
+
 def as_mesh(geometry):
     """(mesh, normals or None) of a Mesh, Brep, Surface, Extrusion or SubD. Raises Refusal."""
     if isinstance(geometry, Rhino.Geometry.Mesh):

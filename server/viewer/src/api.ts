@@ -13,6 +13,7 @@ export interface Problem {
   vertices?: number[];
   faces?: number[];
   edges?: [number, number][];
+  objects?: FileObject[];
 }
 
 export interface Job {
@@ -176,6 +177,10 @@ const post = (body: unknown): RequestInit => ({
   body: JSON.stringify(body),
 });
 
+/** An object of an uploaded file, as POST /v1/surfaces lists them. */
+export interface FileObject { id: string; name: string; layer: string; kind: string; visible: boolean; size: Vec3; used: boolean }
+export interface Stored { id: string; vertices: number; faces: number; repairs: string[]; unit?: string | null; objects?: FileObject[] }
+
 export const api = {
   health: () => json<{ status: string; version: string }>("/health"),
   jobs: () => json<{ jobs: Job[] }>("/v1/jobs?limit=50").then((answer) => answer.jobs),
@@ -193,11 +198,13 @@ export const api = {
   sample: (name: string) => json<Request>(`/v1/samples/${name}`),
   /** The file's mesh as it stands, unchecked: to have something to point at when it is refused. */
   preview: (file: File) => json<{ vertices: Vec3[]; faces: number[][] }>("/v1/surfaces/preview", upload(file)),
-  surface: (file: File) => json<{ id: string; vertices: number; faces: number; repairs: string[] }>("/v1/surfaces", upload(file)),
+  /** object: id of the one that is meant, where the file holds several. */
+  surface: (file: File, object?: string) => json<Stored>("/v1/surfaces", upload(file, object)),
 };
 
-function upload(file: File): RequestInit {
+function upload(file: File, object?: string): RequestInit {
   const form = new FormData();
+  if (object !== undefined) form.append("object", object);
   form.append("file", file, file.name);
   return { method: "POST", body: form };
 }

@@ -1,6 +1,6 @@
 // The page: reads settings, submits jobs, shows results. All state stands in one object; draw functions read it.
 import { balance, choices, close, loopOf, type Corner } from "./angles";
-import { api, FILES, ProblemError, UnreachableError, type BoundaryAngle, type Job, type Problem, type Request, type Result, type Vec3 } from "./api";
+import { api, FILES, ProblemError, UnreachableError, type BoundaryAngle, type FileObject, type Job, type Problem, type Request, type Result, type Vec3 } from "./api";
 import { flatOutline, histogram, singularityCurve, tradeOff } from "./charts";
 import { colour, MODES, number, RAMP_CSS, type Legend, type Mode } from "./colors";
 import { DomainView } from "./domain";
@@ -67,6 +67,7 @@ function meanEdge(): number {
 
 /** Takes over a whole request: what it does not say has its default. */
 function adopt(request: Request): void {
+  $("objects").hidden = true;
   const { surface, name, ...settings } = request;
   const known = description.properties!.surface;
   const own = Object.keys(known.anyOf?.find((part) => part.properties)?.properties ?? {});
@@ -215,8 +216,9 @@ function present(job: Job, result: Result, keepView: boolean): void {
 
 // ---------------------------------------------------------------- surfaces: files and samples
 
-async function takeFile(file: File): Promise<void> {
+async function takeFile(file: File, object?: string): Promise<void> {
   const turn = ++state.turn;
+  if (object === undefined) drawObjects(file, []);
   state.surface = null;
   explorer.clear();
   setEntries([]);
@@ -225,16 +227,34 @@ async function takeFile(file: File): Promise<void> {
   ($("sample") as HTMLSelectElement).value = "";
   note(`Reading ${file.name} …`);
   try {
-    const stored = await api.surface(file);
+    const stored = await api.surface(file, object);
     if (turn !== state.turn) return;
     state.surface = { id: stored.id };
+    drawObjects(file, stored.objects ?? [], stored.unit);
     note(`${stored.vertices} vertices, ${stored.faces} faces. ${stored.repairs.join(" ")}`);
     await solve();
   } catch (error) {
     if (turn !== state.turn) return;
     report(error);
-    if (error instanceof ProblemError) await showFaults(file, error.problem, turn);
+    if (error instanceof ProblemError) {
+      if (error.problem.objects) drawObjects(file, error.problem.objects);
+      await showFaults(file, error.problem, turn);
+    }
   }
+}
+
+/** What a file holds, where that is more than one object: a click takes it alone. */
+function drawObjects(file: File, objects: FileObject[], unit?: string | null): void {
+  const list = $("objects");
+  list.hidden = objects.length < 2;
+  list.replaceChildren(...objects.map((object, i) => {
+    const size = object.size.map((x) => number(x, 4)).join(" × ") + (unit ? ` ${unit}` : "");
+    const where = [object.kind, object.layer, object.visible ? "" : "hidden or locked"].filter(Boolean).join(", ");
+    const button = element("button", { class: object.visible ? "" : "dim", "aria-pressed": String(object.used), "data-object": object.id },
+      element("span", {}, object.name || `object ${i}`), element("small", {}, `${where}: ${size}`));
+    button.addEventListener("click", () => void takeFile(file, object.id));
+    return element("li", {}, button);
+  }));
 }
 
 /** The dropped mesh as it was sent, with the faulty vertices, edges and faces in red. */

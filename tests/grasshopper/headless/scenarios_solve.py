@@ -170,12 +170,18 @@ def sliders_send_settings_only():
 def modes_reach_the_server():
     spy = world.Spy(PORT)
     for mode, expected in (
+        ("auto", {"mode": "auto"}),
         ("straight", {"mode": "straight"}),
         ("isometric", {"mode": "isometric"}),
         ("isometric optimal", {"mode": "isometric", "spread": "optimal"}),
     ):
         settle(sender(Port=spy.port, Mode=mode), 2)
         assert json.loads(spy.bodies("POST", "/v1/jobs")[-1].decode("utf-8"))["boundary"] == expected
+    assert "unit" not in json.loads(spy.bodies("POST", "/v1/jobs")[-1].decode("utf-8"))["surface"]
+    document()
+    settle(sender(Port=spy.port), 2)
+    Rhino.RhinoDoc.ActiveDoc = None
+    assert json.loads(spy.bodies("POST", "/v1/jobs")[-1].decode("utf-8"))["surface"]["unit"] == "mm"
     spy.close()
     assert "no angles came" in sender(Mode="angles").said("error")[0]
     assert "straight, angles" in sender(Mode="bent").said("error")[0]
@@ -416,6 +422,20 @@ def circles_and_lines_are_lifted():
     assert loop.IsClosed and len(piece.points) == 41
 
 
+def the_front_can_be_sent():
+    send = done(Pattern=None)
+    explore = Component("Explore").set(Job=send.Job, MaxSizes=2, Variants=3, Run=True)
+    pump([explore], lambda: explore.Requests or explore.said("error"))
+    assert not explore.said("error"), explore.messages
+    numbers = (explore.Uncovered, explore.Types, explore.PanelCount, explore.Gap, explore.Cost)
+    assert explore.Requests and all(len(list(row)) == len(list(explore.Requests)) for row in numbers)
+    again = done(Pattern=list(explore.Requests)[0], Angles=None, Panels=None)
+    request = world.ask(PORT, "GET", "/v1/jobs/%s/request" % again.Job.rpartition("/")[2])[1]
+    assert request["panels"]["sizes"] <= 2
+    explore.set(MaxSizes=0)
+    assert "1 or more" in explore.said("error")[0]
+
+
 def circles_sent_as_surfaces_are_refused():
     made = sender(Mesh=Circle(0.0, 0.0, 1.0))
     assert made.said("error") == ["Mesh must be a mesh or a surface, not Circle."] and made.Job is None
@@ -617,6 +637,7 @@ world.run([
     domain_with_corners,
     curves_are_lifted_across_the_cut,
     circles_and_lines_are_lifted,
+    the_front_can_be_sent,
     circles_sent_as_surfaces_are_refused,
     umlauts_reach_the_server,
     address_on_the_canvas,

@@ -74,7 +74,7 @@ def _wanted(values: dict[str, Any], max_vertices: int, max_panels: int) -> Wante
         corners = [{"point": p, "angle": a} for p, a in zip(points, angles, strict=True)]
         boundary |= {"angle_unit": "deg", "angles": corners}
     body = {
-        "surface": {"id": ""},
+        "surface": {"id": "", "unit": values["Unit"] or None},
         "boundary": boundary,
         "pattern": {"kind": values["Kind"], "around": values["Around"] or None},
         "panels": {"sizes": values["Sizes"] or None, "target": values["Target"]},

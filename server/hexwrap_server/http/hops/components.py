@@ -70,13 +70,14 @@ COMPONENTS = {
         "Flat, regular panels on a tube-like mesh (hexwrap)",
         (
             Parameter("Mesh", "Mesh", "a mesh like a tube, with two boundary loops", required=True),
-            Parameter("Mode", "Text", "straight, angles or isometric; angles where Points are given"),
+            Parameter("Mode", "Text", "auto, straight, angles or isometric; angles where Points are given"),
             Parameter("Points", "Point", "corners on the boundary", many=True),
             Parameter("Angles", "Number", "degrees, one per point, or one for all", many=True),
             Parameter("Kind", "Text", ", ".join(LATTICES), default="hex"),
             Parameter("Around", "Integer", "cells around; 0 leaves it to the server", default=0),
             Parameter("Sizes", "Integer", "different panel sizes; 0 for one per panel", default=11),
             Parameter("Target", "Text", "inscribed, best, shortest or mean", default="inscribed"),
+            Parameter("Unit", "Text", "of the model: m, cm, mm, ft or in; for messages and files"),
         ),
         (
             Parameter("Panels", "Curve", "closed outlines, one branch per ring", many=True),

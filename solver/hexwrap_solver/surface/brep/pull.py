@@ -89,11 +89,11 @@ def pull(
         trial = np.linalg.norm(points[again] - foot, axis=1)
         better = trial < distance[again]
         uv[again[better]], distance[again[better]] = other[better], trial[better]
-    _follow(patch, points, uv, distance, tolerance)
+    follow(patch, points, uv, distance, tolerance)
     return uv, distance
 
 
-def _follow(patch: Patch, points: Floats, uv: Floats, distance: Floats, tolerance: float) -> None:
+def follow(patch: Patch, points: Floats, uv: Floats, distance: Floats, tolerance: float) -> None:
     """Points (k, 3) of a curve that are far off the surface are pulled again, in place, from where their
     neighbours along the curve came to lie."""
     k = len(points)

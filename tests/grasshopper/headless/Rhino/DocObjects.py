@@ -104,7 +104,7 @@ class Document(object):
     def __init__(self):
         self.Layers, self.InstanceDefinitions = _Layers(), _Blocks()
         self.Objects = _Objects(self)
-        self.Views = self
+        self.Views, self.ModelUnitSystem = self, "Millimeters"
         self.things, self.history, self.record, self.drawn = [], [], None, 0
 
     def Redraw(self):
