@@ -322,12 +322,13 @@ class _Draft:
             self.turn += sign * k * float(search.model.turn[seat])
         self._crowd(seat, k, sign)
 
-    def _turn(self, move: int) -> None:
+    def _turn(self, move: int, steps: int = 1) -> None:
+        """Makes a move, ``steps`` times."""
         search, q = self.search, self.search.seats
-        change = search._moves[0][move]
-        self.value += float(2 * change @ self.gradient[q:] + search._quadratic[move])
+        change = steps * search._moves[0][move]
+        self.value += float(2 * change @ self.gradient[q:] + steps**2 * search._quadratic[move])
         self.gradient = self.gradient + change @ search.square[q:]
-        self.loops = _plus(self.loops, search.moves[move])
+        self.loops = _plus(self.loops, tuple(steps * k for k in search.moves[move]))
 
     def relocate(self, i: int, least: float) -> None:
         """The singularity to the best seat, if that gains at least so much."""
@@ -344,14 +345,16 @@ class _Draft:
         self.pairs[i] = (seat, k)
 
     def turn_loops(self, least: float) -> None:
-        """Loops changed as long as that gains."""
+        """Loops changed as long as that gains, by each move to its minimum at once: where coordinates are
+        wild, it can be 100,000 quanta away."""
         change, q = self.search._moves[0], self.search.seats
+        bend = self.search._quadratic
         while True:
-            gains = 2 * change @ self.gradient[q:] + self.search._quadratic
-            best = int(gains.argmin())
-            if gains[best] >= -least:
+            slope = 2 * change @ self.gradient[q:]
+            best = int((slope + bend).argmin())
+            if slope[best] + bend[best] >= -least or bend[best] <= 0:
                 return
-            self._turn(best)
+            self._turn(best, max(1, round(-float(slope[best]) / (2 * float(bend[best])))))
 
 
 def _plus(loops: tuple[int, ...], move: tuple[int, ...]) -> tuple[int, ...]:

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array, csr_array
-from scipy.sparse.csgraph import breadth_first_order, connected_components
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from hexwrap_solver.arrays import Bools, Floats, Ints
 from hexwrap_solver.geometry import angles_between, face_normals, normalize
@@ -84,33 +84,42 @@ def chained(vertices: Floats, edges: Ints, fold: Floats, stops: Bools) -> tuple[
     # Nodes are slots, made one where a chain goes through; edges join their two slots.
     label = np.arange(2 * k)
     label[two] = one
-    graph = coo_array((np.ones(k, dtype=np.int8), (label[0::2], label[1::2])), shape=(2 * k, 2 * k)).tocsr()
+    tail, head = label[0::2], label[1::2]
+    graph = coo_array((np.ones(k, dtype=np.int8), (tail, head)), shape=(2 * k, 2 * k))
     _, part = connected_components(graph, directed=False)
     ends = np.bincount(label, minlength=2 * k)
-    own = part[label[0::2]]
+    beside = _neighbours(tail, head, 2 * k)
+    by_chain = np.argsort(part[tail], kind="stable")
+    bounds = np.flatnonzero(np.diff(part[tail][by_chain])) + 1
     out = []
-    for chain in np.unique(own):
-        mine = np.flatnonzero(own == chain)
-        nodes = np.unique(label[np.stack([2 * mine, 2 * mine + 1])])
+    for mine in np.split(by_chain, bounds):
+        nodes = np.unique(np.concatenate([tail[mine], head[mine]]))
         tips = nodes[ends[nodes] == 1]
         closed = len(tips) == 0
         among = nodes if closed else tips
         start = int(among[np.argmin(incident[among])])
-        path = _walk(graph, start, closed)
-        line = incident[path]
+        line = incident[_walk(beside, start)]
         out.append(Feature(np.append(line, line[0]) if closed else line, float(fold[mine].mean()), closed))
     return tuple(sorted(out, key=lambda f: (int(f.vertices.min()), len(f.vertices), f.vertices.tolist())))
 
 
-def _walk(graph: csr_array, start: int, closed: bool) -> Ints:
-    """Nodes of a path from one end to the other, or of a cycle once around."""
-    order, before = breadth_first_order(graph, start, directed=False)
-    if not closed or len(order) < 3:
-        return np.asarray(order, dtype=np.int64)
-    # From the start a cycle is found along both sides in turn; one side is followed, then the other back.
-    side = {int(order[1]): 0, int(order[2]): 1}
-    arms: list[list[int]] = [[int(order[1])], [int(order[2])]]
-    for node in order[3:].tolist():
-        side[node] = side[int(before[node])]
-        arms[side[node]].append(node)
-    return np.array([start, *arms[0], *reversed(arms[1])], dtype=np.int64)
+def _neighbours(tail: Ints, head: Ints, n: int) -> Ints:
+    """(n, 2) the nodes joined to each by an edge, the lower one first; −1: none. No node has three."""
+    node, other = np.concatenate([tail, head]), np.concatenate([head, tail])
+    order = np.lexsort((other, node))
+    node, other = node[order], other[order]
+    beside = np.full((n, 2), -1, dtype=np.int64)
+    again = np.concatenate([[0], (node[1:] == node[:-1]).astype(np.int64)])
+    beside[node, again] = other
+    return beside
+
+
+def _walk(beside: Ints, start: int) -> Ints:
+    """Nodes of a path from one end to the other, or of a cycle once around. Its steps are those of the chain
+    alone, so that any number of chains takes no longer than their edges."""
+    path, before, at = [start], start, int(beside[start, 0])
+    while at not in (-1, start):
+        path.append(at)
+        one, two = beside[at].tolist()
+        before, at = at, two if one == before else one
+    return np.array(path, dtype=np.int64)

@@ -170,7 +170,9 @@ def place_by_sides(
     angle = edge_angle(lattice, settings)
     trials = _trials(straightening, settings, spread)
     tried = []
-    for trial in _best_of(trials, strain)[:DEFORMED]:
+    # With features many come near, most of them alike, and each takes as long as the whole search.
+    most = DEFORMED if straightening.features is None else 1
+    for trial in _best_of(trials, strain)[:most]:
         rest = trial.scale * (cmap.uv - (cmap.deck.apex or 0)) + trial.origin
         glued = Glued.by_sheets(cmap, trial.motion)
         place = deform(system, glued, trial.scale, rest, lines.depths(trial.depth, trial.motion))
