@@ -14,12 +14,14 @@ from PIL import Image
 
 from hexwrap_server import samples
 from hexwrap_server.input.schemas import parse_request
-from hexwrap_server.jobs.work import run_stages
+from hexwrap_server.jobs.work import run_stages, take_in
 from hexwrap_server.output.colours import class_colours, panel_colours
 from hexwrap_server.output.picture import panels_scene
 from hexwrap_server.output.scene import render
 from hexwrap_server.output.writers import Meta, write
 from hexwrap_solver.pipeline import PlainRunner, Solution
+from hexwrap_solver.singularities.solve import seated
+from hexwrap_solver.singularities.types import SingularitySettings
 
 HERE = Path(__file__).parent
 #: Pixels of the front picture.
@@ -118,6 +120,29 @@ def sheet() -> Figure:
     return figure
 
 
+def singularities() -> Figure:
+    """The curve over their number for 3, 5 and 11 sizes beside the domain and the surface they lead to."""
+    request = parse_request(samples.load("singular"), 10**7, 10**6)
+    assert not isinstance(request.surface, str)
+    wanted, surface = request.wanted, take_in(request.surface, request.wanted.surface)
+    figure = Figure(figsize=(13, 4.2), dpi=100, facecolor="white")
+    curve, domain, space = figure.subplots(1, 3, gridspec_kw={"width_ratios": [1.25, 1, 0.9], "wspace": 0.1})
+    for sizes, colour in ((3, "#c2410c"), (5, "#b8860b"), (11, "#1f6f78")):
+        seats = seated(surface, wanted.boundary.adapted("hex"), SingularitySettings(6), wanted.pattern, sizes)
+        found = seats.placing.proposals
+        curve.plot([one.count for one in found], [100 * one.uncovered for one in found], "o-", color=colour)
+        curve.annotate(f" {sizes} sizes", (0, 100 * found[0].uncovered), xytext=(6, 0), color=colour,
+                       textcoords="offset points", va="center", fontsize=11)  # fmt: skip
+    curve.set(xlabel="singularities", ylabel="uncovered, %", ylim=(0, None))
+    curve.spines[["top", "right"]].set_visible(False)
+    solution = solved("singular")
+    draw_domain(domain, solution)
+    space.imshow(np.clip(render(panels_scene(solution)), 0, 1), interpolation="lanczos")
+    space.set_axis_off()
+    figure.subplots_adjust(left=0.05, right=0.99, bottom=0.12, top=0.97)
+    return figure
+
+
 def main() -> None:
     picture = Image.open(
         io.BytesIO(write("panels.png", solved("singular"), Meta("tower with three heptagons")))
@@ -127,6 +152,7 @@ def main() -> None:
     cases()
     (HERE / "domain.svg").write_bytes(write("domain.svg", solved("entrance"), Meta("entrance")))
     sheet().savefig(HERE / "sheet.png")
+    singularities().savefig(HERE / "singularities.png")
 
 
 if __name__ == "__main__":

@@ -186,4 +186,5 @@ def _map(
         lambda progress: closed_map(surface, seats.frame, seats.placing, boundary, progress),
     )
     placing = seats.placing
-    return cmap, Choices.of(placing.proposals, placing.chosen, classes or SIZES, surface.vertices)
+    taken = placing.chosen if len(cmap.cones) else 0
+    return cmap, Choices.of(placing.proposals, taken, classes or SIZES, surface.vertices)

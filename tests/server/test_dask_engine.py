@@ -335,3 +335,23 @@ def test_scheduler_that_is_down_at_start_is_told_in_a_sentence(tmp_path: Path, a
     assert told.returncode == 1
     assert f"hexwrap: The dask scheduler at {address} does not answer" in told.stderr
     assert "Traceback" not in told.stderr
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_explorations_run_there_too(tmp_path: Path) -> None:
+    from hexwrap_server.jobs.dask_engine import DaskEngine
+
+    vary = {"around": [10, 12], "sizes": [1, 5], "singularities": [0]}
+    with (
+        distributed.LocalCluster(
+            n_workers=1, threads_per_worker=1, dashboard_address=":0", protocol="tcp://", silence_logs=50
+        ) as made,
+        running(tmp_path, DaskEngine(made.scheduler_address)) as client,
+    ):
+        body = {"surface": tube(), "vary": vary, "variants": 3}
+        job = finished(client, client.post("/v1/explore", json=body).json()["id"])
+        assert job["status"] == "done", job
+        result = client.get(f"/v1/jobs/{job['id']}/result").json()
+        best = result["variants"][result["best"]]
+        assert best["measured"]
+        assert client.post("/v1/jobs", json=best["request"]).json()["status"] == "done"

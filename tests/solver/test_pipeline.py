@@ -10,6 +10,7 @@ from hexwrap_solver.arrays import Ragged
 from hexwrap_solver.conformal.types import BoundaryCondition
 from hexwrap_solver.errors import HexwrapError
 from hexwrap_solver.panels.types import ComponentSettings, PanelSettings, Weights
+from hexwrap_solver.pattern.lattice import LATTICES
 from hexwrap_solver.pattern.types import PatternSettings
 from hexwrap_solver.pipeline import PlainRunner, SolveSettings, solve
 from hexwrap_solver.surface import surface_from_mesh
@@ -43,7 +44,7 @@ def test_hexagons_close_up_and_panels_keep_the_contract():
     assert list(runner.timings) == ["surface", "map", "pattern", "fit", "panels", "quality"]
 
 
-@pytest.mark.parametrize("kind", ["hex", "quad", "triangle"])
+@pytest.mark.parametrize("kind", list(LATTICES))
 @pytest.mark.parametrize("boundary", ["whole", "trim"])
 @pytest.mark.parametrize("align", ["none", "both"])
 def test_no_kind_of_pattern_overlaps(kind, boundary, align):

@@ -117,7 +117,7 @@ class _Group:
 
     @property
     def sides(self) -> int:
-        return self.at.shape[1]
+        return int(self.at.shape[1])
 
     @property
     def spokes(self) -> Ragged:

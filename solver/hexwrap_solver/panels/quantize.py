@@ -67,16 +67,7 @@ def quantize(fitted: FittedPanels, settings: PanelSettings) -> Panels:
         length, said = _fewest(choices[0], limits[0], settings)
         pick, lengths = 0, [length]
     else:
-        lengths = [
-            _by_kind(
-                fitted,
-                limit,
-                lambda own: choose_lengths(
-                    own, settings.sizes, settings.size_cost, settings.increment, smallest
-                ),
-            )
-            for limit in limits
-        ]
+        lengths = [_chosen(fitted, limit, settings.sizes, settings, smallest) for limit in limits]
         pick = min(range(len(lengths)), key=lambda k: _loss(fitted, lengths[k], smallest, settings))
     fitted, length = choices[pick], lengths[pick]
     sides = fitted.spokes.lengths
@@ -128,6 +119,14 @@ def _by_kind(fitted: FittedPanels, limit: Floats, choose: Callable[[Floats], Flo
     return chosen
 
 
+def _chosen(
+    fitted: FittedPanels, limit: Floats, classes: int | None, settings: PanelSettings, smallest: float = 0.0
+) -> Floats:
+    """(r,) lengths in so many classes of each kind."""
+    cost, increment = settings.size_cost, settings.increment
+    return _by_kind(fitted, limit, lambda own: choose_lengths(own, classes, cost, increment, smallest))
+
+
 def _true_sides(fitted: FittedPanels, member: Ints) -> Ints:
     """(s,) sides of the panels of each class; edges in line with each other are one side."""
     one = np.unique(member, return_index=True)[1]
@@ -136,7 +135,7 @@ def _true_sides(fitted: FittedPanels, member: Ints) -> Ints:
     back = np.empty_like(ahead)
     back[spokes.next()] = -ahead
     bends = np.linalg.norm(np.cross(ahead, back), axis=1) > 1e-6
-    return row_sums(bends.astype(np.int64), spokes.offsets) if len(one) else one
+    return np.asarray(row_sums(bends.astype(float), spokes.offsets), dtype=np.int64)
 
 
 def _fewest(fitted: FittedPanels, limit: Floats, settings: PanelSettings) -> tuple[Floats, tuple[str, ...]]:
@@ -163,11 +162,7 @@ def _fewest(fitted: FittedPanels, limit: Floats, settings: PanelSettings) -> tup
     length, bound = found.length, np.where(found.over, np.inf, settings.max_gap * (1 + SLACK))
     few = _classes(sides, length)
     for classes in range(1, min(few, TRADE_OFF_CLASSES) + 1):
-        covering = _by_kind(
-            fitted,
-            limit,
-            lambda own, k=classes: choose_lengths(own, k, settings.size_cost, settings.increment),
-        )
+        covering = _chosen(fitted, limit, classes, settings)
         if _classes(sides, covering) > few:
             break
         if (joints.width(covering) <= bound).all():

@@ -91,9 +91,10 @@ def nearest_copy(points: Floats, outline: Floats, normal: Floats | None = None) 
     tried = [_copy(points, start, normal) for start in starts]
     best = np.argmax([one.free_length for one in tried], axis=0)
     pick = best, np.arange(len(points))
-    axes = [np.stack([getattr(one, name) for one in tried])[pick] for name in ("x_axis", "y_axis")]
+    x_axis = np.stack([one.x_axis for one in tried])[pick]
+    y_axis = np.stack([one.y_axis for one in tried])[pick]
     length = np.stack([one.free_length for one in tried])[pick]
-    return Poses(points.mean(axis=1), *axes, length, np.stack(starts)[best])
+    return Poses(points.mean(axis=1), x_axis, y_axis, length, np.stack(starts)[best])
 
 
 def _copy(points: Floats, outline: Floats, normal: Floats | None) -> Poses:

@@ -95,7 +95,7 @@ class Lattice:
     @cached_property
     def turns(self) -> Complexes:
         """(order,) ζ^j."""
-        return np.exp(1j * self.step_angle * np.arange(self.order))
+        return np.asarray(np.exp(1j * self.step_angle * np.arange(self.order)))
 
     @cached_property
     def basis(self) -> Ints:
@@ -382,7 +382,7 @@ class Lattice:
         rows = np.stack([following[:, 1] - ring[:, 1], ring[:, 0] - following[:, 0]], axis=1)
         return np.asarray(rows // det[:, None])
 
-    def cells_along(self, x: Floats, y: Floats) -> Floats:
+    def cells_along(self, x: Floats | Ints, y: Floats | Ints) -> Ints | Floats:
         """(…) cells in a shortest ring along xg + yζg; also of a part of a translation."""
         rows = self._measures
         return np.asarray(self.counted * np.max([m * x + n * y for m, n in rows.tolist()], axis=0))
@@ -403,7 +403,7 @@ class Lattice:
         """Cells in a shortest closed ring of neighbouring cells once around along a translation."""
         e1 = self.position(self.basis[0])
         x, y = np.moveaxis(np.rint(self.coordinates(self.position(translation) / e1)).astype(np.int64), -1, 0)
-        return self.cells_along(x, y)
+        return np.asarray(self.cells_along(x, y), dtype=np.int64)
 
 
 ROOT = 3**0.5

@@ -32,11 +32,13 @@ REACHES, SPACING, ROUNDS = (1.5, 0.8, 0.4), 0.4, 20
 @dataclass(frozen=True)
 class Placing:
     """proposals: the best with each number of singularities that is possible, ascending. chosen: index of
-    the one to take. symmetry: of the surface, which they keep to; empty where that is not asked for."""
+    the one to take. symmetry: of the surface, which they keep to; empty where that is not asked for.
+    may_be_none: where they cannot be closed, a map without any will do."""
 
     proposals: tuple[Proposal, ...]
     chosen: int
     symmetry: str = ""
+    may_be_none: bool = False
 
     @property
     def proposal(self) -> Proposal:

@@ -239,7 +239,8 @@ def chosen(surface: Surface, frame: Frame, settings: SingularitySettings) -> Pla
     if settings.at:
         return Placing((given(surface, frame.rules, settings.at),), 0)
     count: int | Literal["auto"] = "auto" if settings.count is None else settings.count
-    return place(surface, frame.rules, count, frame.turn)
+    placing = place(surface, frame.rules, count, frame.turn)
+    return replace(placing, may_be_none=settings.count == "auto")
 
 
 def closed_map(
@@ -254,7 +255,14 @@ def closed_map(
     proposal = placing.proposal
     if not proposal.count:
         return conformal_map(surface, boundary, progress)
-    chart, found = _closed(surface, frame, proposal, progress)
+    try:
+        chart, found = _closed(surface, frame, proposal, progress)
+    except ConvergenceError as error:
+        if not placing.may_be_none or placing.proposals[0].count:
+            raise
+        plain = conformal_map(surface, boundary, progress)
+        note = f"{told(frame.lattice.kind, proposal.index).capitalize()} would pay, but are left out: "
+        return replace(plain, notes=(*plain.notes, note + error.detail))
     return _as_map(frame, chart, found, placing, surface)
 
 

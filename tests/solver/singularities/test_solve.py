@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from hexwrap_solver.conformal.types import BoundaryCondition
-from hexwrap_solver.errors import SingularitiesError
+from hexwrap_solver.errors import ConvergenceError, SingularitiesError
 from hexwrap_solver.panels.types import PanelSettings
 from hexwrap_solver.pattern.types import PatternSettings
 from hexwrap_solver.pipeline import SolveSettings, solve
+from hexwrap_solver.singularities import solve as module
 from hexwrap_solver.singularities.types import SingularityAt, SingularitySettings
 from tests.solver.singularities import shapes
 
@@ -214,3 +215,16 @@ def test_a_closed_surface_takes_triangles():
 def test_what_closes_around_nothing_is_refused(kind, index, said):
     with pytest.raises(SingularitiesError, match=said):
         solved(shapes.waist(), "isometric", None, (SingularityAt(index, vertex=620),), kind=kind, around=24)
+
+
+def test_where_they_cannot_be_closed_there_are_none(monkeypatch):
+    def fails(*args):
+        raise ConvergenceError("It did not close.")
+
+    monkeypatch.setattr(module, "_closed", fails)
+    found = solved(shapes.waist(), count="auto", around=16)
+    assert len(found.map.cones) == 0
+    assert any("left out: It did not close." in note for note in found.quality.notes)
+    assert found.quality.singularities.number[found.quality.singularities.taken] == 0
+    with pytest.raises(ConvergenceError):
+        solved(shapes.waist(), count=4, around=16)

@@ -138,7 +138,7 @@ def whole_cells(lattice: Lattice, edges: PatternEdges) -> WholeCells:
 def sides_by_edge(edges: PatternEdges, cells: WholeCells) -> Ints:
     """(n·width,) the side that runs along each directed edge, −1 where there is none."""
     side = np.full(edges.head.size, -1, dtype=np.int64)
-    side[edges.number(cells.corner.values, cells.slot)] = np.arange(len(cells.slot))
+    side[edges.number(cells.corner.values.astype(np.int64), cells.slot)] = np.arange(len(cells.slot))
     return side
 
 

@@ -46,7 +46,7 @@ class PatternEdges:
 
     @property
     def width(self) -> int:
-        return self.head.shape[1]
+        return int(self.head.shape[1])
 
     def number(self, node: Ints, slot: Ints) -> Ints:
         return np.asarray(node * self.width + slot)
@@ -114,7 +114,9 @@ def _cone(layout: Layout, nodes: Nodes, corner: int) -> _Cone | None:
     own = int(nodes.own[node])
     place = complex(lattice.stand(nodes.point[own]))
     corner = 3 * int(nodes.face[own]) + int(np.argmin(abs(layout.corners[nodes.face[own]] - place)))
-    incidence, begins, isometry = [], [], [np.zeros(4, dtype=np.int64)]
+    incidence: list[int] = []
+    begins: list[float] = []
+    isometry = [np.zeros(4, dtype=np.int64)]
     at_corner, angle = corner, 0.0
     while True:
         f, c = divmod(at_corner, 3)
