@@ -285,7 +285,7 @@ def _common(
     along = cmap.deck.translation if cmap.deck.apex is None else 0j
     if along == 0:
         along = max(chains, key=lambda chain: chain.length).axis
-    return zero * abs(along) / along
+    return zero * abs(along) / along if along else zero  # a ring on a disk has no direction
 
 
 def _trials_at(frame: _Frame, strain: Strain, scale: complex, cost_of_size: float) -> list[_Trial]:
