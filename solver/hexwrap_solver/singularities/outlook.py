@@ -9,7 +9,7 @@ import numpy as np
 from hexwrap_solver.arrays import Floats
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.pattern.lattice import LATTICES
-from hexwrap_solver.pattern.types import Pattern
+from hexwrap_solver.pattern.types import Kind, Pattern
 from hexwrap_solver.singularities.linear import linear_model, vertex_areas
 from hexwrap_solver.singularities.place import number_of
 from hexwrap_solver.singularities.search import Search, ranked
@@ -43,7 +43,7 @@ class ProspectKey:
     cells: how far singularities stand apart is counted in cells, and to the nearest power of two is enough
     for a coarse look. So it stays the same where the cells change a little."""
 
-    kind: str
+    kind: Kind
     doublings: int
 
     @classmethod
