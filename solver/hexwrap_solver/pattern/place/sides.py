@@ -85,8 +85,8 @@ def sides_of(cmap: ConformalMap, lattice: Lattice, loops: list[int]) -> Sides:
 
 
 def no_sides() -> Sides:
-    none, nothing = np.zeros(0, dtype=np.int64), np.zeros(0)
-    return Sides(nothing + 0j, nothing, none, none > 0, none, none, none, nothing + 0j)
+    none, nothing, nowhere = np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0, dtype=np.complex128)
+    return Sides(nowhere, nothing, none, none > 0, none, none, none, nowhere)
 
 
 def _sheets_gained(cmap: ConformalMap) -> Ints:
