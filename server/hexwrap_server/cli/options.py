@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import pathlib
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
 from hexwrap_server.errors import FormError
+from hexwrap_server.input.curves import READERS, drawn, read_drawing
 from hexwrap_server.input.faults import Path, pointer
 from hexwrap_server.input.form import Body, Leaf, is_nullable, leaves
 
@@ -21,6 +23,7 @@ FLAGS: dict[Path, str] = {
     ("panels", "weights", "edge"): "--weight-edge",
     ("panels", "weights", "surface"): "--weight-surface",
     ("surface", "features", "angle"): "--fold",
+    ("surface", "features", "lines"): "--feature-lines",
 }
 #: Settings of which a request gives one.
 SIZES: tuple[Path, Path] = (("pattern", "around"), ("pattern", "edge_length"))
@@ -56,6 +59,8 @@ class Option:
         text, default = self.leaf.setting.help, self.leaf.default
         if self.leaf.is_list:
             return f"{text}; PLACE is {_places(self.leaf)} (any number of times)"
+        if self.leaf.is_lines:
+            return f"{text}: a {', '.join(READERS)} file, or X,Y,Z;X,Y,Z;… (any number of times)"
         if self.is_first:
             text += "; 'none' leaves it out"
         if default is None or default is False or default == "":
@@ -89,6 +94,8 @@ def add_request_options(parser: argparse.ArgumentParser, section: str = "") -> N
             group.add_argument(
                 option.flag, action="append", metavar=f"PLACE={option.leaf.entry[-1].upper()}", **common
             )
+        elif option.leaf.is_lines:
+            group.add_argument(option.flag, action="append", metavar="FILE", **common)
         elif option.leaf.default is False:
             group.add_argument(option.flag, action="store_true", **common)
         elif option.words:
@@ -119,6 +126,8 @@ def asked_body(arguments: argparse.Namespace, body: dict[str, Any]) -> dict[str,
             asked[path[0]] = None
         elif option.leaf.is_list:
             _put(asked, path, [_entry(option, text) for text in value])
+        elif option.leaf.is_lines:
+            _put(asked, path, [line for text in value for line in _lines(option, text)])
         else:
             _put(asked, path, value)
     if ("boundary", "angles") in given and isinstance(asked["boundary"], dict):
@@ -209,6 +218,17 @@ def _entry(option: Option, text: str) -> dict[str, object]:
         )
     line = [[_value(x) for x in part] for part in parts]
     return {points: line if points == "line" else line[0], **asked}
+
+
+def _lines(option: Option, text: str) -> list[list[list[Any]]]:
+    """The curves of a drawing, or one line of points. Raises FormError, DrawingError."""
+    points = [part.split(",") for part in text.split(";")]
+    if len(points) > 1 and all(len(point) == 3 for point in points):
+        return [[[_value(x) for x in point] for point in points]]
+    curves = [drawn(curve) for curve in read_drawing(pathlib.Path(text)).curves if len(curve.points) > 1]
+    if not curves or any(points.shape[1] != 3 for points in curves):
+        raise FormError.at(pointer(option.path), f"{option.flag} {text}: no curves of points x, y, z in it")
+    return [points.tolist() for points in curves]
 
 
 def _put(body: dict[str, Any], path: Path, value: object) -> None:

@@ -75,7 +75,7 @@ def _write_csv(curves: list[Curve], unit: str | None) -> bytes:
     for number, curve in enumerate(curves):
         if number:
             text.write("\r\n")
-        writer.writerows(_drawn(curve).tolist())
+        writer.writerows(drawn(curve).tolist())
     return text.getvalue().encode()
 
 
@@ -102,7 +102,7 @@ def _write_3dm(curves: list[Curve], unit: str | None) -> bytes:
     model = rhino3dm.File3dm()
     model.Settings.ModelUnitSystem = getattr(rhino3dm.UnitSystem, unit_of(unit).rhino)
     for curve in curves:
-        points = [rhino3dm.Point3d(*p, *[0.0] * (3 - len(p))) for p in _drawn(curve).tolist()]
+        points = [rhino3dm.Point3d(*p, *[0.0] * (3 - len(p))) for p in drawn(curve).tolist()]
         if len(points) == 1:
             model.Objects.AddPoint(points[0])
         else:
@@ -110,7 +110,8 @@ def _write_3dm(curves: list[Curve], unit: str | None) -> bytes:
     return base64.b64decode(model.Encode())
 
 
-def _drawn(curve: Curve) -> Floats:
+def drawn(curve: Curve) -> Floats:
+    """(k, 2 or 3) its points, the first one again where it is closed."""
     return np.vstack([curve.points, curve.points[:1]]) if curve.closed else curve.points
 
 

@@ -65,7 +65,18 @@ class Leaf:
     @property
     def is_list(self) -> bool:
         """Whether it is a list of sections."""
-        return any(get_args(part)[-1:] == (...,) for part in _parts(self.annotation))
+        return any(
+            get_args(part)[-1:] == (...,) and is_dataclass(get_args(part)[0])
+            for part in _parts(self.annotation)
+        )
+
+    @property
+    def is_lines(self) -> bool:
+        """Whether it is a list of polylines."""
+        return any(
+            get_args(part)[-1:] == (...,) and get_args(get_args(part)[0])[-1:] == (...,)
+            for part in _parts(self.annotation)
+        )
 
     @property
     def entry(self) -> tuple[str | None, str, str]:

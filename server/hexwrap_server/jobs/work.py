@@ -24,6 +24,7 @@ from hexwrap_server.output.writers import Meta, write
 from hexwrap_solver import pipeline
 from hexwrap_solver.surface import surface_from_mesh, with_openings
 from hexwrap_solver.surface.brep import surface_from_brep, surface_from_patch
+from hexwrap_solver.surface.drawn import with_lines
 from hexwrap_solver.surface.types import Origin, Surface, SurfaceSettings
 
 #: Finished solutions that a worker keeps for lift, flatten and files.
@@ -86,6 +87,8 @@ def take_in(sent: SentSurface, asked: SurfaceSettings | None = None) -> Surface:
     else:
         assert sent.nurbs is not None
         surface = surface_from_patch(sent.nurbs, settings, sent.tolerance)
+    if settings.features is not None:
+        surface = with_lines(surface, settings.features.lines)
     surface = with_openings(surface, settings.openings)
     unit = settings.unit or sent.unit
     if (unit, sent.origin, sent.told) == (None, Origin(), ()):

@@ -86,8 +86,9 @@ def told(features: tuple[PatternFeature, ...]) -> list[str]:
     worst = max(feature.distortion or 0.0 for feature in straight)
     one = len(straight) == 1
     angle = f"{min(folds):.0f}°" if np.ptp(folds) < 1 else f"{min(folds):.0f}° to {max(folds):.0f}°"
+    folded = f" (folded by {angle})" if max(folds) >= 1 else ""  # drawn lines may lie flat
     return [
-        f"{len(straight)} {'feature' if one else 'features'} (folded by {angle}) "
+        f"{len(straight)} {'feature' if one else 'features'}{folded} "
         f"{'lies' if one else 'lie'} on lines of the pattern; {cut} cells are cut there, at a distortion of "
         f"{worst:.2g} beside them."
     ]

@@ -15,6 +15,8 @@ SurfaceError
 │   ├── SeveralComponentsError   more than one piece
 │   ├── NotOrientableError       a Möbius band
 │   └── HandlesError             a torus, or a surface with handles
+├── of what is drawn on it
+│   └── DrawnLineError           a line of features.lines that cannot be followed on the surface
 └── of a NURBS surface
     ├── NurbsDataError           degree, knots, weights or control points that define no surface
     ├── NotClosedError           closed in no direction, or not where it claims to be
@@ -88,6 +90,13 @@ class HandlesError(SurfaceError):
 
     slug = "handles"
     title = "The surface has handles"
+
+
+class DrawnLineError(SurfaceError):
+    """data["line"], data["point"]: the numbers of the line and of its point."""
+
+    slug = "feature-line"
+    title = "A line drawn on the surface cannot be followed"
 
 
 class NurbsDataError(SurfaceError):

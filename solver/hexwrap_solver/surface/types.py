@@ -9,10 +9,14 @@ from typing import Annotated, Literal
 import numpy as np
 
 from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged
+from hexwrap_solver.errors import SettingError
 from hexwrap_solver.geometry import face_areas
 from hexwrap_solver.setting import Setting
 from hexwrap_solver.surface.closest import TriangleTree
 from hexwrap_solver.surface.topology import edge_groups, edge_lengths, half_edges, twins_of
+
+#: Of all drawn lines together.
+MOST_POINTS = 20_000
 
 Openings = Literal["cut", "loop"]
 Caps = Literal["drop", "keep"]
@@ -63,9 +67,13 @@ class MeshSettings:
     ] = 1_000_000
 
 
+Polyline = tuple[tuple[float, float, float], ...]
+
+
 @dataclass(frozen=True)
 class FeatureSettings:
-    """Which edges of the mesh are lines of the pattern."""
+    """Which edges of the mesh are lines of the pattern, and lines that are drawn on it. Raises SettingError
+    for a line of fewer than two points, and for too many points."""
 
     angle: Annotated[
         float | None,
@@ -73,6 +81,20 @@ class FeatureSettings:
             "mesh edges that fold by more are lines of the pattern; null: none", ge=1, lt=180, unit="degrees"
         ),
     ] = 30.0
+    lines: Annotated[
+        tuple[Polyline, ...],
+        Setting(
+            "polylines drawn on the surface, lines of the pattern too; closed: the first point again",
+            most=1000,
+        ),
+    ] = ()
+
+    def __post_init__(self) -> None:
+        for i, line in enumerate(self.lines):
+            if len(line) < 2:
+                raise SettingError(f"line {i} has {len(line)} of the two points that it needs at least")
+        if sum(map(len, self.lines)) > MOST_POINTS:
+            raise SettingError(f"'lines' may have {MOST_POINTS} points together; give fewer")
 
 
 @dataclass(frozen=True)

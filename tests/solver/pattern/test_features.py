@@ -15,6 +15,7 @@ from hexwrap_solver.pattern.lattice import LATTICES
 from hexwrap_solver.pattern.place.choose import Placing
 from hexwrap_solver.pattern.place.deform import distortion_of
 from hexwrap_solver.pattern.types import Kind, Pattern, PatternSettings
+from hexwrap_solver.surface.drawn import with_lines
 from tests.solver.pattern.folded import ELL, RECTANGLE, prism
 
 PLANS = {"box": RECTANGLE, "ell": ELL}
@@ -74,3 +75,24 @@ def test_leaning_creases_are_followed_at_the_price_of_their_lean(kind: Kind) -> 
     lean = np.deg2rad(4.05)
     assert 0.5 * (1 / np.tan(np.pi / 4 - lean / 2) - 1) < pattern.distortion < 0.15
     assert euler(pattern) == 0
+
+
+@pytest.mark.parametrize("kind", ["hex", "quad"])
+def test_drawn_lines_are_followed_as_creases_are(kind: Kind) -> None:
+    """Across the creases of a box, and one that ends within an edge of the pattern, on either side of it."""
+    box = prism(RECTANGLE, edge=2.0)
+    x, y = box.vertices[:, 0].max(), box.vertices[:, 1].max()
+    ring = np.array([(-x, -y, 22.3), (x, -y, 22.3), (x, y, 22.3), (-x, y, 22.3), (-x, -y, 22.3)])
+    stub = np.array([(0.3, -y, 31.1), (0.3, -y, 47.2)])
+    cmap = conformal_map(with_lines(box, [ring, stub]), BoundaryCondition("straight"))
+    pattern = lay_pattern(cmap, PatternSettings(kind, around=37, boundary="trim"))
+    assert euler(pattern) == 0
+    around, up, *creases = pattern.features
+    assert all(feature.straight for feature in pattern.features)
+    assert len(creases) == 4
+    assert abs(pattern.vertices[around.vertices, 2] - 22.3).max() < 1e-9
+    assert abs(pattern.vertices[up.vertices, 0] - 0.3).max() < 0.05
+    assert np.ptp(pattern.vertices[up.vertices, 2]) > 10
+    area = fan_areas(pattern.cells)
+    assert (area > 0).all()
+    assert area.sum() == pytest.approx(60 * 100, rel=2e-3)
