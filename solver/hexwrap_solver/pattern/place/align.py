@@ -223,7 +223,7 @@ def _sizes(frame: _Frame, size: float, spread: float) -> Floats:
     each; for then the places along it are tried, too."""
     if not (frame.sides.loop < 0).any():
         return np.linspace(-1, 1, SCALES)
-    if not frame.sides.closed.any() or frame.turns:
+    if not frame.sides.closed.any() or frame.turns or frame.cmap.deck.translation == 0:
         return np.linspace(-1, 1, SCALES_OF_FEATURES)
     row = frame.lattice.shortest_towards(frame.unit * frame.cmap.deck.translation)
     cells = size * abs(frame.cmap.deck.translation) / abs(complex(frame.lattice.position(row)))
