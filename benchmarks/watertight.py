@@ -100,7 +100,7 @@ def rows(kinds: list[Kind], files: list[Path], around: int) -> Iterator[str]:
 class Processor(PlainRunner):
     """Processor seconds per stage."""
 
-    def __call__(self, stage, settings, compute):  # type: ignore[no-untyped-def]
+    def __call__(self, stage, settings, compute, after=None):  # type: ignore[no-untyped-def]
         start = time.process_time()
         result = compute(self.progress)
         self.timings[stage] = time.process_time() - start

@@ -17,12 +17,12 @@ from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap
 from hexwrap_solver.explore import best_boundary_map
 from hexwrap_solver.panels import fit_panels, make_components, measure, quantize, support
 from hexwrap_solver.panels.fit import FitKey
-from hexwrap_solver.panels.quantize import SizeKey
+from hexwrap_solver.panels.quantize import CurveKey, SizeKey, trade_off
 from hexwrap_solver.panels.types import Components, ComponentSettings, Panels, PanelSettings, Quality, Support
 from hexwrap_solver.pattern import lay_pattern
 from hexwrap_solver.pattern.types import Pattern, PatternSettings
 from hexwrap_solver.setting import Setting
-from hexwrap_solver.singularities.outlook import outlook, outlook_note
+from hexwrap_solver.singularities.outlook import ProspectKey, outlook, outlook_note, prospects, worth_a_look
 from hexwrap_solver.singularities.solve import SIZES, closed_map, needs_singularities, seated
 from hexwrap_solver.singularities.types import Choices, SingularitySettings
 from hexwrap_solver.surface.types import Surface
@@ -32,9 +32,12 @@ T = TypeVar("T")
 
 
 class StageRunner(Protocol):
-    """Runs one stage. settings: all that the stage depends on besides the stages before it."""
+    """Runs one stage. settings: all that the stage depends on besides the stages before it. after: of a stage
+    beside the others, on which none depends, the last one that it depends on itself."""
 
-    def __call__(self, stage: str, settings: Any, compute: Callable[[Progress], T]) -> T: ...
+    def __call__(
+        self, stage: str, settings: Any, compute: Callable[[Progress], T], after: str | None = None
+    ) -> T: ...
 
 
 @dataclass
@@ -44,7 +47,9 @@ class PlainRunner:
     progress: Progress = no_progress
     timings: dict[str, float] = field(default_factory=dict)
 
-    def __call__(self, stage: str, settings: Any, compute: Callable[[Progress], T]) -> T:
+    def __call__(
+        self, stage: str, settings: Any, compute: Callable[[Progress], T], after: str | None = None
+    ) -> T:
         start = time.perf_counter()
         result = compute(self.progress)
         self.timings[stage] = time.perf_counter() - start
@@ -114,11 +119,13 @@ def _solve(
     laid = run("pattern", pattern, lambda progress: lay_pattern(cmap, pattern, progress))
     made, wanted = None, None
     if panels is not None:
-        # Two stages, so that a change of the size classes alone reuses the poses and limits.
+        # Three stages, so that a change of the size classes alone reuses the poses and limits.
         fitted = run("fit", FitKey.of(panels), lambda progress: fit_panels(cmap, laid, panels, progress))
-        made = run("panels", SizeKey.of(panels), lambda progress: quantize(fitted, panels))
+        curve = run("trade-off", CurveKey.of(panels), lambda progress: trade_off(fitted, panels))
+        made = run("panels", SizeKey.of(panels), lambda progress: quantize(fitted, panels, curve))
         wanted = panels.components or (ComponentSettings() if settings.support else None)
-    quality = run("quality", None, lambda progress: _measured(cmap, laid, made, panels, choices, progress))
+    quality = run("quality", None, lambda progress: measure(cmap, laid, made, progress))
+    quality = _with_choices(quality, cmap, laid, made, panels, choices, run)
     parts, frame = None, None
     if made is not None and wanted is not None:
         parts = run("components", wanted, lambda progress: make_components(made, wanted))
@@ -137,22 +144,26 @@ def mapped(
     return _map(surface, settings, settings.boundary.adapted(pattern.kind if pattern else None), run)
 
 
-def _measured(
+def _with_choices(
+    quality: Quality,
     cmap: ConformalMap,
     laid: Pattern,
     made: Panels | None,
     settings: PanelSettings | None,
     choices: Choices | None,
-    progress: Progress,
+    run: StageRunner,
 ) -> Quality:
     """With what other numbers of singularities would leave open, and a note where they would bring much."""
-    quality = replace(measure(cmap, laid, made, progress), singularities=choices)
-    if made is None or settings is None or made.mode == "watertight" or not isinstance(settings.sizes, int):
-        return quality
     left = 1 - quality.coverage
+    if made is None or settings is None or made.mode == "watertight" or not isinstance(settings.sizes, int):
+        return replace(quality, singularities=choices)
     if choices is not None:
         return replace(quality, singularities=choices.with_measured(left))
-    choices = outlook(cmap, laid, settings.sizes, left)
+    if not worth_a_look(cmap, laid, settings.sizes, left):
+        return quality
+    key = ProspectKey.of(cmap.surface, laid)
+    found = run("outlook", key, lambda progress: prospects(cmap.surface, key), after="map")
+    choices = outlook(found, cmap.surface, laid, settings.sizes, left)
     if choices is None:
         return quality
     return replace(quality, singularities=choices, notes=(*quality.notes, *outlook_note(laid, choices)))

@@ -167,6 +167,19 @@ def test_memory_counts_what_was_derived_from_a_stage() -> None:
     assert cache.get("surface") is None
 
 
+def test_a_stage_beside_the_others_is_kept_whatever_changes_between() -> None:
+    cache = StageCache(None, 10**8)
+    found = []
+    for around in (10, 11):
+        run = CachingRunner(cache, lambda stage, fraction, what: None)
+        run("map", 1, lambda progress: 1)
+        run("pattern", around, lambda progress: 1)
+        assert run("outlook", None, lambda progress: 7, after="map") == 7
+        run("panels", None, lambda progress: 1)
+        found.append(run.found)
+    assert found[1] == {"map": "memory", "pattern": "computed", "outlook": "memory", "panels": "computed"}
+
+
 def test_progress_never_goes_back() -> None:
     heard: list[float] = []
     run = CachingRunner(StageCache(None, 0), lambda stage, fraction, what: heard.append(fraction))

@@ -41,7 +41,8 @@ def test_hexagons_close_up_and_panels_keep_the_contract():
     assert quality.angle_deviation.max() < 1e-9
     assert quality.overlaps == 0
     assert len(panels.class_length) == 11
-    assert list(runner.timings) == ["surface", "map", "pattern", "fit", "panels", "quality"]
+    stages = ["surface", "map", "pattern", "fit", "trade-off", "panels", "quality", "outlook"]
+    assert list(runner.timings) == stages
 
 
 @pytest.mark.parametrize("kind", list(LATTICES))
@@ -76,9 +77,9 @@ def test_stages_run_with_one_blas_thread_and_leave_the_callers_setting_alone():
     seen = []
 
     class Runner(PlainRunner):
-        def __call__(self, stage, settings, compute):
+        def __call__(self, stage, settings, compute, after=None):
             seen.append(threads())
-            return super().__call__(stage, settings, compute)
+            return super().__call__(stage, settings, compute, after)
 
     with threadpool_limits(2, user_api="blas"):
         before = threads()

@@ -1,6 +1,7 @@
 """Stages that need not be computed twice.
 
-Each stage is known by the SHA-256 of the solver's version, the stage's settings and the stage before it. The
+Each stage is known by the SHA-256 of the solver's version, the stage's settings and the stage before it, so
+that a change asks for the stages after it alone; a stage beside the others names the one that it follows. The
 stages of one worker are kept in its memory, those of all workers of a machine in a folder.
 """
 
@@ -33,8 +34,10 @@ SHARES = {
     "map": 0.35,
     "pattern": 0.1,
     "fit": 0.2,
-    "panels": 0.05,
-    "quality": 0.15,
+    "trade-off": 0.02,
+    "panels": 0.03,
+    "quality": 0.1,
+    "outlook": 0.05,
     "components": 0.02,
     "support": 0.03,
 }
@@ -114,9 +117,12 @@ class CachingRunner:
         self.cache = cache
         self._report = report
         self._key = solver_version()
+        self._keys: dict[str, str] = {}
         self._done = 0.0
 
-    def __call__(self, stage: str, settings: Any, compute: Callable[[Progress], T]) -> T:
+    def __call__(
+        self, stage: str, settings: Any, compute: Callable[[Progress], T], after: str | None = None
+    ) -> T:
         start = time.perf_counter()
         share = SHARES.get(stage, 0.0)
         done = self._done
@@ -125,11 +131,14 @@ class CachingRunner:
             self._report(stage, min(done + share * min(max(fraction, 0.0), 1.0), 1.0), what)
 
         progress(0.0, "")
-        self._key = digest(self._key, stage, settings)
-        hit = self.cache.get(self._key)
+        key = digest(self._key if after is None else self._keys[after], stage, settings)
+        self._keys[stage] = key
+        if after is None:
+            self._key = key
+        hit = self.cache.get(key)
         if hit is None:
             result = compute(progress)
-            self.cache.put(self._key, result)
+            self.cache.put(key, result)
             self.found[stage] = "computed"
         else:
             result, self.found[stage] = hit

@@ -270,12 +270,17 @@ class Unrolled:
 
 @dataclass(frozen=True)
 class Fitted:
-    """z ↦ factor·z + shift carries every motion of the net to a symmetry of the lattice of cell centres ℤ[ζ],
-    ζ = e^{2πi/order}, one cell being 1 wide."""
+    """z ↦ factor·z + shift carries every motion of the chart to a symmetry of the lattice of cell centres
+    ℤ[ζ], ζ = e^{2πi/order}, one cell being 1 wide.
+
+    chart: the net, cut alike, of the surface slightly stretched, where both ends are lattice lines for that;
+    None: it is the map's own net.
+    """
 
     order: int
     factor: complex
     shift: complex
+    chart: Net | None = None
 
 
 @dataclass(frozen=True)

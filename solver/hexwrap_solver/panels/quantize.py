@@ -46,22 +46,45 @@ class SizeKey:
         )
 
 
-def quantize(fitted: FittedPanels, settings: PanelSettings) -> Panels:
-    """Chooses the size classes and makes the polygons.
+@dataclass(frozen=True)
+class CurveKey:
+    """The settings that ``trade_off`` depends on."""
+
+    size_cost: str
+    largest: float | None
+    increment: float
+
+    @classmethod
+    def of(cls, settings: PanelSettings) -> CurveKey:
+        largest = None if settings.edge_range is None else settings.edge_range[1]
+        return cls(settings.size_cost, largest, settings.increment)
+
+
+def trade_off(fitted: FittedPanels, settings: PanelSettings) -> TradeOff | None:
+    """What each number of classes leaves open, for the better of the limits; the regular panels only. None
+    without such.
+
+    Depends on the settings in ``CurveKey`` only. Raises PanelsError as ``quantize`` does.
+    """
+    limits = _limits(fitted, settings)[1]
+    if not len(limits[0]):
+        return None
+    curves = [_curve(fitted, limit, settings) for limit in limits]
+    most = max(len(curve) for curve in curves)
+    filled = np.stack([curve[np.minimum(np.arange(most), len(curve) - 1)] for curve in curves])
+    best = filled[..., 0 if settings.size_cost == "area" else 1].argmin(axis=0)
+    return TradeOff(np.arange(1, most + 1), *filled[best, np.arange(most)].T)
+
+
+def quantize(fitted: FittedPanels, settings: PanelSettings, curve: TradeOff | None = None) -> Panels:
+    """Chooses the size classes and makes the polygons. curve: the ``trade_off``, where it is known.
 
     Depends on the settings in ``SizeKey`` only. Raises PanelsError where the increment is longer than a panel
     may be.
     """
     regular = fitted.regular
-    smallest, largest = settings.edge_range or (0.0, np.inf)
-    choices = [fitted]
-    if fitted.spare_limit is not None and fitted.spare_center is not None:
-        choices.append(replace(fitted, limit=fitted.spare_limit, center=fitted.spare_center))
-    limits = [np.minimum(choice.limit[regular], largest) for choice in choices]
-    usable = [k for k, limit in enumerate(limits) if (floor_to(limit, settings.increment) > 0).all()]
-    if not usable:
-        _require_increment(limits[0], np.flatnonzero(regular), settings.increment)
-    choices, limits = [choices[k] for k in usable], [limits[k] for k in usable]
+    smallest = settings.edge_range[0] if settings.edge_range else 0.0
+    choices, limits = _limits(fitted, settings)
     said: tuple[str, ...] = ()
     if settings.sizes == "fewest":
         length, said = _fewest(choices[0], limits[0], settings)
@@ -96,7 +119,7 @@ def quantize(fitted: FittedPanels, settings: PanelSettings) -> Panels:
         class_length=np.concatenate([class_length, edge_length[alone]]),
         class_count=np.concatenate([class_count, np.ones(len(alone), dtype=np.int64)]).astype(np.int64),
         class_sides=np.concatenate([_true_sides(fitted, member), polygons.lengths[alone]]).astype(np.int64),
-        trade_off=_trade_off(fitted, limits, settings) if len(length) else None,
+        trade_off=curve or trade_off(fitted, settings),
         energy=fitted.energy,
         notes=(
             *fitted.notes,
@@ -108,6 +131,19 @@ def quantize(fitted: FittedPanels, settings: PanelSettings) -> Panels:
         max_gap=settings.max_gap,
         n_special=len(alone),
     )
+
+
+def _limits(fitted: FittedPanels, settings: PanelSettings) -> tuple[list[FittedPanels], list[Floats]]:
+    """The choices of limit and centre that the increment leaves, and (r,) the limits of each."""
+    largest = settings.edge_range[1] if settings.edge_range else np.inf
+    choices = [fitted]
+    if fitted.spare_limit is not None and fitted.spare_center is not None:
+        choices.append(replace(fitted, limit=fitted.spare_limit, center=fitted.spare_center))
+    limits = [np.minimum(choice.limit[fitted.regular], largest) for choice in choices]
+    usable = [k for k, limit in enumerate(limits) if (floor_to(limit, settings.increment) > 0).all()]
+    if not usable:
+        _require_increment(limits[0], np.flatnonzero(fitted.regular), settings.increment)
+    return [choices[k] for k in usable], [limits[k] for k in usable]
 
 
 def _by_kind(fitted: FittedPanels, limit: Floats, choose: Callable[[Floats], Floats]) -> Floats:
@@ -248,15 +284,6 @@ def _polygons(fitted: FittedPanels, length: Floats) -> Ragged:
     points[is_regular] = center[spokes.row] + length[spokes.row, None] * spokes.values
     points[~is_regular] = fitted.shapes.values
     return Ragged(points, offsets)
-
-
-def _trade_off(fitted: FittedPanels, limits: list[Floats], settings: PanelSettings) -> TradeOff:
-    """What each number of classes leaves open, for the better of the limits; the regular panels only."""
-    curves = [_curve(fitted, limit, settings) for limit in limits]
-    most = max(len(curve) for curve in curves)
-    filled = np.stack([curve[np.minimum(np.arange(most), len(curve) - 1)] for curve in curves])
-    best = filled[..., 0 if settings.size_cost == "area" else 1].argmin(axis=0)
-    return TradeOff(np.arange(1, most + 1), *filled[best, np.arange(most)].T)
 
 
 def _curve(fitted: FittedPanels, allowed: Floats, settings: PanelSettings) -> Floats:

@@ -225,11 +225,13 @@ def _rim(surface: Surface, loop: Ints) -> Ints:
 
 @dataclass(frozen=True)
 class Closed:
-    """seen: the map. factor, shift: z ↦ factor · z + shift carries its layout to the lattice whose
-    translations are ℤ[ζ]. motion: (e, 2) translation of each leaf's motion there. moves: (s,) cells;
+    """seen: the chart on which the lattice lies. factor, shift: z ↦ factor · z + shift carries it to the
+    lattice whose translations are ℤ[ζ]. unstretched: the map, whose faces the chart has; the same but for
+    the stretch. motion: (e, 2) translation of each leaf's motion there. moves: (s,) cells;
     dipole: the largest amplitude; stretch: ε. residual: cells."""
 
     seen: Seen
+    unstretched: Seen
     factor: complex
     shift: complex
     motion: Ints
@@ -457,5 +459,8 @@ class Closing:
         w = s + 2 * len(chart.waves)
         dipole = float(np.hypot(x[s:w:2], x[s + 1 : w : 2]).max(initial=0.0)) * DIPOLE
         stretch = STRETCH * float(x[-1]) if chart.slope is not None else 0.0
+        unstretched = chart.at(np.append(x[:-1], 0.0)) if stretch else seen
         moves = np.hypot(x[0:s:2], x[1:s:2])
-        return Closed(seen, factor, -factor * seen.center, motion, moves, dipole, stretch, residual, steps)
+        return Closed(
+            seen, unstretched, factor, -factor * seen.center, motion, moves, dipole, stretch, residual, steps
+        )

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
+import numpy as np
+
+from hexwrap_solver.arrays import Floats
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.pattern.lattice import LATTICES
-from hexwrap_solver.pattern.types import Pattern
+from hexwrap_solver.pattern.types import Kind, Pattern
 from hexwrap_solver.singularities.linear import linear_model, vertex_areas
 from hexwrap_solver.singularities.place import number_of
-from hexwrap_solver.singularities.search import Search, curve
+from hexwrap_solver.singularities.search import Search, ranked
 from hexwrap_solver.singularities.sizes import uncovered
 from hexwrap_solver.singularities.solve import told
-from hexwrap_solver.singularities.types import Choices, End, Rules
+from hexwrap_solver.singularities.types import Choices, End, Proposal, Rules
+from hexwrap_solver.surface.types import Surface
 
 #: A coarse look: so many patches and singularities; larger meshes are not looked at.
 PATCHES, MOST, LARGEST = 200, 4, 30_000
@@ -20,36 +24,78 @@ PATCHES, MOST, LARGEST = 200, 4, 30_000
 SAVED, SHARE = 0.01, 0.3
 
 
-def outlook(cmap: ConformalMap, laid: Pattern, sizes: int, left: float) -> Choices | None:
-    """What numbers of singularities would leave open, by a coarse linear model, the ends being free; the
-    first is none, which leaves ``left``. None where all of them together cannot save much."""
-    surface = cmap.surface
+@dataclass(frozen=True)
+class Prospects:
+    """Singularities that a map could have, the best of each number from none upwards, the ends being free.
+
+    proposals: their ``uncovered`` is with a length for each cell, per width of a cell, which it grows with.
+    u: (c, p) scale factors of the patches then. weight: (p,) share of the area of each.
+    """
+
+    proposals: tuple[Proposal, ...]
+    u: Floats
+    weight: Floats
+
+
+@dataclass(frozen=True)
+class ProspectKey:
+    """What ``prospects`` depends on beside the map. kind: of the pattern. doublings: log₂ of the number of
+    cells: how far singularities stand apart is counted in cells, and to the nearest power of two is enough
+    for a coarse look. So it stays the same where the cells change a little."""
+
+    kind: Kind
+    doublings: int
+
+    @classmethod
+    def of(cls, surface: Surface, laid: Pattern) -> ProspectKey:
+        return cls(laid.kind, round(float(np.log2(surface.areas.sum() / _width(laid) ** 2))))
+
+
+def worth_a_look(cmap: ConformalMap, laid: Pattern, sizes: int, left: float) -> bool:
+    """Whether singularities can be looked at, and all of them together could save much. left: share of the
+    area that panels leave open now."""
+    surface, lattice = cmap.surface, LATTICES[laid.kind]
     if (
-        LATTICES[laid.kind].fold < LATTICES[laid.kind].order
+        lattice.fold < lattice.order
         or len(cmap.cones)
         or not 1 <= len(surface.loops) <= 2
         or len(surface.vertices) > LARGEST
     ):
-        return None
+        return False
     weight = vertex_areas(surface)
-    now = uncovered(cmap.log_scale, weight / weight.sum(), sizes)
-    if now < max(SAVED, SHARE * left):  # no singularities can save more than the sizes cost
-        return None
-    lattice = LATTICES[laid.kind]
-    width = laid.edge_length * abs(complex(lattice.position(lattice.basis[0]))) / lattice.edge
+    # no singularities can save more than the sizes cost
+    return uncovered(cmap.log_scale, weight / weight.sum(), sizes) >= max(SAVED, SHARE * left)
+
+
+def prospects(surface: Surface, key: ProspectKey) -> Prospects:
+    """By a coarse linear model. None are found where no place is allowed."""
     free: End = "free"
     ends = (free,) * len(surface.loops)
-    rules = Rules(lattice.quantum, width, sizes, ends, most=MOST)
+    cell = float(np.sqrt(surface.areas.sum() / 2.0**key.doublings))
+    rules = Rules(LATTICES[key.kind].quantum, cell, None, ends, most=MOST)
     model = linear_model(surface, rules, patches=PATCHES, steps=False)
     if not len(model.seat):
+        return Prospects((), np.zeros((0, len(model.weight))), model.weight)
+    search = Search(model, rules)
+    best = [states[0] for states in ranked(search, starts=0, refine=False) if states]
+    proposals = [search.proposal(state) for state in best]
+    return Prospects(
+        tuple(replace(one, uncovered=one.uncovered / cell) for one in proposals),
+        np.array([search.scale(state) for state in best]),
+        model.weight,
+    )
+
+
+def outlook(found: Prospects, surface: Surface, laid: Pattern, sizes: int, left: float) -> Choices | None:
+    """What numbers of singularities would leave open with so many sizes; the first is none, which leaves
+    ``left``. None where there is no choice."""
+    if len(found.proposals) < 2 or found.proposals[0].count:
         return None
-    proposals = curve(Search(model, rules), starts=0, refine=False)
-    if len(proposals) < 2 or proposals[0].count:
-        return None
-    found = Choices.of(proposals, 0, sizes, surface.vertices)
-    then = found.uncovered.copy()
+    choices = Choices.of(found.proposals, 0, sizes, surface.vertices)
+    then = choices.uncovered * _width(laid)
+    then += [uncovered(u, found.weight, sizes) for u in found.u]
     then[0] = left  # measured, and with the ends as they are now
-    return replace(found, uncovered=then, coarse=True)
+    return replace(choices, uncovered=then, coarse=True)
 
 
 def outlook_note(laid: Pattern, found: Choices) -> tuple[str, ...]:
@@ -62,3 +108,9 @@ def outlook_note(laid: Pattern, found: Choices) -> tuple[str, ...]:
         f"{told(laid.kind, found.index[best]).capitalize()} would leave about {then:.1%} uncovered instead "
         f"of {left:.1%}, the ends being free: ask for singularities auto with boundary.mode isometric.",
     )
+
+
+def _width(laid: Pattern) -> float:
+    """Of a cell, in units of the model."""
+    lattice = LATTICES[laid.kind]
+    return laid.edge_length * abs(complex(lattice.position(lattice.basis[0]))) / lattice.edge

@@ -6,6 +6,7 @@ of the loops, so that every move of one of them is judged for all seats at once.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -377,12 +378,30 @@ def curve(
     search: Search, starts: int = STARTS, refine: bool = True, patience: int | None = None
 ) -> list[Proposal]:
     """The best there is with 0, 1, 2, … singularities, as far as the rules allow and numbers are possible.
-    starts: random ones for each number. refine: for the uncovered area, beyond the variance. patience:
-    numbers beyond the best at which it ends; None: only at ``rules.most``."""
+    starts, refine: see ``ranked``. patience: numbers beyond the best at which it ends; None: only at
+    ``rules.most``."""
+    found: dict[int, Proposal] = {}
+    for states in ranked(search, starts, refine):
+        for state in states:
+            count = search.count_of(state)  # with symmetry a seat may be several singularities
+            if count not in found or search.model.orbits is not None:
+                one = search.proposal(state)
+                if count <= search.rules.most and (
+                    count not in found or one.uncovered < found[count].uncovered
+                ):
+                    found[count] = one
+        least = min(found.values(), key=lambda one: one.uncovered, default=None)
+        if patience is not None and least is not None and max(found) >= least.count + patience:
+            break
+    return [found[number] for number in sorted(found)]
+
+
+def ranked(search: Search, starts: int = STARTS, refine: bool = True) -> Iterator[list[State]]:
+    """For 0, 1, 2, … seats taken the best states, the best first. starts: random ones for each number.
+    refine: for the uncovered area, beyond the variance; without, they do not depend on the sizes."""
     rng = np.random.default_rng(17)
     kinds = [k for size in range(1, search.rules.largest + 1) for k in (-size, size)]
     beam = [search.settled(State((), (), (0,) * max(len(search.model.free) - 1, 0)))]
-    found: dict[int, Proposal] = {}
     for number in range(search.rules.most + 1):
         if number:
             added = [
@@ -396,20 +415,9 @@ def curve(
             whole = sorted(
                 (search.refined(state) for _, state in whole), key=lambda one: (one[0], one[1].seat)
             )
-        for _, state in whole:
-            count = search.count_of(state)  # with symmetry a seat may be several singularities
-            if count not in found or search.model.orbits is not None:
-                one = search.proposal(state)
-                if count <= search.rules.most and (
-                    count not in found or one.uncovered < found[count].uncovered
-                ):
-                    found[count] = one
-        least = min(found.values(), key=lambda one: one.uncovered, default=None)
-        if patience is not None and least is not None and max(found) >= least.count + patience:
-            break
+        yield [state for _, state in whole]
         grouped = {state for _, state in beam[:BEAM]} | {state for _, state in whole[:1]}
         beam = [(search.value(state), state) for state in sorted(grouped, key=lambda state: state.seat)]
-    return [found[number] for number in sorted(found)]
 
 
 def _additions(

@@ -363,7 +363,7 @@ def _nearest_inside(surface: Surface, places: Floats) -> Ints:
 
 
 def _as_map(frame: Frame, chart: Chart, found: Closed, placing: Placing, before: Surface) -> ConformalMap:
-    seen, quantum = found.seen, frame.lattice.quantum
+    seen, quantum = found.unstretched, frame.lattice.quantum
     surface = seen.surface
     sums = chart.energy.angle_sums(seen.metric)
     curvature = np.concatenate(
@@ -372,7 +372,12 @@ def _as_map(frame: Frame, chart: Chart, found: Closed, placing: Placing, before:
     layout = lay_out(surface, seen.lengths, seen.metric, curvature * quantum, chart.cones)
     net = layout.domain
     assert isinstance(net, Net)
-    here, there = found.factor * seen.place[:, 0] + found.shift, net.corners[0]
+    stretched, closing_error = None, layout.closing_error
+    if found.stretch:
+        other = lay_out(surface, found.seen.lengths, found.seen.metric, curvature * quantum, chart.cones)
+        assert isinstance(other.domain, Net)
+        stretched, closing_error = other.domain, max(closing_error, other.closing_error)
+    here, there = found.factor * found.seen.place[:, 0] + found.shift, (stretched or net).corners[0]
     factor = complex((here[1] - here[0]) / (there[1] - there[0]))
     wanted = before.vertices[_ordered(placing.proposal)[0]]
     moved = np.linalg.norm(surface.vertices[chart.cones] - wanted, axis=1)
@@ -384,9 +389,9 @@ def _as_map(frame: Frame, chart: Chart, found: Closed, placing: Placing, before:
         iterations=found.steps,
         residual=seen.residual,
         inserted=0,
-        closing_error=layout.closing_error,
+        closing_error=closing_error,
         cones=Cones(chart.cones, chart.index, quantum, moved),
-        fitted=Fitted(frame.lattice.order, factor, complex(here[0] - factor * there[0])),
+        fitted=Fitted(frame.lattice.order, factor, complex(here[0] - factor * there[0]), stretched),
         notes=tuple(_notes(frame, found, placing)),
     )
 

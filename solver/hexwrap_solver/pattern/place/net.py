@@ -6,6 +6,8 @@ equations tie the motions together: around a vertex inside, their product is the
 singularity of index k it is the rotation by −k quanta about its place, which must be a centre of that
 symmetry. What rounding leaves over is made up for by the least deformation (``deform``), which is told as
 distortion; nothing is left over where the singularities were moved beforehand until all motions are exact.
+Where a uniform stretch was needed for that, the lattice lies on the chart of the stretched surface, whose
+faces are the domain's, and the stretch is the distortion.
 
 Loops that are polygons of quantized corners, as the frames of doors and windows, or closed straight lines,
 may be asked to lie on lattice lines (``polygons``). The place of the lattice is chosen so that they are near
@@ -99,7 +101,8 @@ def _placed(
     cmap: ConformalMap, lattice: Lattice, settings: PatternSettings, alignment: Alignment | None
 ) -> Placement:
     net, faces = cmap.net, cmap.surface.faces
-    motions = _motions(cmap, lattice)
+    fitted = _on_fitted(cmap, lattice)
+    motions = _motions(cmap, lattice, net)
     angle = edge_angle(lattice, settings)
     scale = lattice.edge / wanted_edge(cmap, lattice, settings, angle)
     along = boundary_direction(cmap, lattice, anchor_vertex(cmap))
@@ -114,7 +117,11 @@ def _placed(
         place = factor * (own - own[anchor_vertex(cmap)]) + phase
         return _placement(cmap, lattice, settings, rows, place, factor, angle, 0.0)
     tried, system = [], None
-    for misfit, A, B, rows in _choices(cmap, lattice, settings, motions, factor, phase, alignment):
+    if fitted is None:
+        choices = _choices(cmap, lattice, settings, motions, factor, phase, alignment)
+    else:
+        net, choices = fitted[0], [fitted[1]]
+    for misfit, A, B, rows in choices:
         glued_rows, corner = around_vertices(lattice, net, cmap.surface.twin, rows, faces)
         place = A * net.corners.ravel()[corner] + B
         glued = Glued(lattice, glued_rows)
@@ -130,7 +137,7 @@ def _placed(
         else:
             pinned = normal.any(axis=1)
             place[pinned] = depth[pinned, 0] + 1j * depth[pinned, 1]
-            distortion = 0.0
+            distortion = 0.0 if net is cmap.net else distortion_of(cmap, glued, place)
         tried.append((distortion, glued, rows, place, A))
         if distortion < FINE:
             break
@@ -182,8 +189,23 @@ def _phase(lattice: Lattice, settings: PatternSettings, angle: float) -> complex
     return lattice.without_translations(complex(width * settings.phase[0], lattice.edge * settings.phase[1]))
 
 
-def _motions(cmap: ConformalMap, lattice: Lattice) -> Motions:
-    net, faces, twin = cmap.net, cmap.surface.faces, cmap.surface.twin
+def _on_fitted(
+    cmap: ConformalMap, lattice: Lattice
+) -> tuple[Net, tuple[float, complex, complex, Ints]] | None:
+    """The chart for which singularities were moved, and (0, A, B, rows) of the lattice there; None where they
+    were not, or for another lattice."""
+    fitted = cmap.fitted
+    if fitted is None or fitted.order != lattice.order:
+        return None
+    net = cmap.net if fitted.chart is None else fitted.chart
+    e1 = complex(lattice.position(lattice.basis[0]))
+    A, B = e1 * fitted.factor, e1 * fitted.shift + complex(lattice.position(np.array(lattice.centre)))
+    rows, misfit = _rounded(lattice, _motions(cmap, lattice, net), np.array([A]), np.array([B]))
+    return (net, (0.0, A, B, rows[0])) if misfit[0] < NEARLY else None
+
+
+def _motions(cmap: ConformalMap, lattice: Lattice, net: Net) -> Motions:
+    faces, twin = cmap.surface.faces, cmap.surface.twin
     steps, own = net.angle / lattice.step_angle, lattice.order // lattice.fold
     used = np.unique(net.crossing)
     off = abs(steps - own * np.rint(steps / own)) * lattice.step_angle
@@ -233,16 +255,6 @@ def _choices(
     alignment: Alignment | None,
 ) -> list[tuple[float, complex, complex, Ints]]:
     """(misfit, A, B, rows) of the places of the lattice that fit best, the best first."""
-    fitted = cmap.fitted
-    if fitted is not None and fitted.order == lattice.order:
-        e1 = complex(lattice.position(lattice.basis[0]))
-        A, B = (
-            np.array([e1 * fitted.factor]),
-            np.array([e1 * fitted.shift + lattice.position(np.array(lattice.centre))]),
-        )
-        rows, misfit = _rounded(lattice, motions, A, B)
-        if misfit[0] < NEARLY:
-            return [(0.0, complex(A[0]), complex(B[0]), rows[0])]
     free = not len(cmap.surface.loops)
     size = np.linspace(-1, 1, SCALES)
     turn = lattice.quantum * np.arange(DIRECTIONS) / DIRECTIONS if free else np.zeros(1)
