@@ -197,5 +197,5 @@ def _map(
         lambda progress: closed_map(surface, seats.frame, seats.placing, boundary, progress),
     )
     placing = seats.placing
-    taken = placing.chosen if len(cmap.cones) else 0
+    taken = next(i for i, one in enumerate(placing.proposals) if one.count == len(cmap.cones))
     return cmap, Choices.of(placing.proposals, taken, classes or SIZES, surface.vertices)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 from dataclasses import replace
 
@@ -35,7 +36,7 @@ from hexwrap_solver.pattern.place.choose import Placing
 from hexwrap_solver.pattern.place.placement import Placement, anchor_vertex, edge_angle
 from hexwrap_solver.pattern.place.rotation import with_rotation
 from hexwrap_solver.pattern.place.sense import check_edge, too_many
-from hexwrap_solver.pattern.place.size import ASKED, fitting_number
+from hexwrap_solver.pattern.place.size import ASKED, fitting_number, mean_stretch, wanted_edge
 from hexwrap_solver.pattern.trim.arrangement import Points
 from hexwrap_solver.pattern.trim.boundary import Boundary, boundary_of
 from hexwrap_solver.pattern.trim.enclosed import around_enclosed, met_by_pattern
@@ -48,6 +49,9 @@ from hexwrap_solver.surface.projection import project, start_parameters
 
 #: Relative error of an edge length asked for that calls for a second attempt.
 CLOSE = 0.005
+
+#: Parts of the default edge length that are tried where cells of it do not close up.
+FINER = (2, 4, 8)
 
 #: Above so many cells, where the map is STEEP, it is the map that does not suit, not the size of the cells.
 MANY = 1e12
@@ -68,7 +72,8 @@ def lay_pattern(cmap: ConformalMap, settings: PatternSettings, progress: Progres
     lattice = LATTICES[settings.kind]
     settings, notes = with_rotation(cmap, lattice, settings)
     placing = Placing.of(cmap, lattice, settings)
-    pattern = _lay(cmap, placing, settings, progress)
+    pattern, finer = _laid(cmap, placing, settings, progress)
+    notes += finer
     if settings.around is not None and pattern.around != settings.around and cmap.fitted is None:
         why = "the nearest that closes up"
         if any(feature.straight for feature in pattern.features):
@@ -87,6 +92,33 @@ def lay_pattern(cmap: ConformalMap, settings: PatternSettings, progress: Progres
                 "had with around."
             )
     return replace(pattern, notes=(*notes, *pattern.notes))
+
+
+class _CoarseError(PatternError):
+    """The cells are too large to close up."""
+
+
+def _laid(
+    cmap: ConformalMap, placing: Placing, settings: PatternSettings, progress: Progress
+) -> tuple[Pattern, list[str]]:
+    """In cells small enough to close up, where no size is asked for; and a note if the default is not."""
+    try:
+        return _lay(cmap, placing, settings, progress), []
+    except _CoarseError:
+        if settings.around is not None or settings.edge_length is not None or cmap.fitted is not None:
+            raise
+        lattice = LATTICES[settings.kind]
+        edge = wanted_edge(cmap, lattice, settings, edge_angle(lattice, settings)) * mean_stretch(cmap)
+        for part in FINER:
+            with contextlib.suppress(_CoarseError):
+                pattern = _lay(cmap, placing, replace(settings, edge_length=edge / part), progress)
+                break
+        else:
+            raise
+    return pattern, [
+        f"Cells of the default size, {edge:.3g} long edges, do not close up around the narrowest place: "
+        f"these are {pattern.edge_length:.3g} long."
+    ]
 
 
 def _lay(cmap: ConformalMap, placing: Placing, settings: PatternSettings, progress: Progress) -> Pattern:
@@ -344,9 +376,9 @@ def mean_edge(vertices: Floats, faces: Ragged) -> float:
     return float(length @ area / area.sum())
 
 
-def _too_coarse(cmap: ConformalMap, settings: PatternSettings, placement: Placement) -> PatternError:
+def _too_coarse(cmap: ConformalMap, settings: PatternSettings, placement: Placement) -> _CoarseError:
     if cmap.kind == "net":
-        return PatternError(
+        return _CoarseError(
             f"No cell of this size fits on the surface: its longest loop would take {placement.around} of "
             "them. Ask for more cells around, or a shorter edge."
         )
@@ -354,7 +386,7 @@ def _too_coarse(cmap: ConformalMap, settings: PatternSettings, placement: Placem
     if settings.around not in (None, around):
         only = f" (only multiples of {step} close up at this rotation)" if step > 1 else ""
         asked = f", the nearest to the {settings.around} asked for{only}"
-    return PatternError(
+    return _CoarseError(
         f"With {around} cell{'s' if around > 1 else ''} around{asked}, the cells do not close up to a ring "
         "around the surface, since they are too large for its narrowest place: ask for more cells around, or "
         f"a shorter edge{_that_fits(cmap, settings, placement)}."

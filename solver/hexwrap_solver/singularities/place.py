@@ -33,12 +33,14 @@ REACHES, SPACING, ROUNDS = (1.5, 0.8, 0.4), 0.4, 20
 class Placing:
     """proposals: the best with each number of singularities that is possible, ascending. chosen: index of
     the one to take. symmetry: of the surface, which they keep to; empty where that is not asked for.
-    may_be_none: where they cannot be closed, a map without any will do."""
+    others: those that will do where it cannot be closed, best first. may_be_none: a map without any will
+    do then."""
 
     proposals: tuple[Proposal, ...]
     chosen: int
     symmetry: str = ""
     may_be_none: bool = False
+    others: tuple[int, ...] = ()
 
     @property
     def proposal(self) -> Proposal:
@@ -64,7 +66,12 @@ def place(
     chosen = _choice(proposals, count)
     if proposals[chosen].count and not rules.symmetric:
         proposals[chosen] = _polished(known, proposals[chosen])
-    return Placing(tuple(proposals), chosen, symmetry)
+    others = [
+        i
+        for i in np.argsort([one.uncovered for one in proposals], kind="stable")
+        if i != chosen and proposals[i].count > 0 and (count == "auto" or proposals[i].count <= count)
+    ]
+    return Placing(tuple(proposals), chosen, symmetry, others=tuple(int(i) for i in others))
 
 
 def _curve(known: Responses, patience: int | None, group: Group | None = None) -> list[Proposal]:

@@ -42,6 +42,9 @@ FREE, ASKED = 0.05, 0.015
 #: Where the least moves that close are longer than this, in cells, singularities are seated anew, so many
 #: times.
 FAR, AGAIN = 0.6, 2
+#: Where those chosen do not close, so many other numbers of singularities are tried, and then cells smaller
+#: by these factors.
+OTHERS, FINER = 1, (1, 2)
 #: Creases whose surroundings are more than this part of the surface are no lines to keep away from.
 FACETED = 0.5
 #: Sums of listed angles this near to a multiple of the quantum are one, radians.
@@ -54,7 +57,7 @@ class Frame:
 
     width: of a cell, which is that of the surface as of the domain. line: for straight loops that are to be
     lattice lines; aligned: which ones. turn: (n,) and slope: (m, 3) of two straight ends, see
-    ``linear.Model`` and ``close.Chart``.
+    ``linear.Model`` and ``close.Chart``. sized: a size of the cells was asked for.
     """
 
     lattice: Lattice
@@ -64,6 +67,7 @@ class Frame:
     aligned: tuple[bool, ...]
     turn: Floats | None
     free_scale: float
+    sized: bool
 
 
 def needs_singularities(surface: Surface, boundary: BoundaryCondition) -> bool:
@@ -122,7 +126,8 @@ def frame_of(
         turn = tube.uv.real / tube.circumference
     free_scale = ASKED if pattern.edge_length is not None else FREE
     line = _line(lattice, angle, pattern.boundary) if any(aligned) else None
-    return Frame(lattice, rules, width, line, aligned, turn, free_scale)
+    sized = pattern.edge_length is not None or pattern.around is not None
+    return Frame(lattice, rules, width, line, aligned, turn, free_scale, sized)
 
 
 def _check_kind(lattice: Lattice, settings: SingularitySettings) -> None:
@@ -256,14 +261,47 @@ def closed_map(
     if not proposal.count:
         return conformal_map(surface, boundary, progress)
     try:
-        chart, found = _closed(surface, frame, proposal, progress)
+        return _first_that_closes(surface, frame, placing, progress)
     except ConvergenceError as error:
         if not placing.may_be_none or placing.proposals[0].count:
             raise
         plain = conformal_map(surface, boundary, progress)
         note = f"{told(frame.lattice.kind, proposal.index).capitalize()} would pay, but are left out: "
         return replace(plain, notes=(*plain.notes, note + error.detail))
-    return _as_map(frame, chart, found, placing, surface)
+
+
+def _first_that_closes(surface: Surface, frame: Frame, placing: Placing, progress: Progress) -> ConformalMap:
+    """With other singularities, and smaller cells where no size is asked for, if those chosen do not close:
+    the smaller the cells, the less they have to move. Raises ConvergenceError, that of the first."""
+    failed: ConvergenceError | None = None
+    for part in FINER[:1] if frame.sized or not placing.proposals[0].count else FINER:
+        smaller = replace(frame, width=frame.width / part)
+        for chosen in (placing.chosen, *placing.others[:OTHERS]):
+            taken = replace(placing, chosen=chosen)
+            try:
+                chart, found = _closed(surface, smaller, taken.proposal, progress)
+            except ConvergenceError as error:
+                failed = failed or error
+                continue
+            cmap = _as_map(smaller, chart, found, taken, surface)
+            changes = [*_changes(frame, placing, chosen, part)]
+            return replace(cmap, notes=(*cmap.notes, *changes))
+    assert failed is not None
+    raise failed
+
+
+def _changes(frame: Frame, placing: Placing, chosen: int, part: int) -> Iterator[str]:
+    best, kind = placing.proposal, frame.lattice.kind
+    if chosen != placing.chosen:
+        yield (
+            f"{told(kind, best.index).capitalize()}, which would leave about {best.uncovered:.1%} uncovered "
+            f"instead of {placing.proposals[chosen].uncovered:.1%}, cannot be moved so that it closes."
+        )
+    if part > 1:
+        yield (
+            f"The cells are 1/{part} of the default size, since the singularities of larger ones would have "
+            "to move too far for the pattern to close."
+        )
 
 
 def _closed(surface: Surface, frame: Frame, proposal: Proposal, progress: Progress) -> tuple[Chart, Closed]:

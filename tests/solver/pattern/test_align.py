@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +13,7 @@ from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.errors import PatternError
 from hexwrap_solver.pattern import lay_pattern
 from hexwrap_solver.pattern.lattice import LATTICES
-from hexwrap_solver.pattern.place import choose
+from hexwrap_solver.pattern.place import choose, size
 from hexwrap_solver.pattern.place.align import Straightening
 from hexwrap_solver.pattern.place.choose import Placing, loops_to_align, place_lattice
 from hexwrap_solver.pattern.place.deform import distortion_of
@@ -24,6 +25,8 @@ from tests.solver.conformal.annuli import corners_at
 from tests.solver.pattern import annuli
 from tests.solver.pattern.test_lay import check_closed
 from tests.solver.pattern.test_trim import cell_areas, domain_area, euler
+
+lay_module = importlib.import_module("hexwrap_solver.pattern.lay_pattern")
 
 #: Boundary vertices of a grid with 48 columns and 16 rows, and their angles in units of π.
 CASES = {
@@ -143,6 +146,18 @@ def test_loops_turned_against_each_other_are_not_both_aligned():
 def test_cells_larger_than_the_narrowest_place_are_refused():
     with pytest.raises(PatternError, match="close up"):
         lay_pattern(MAPS["cone"], PatternSettings(around=3))
+
+
+def test_a_default_size_that_does_not_close_up_is_made_smaller(monkeypatch):
+    """Nobody asked for it; sizes that are asked for are refused as before."""
+    monkeypatch.setattr(size, "default_edge", lambda cmap, *_: cmap.circumference / 3)
+    with monkeypatch.context() as only_that:
+        only_that.setattr(lay_module, "FINER", ())
+        with pytest.raises(PatternError, match="close up"):
+            lay_pattern(MAPS["cone"], PatternSettings(align="none"))
+    pattern = lay_pattern(MAPS["cone"], PatternSettings(align="none"))
+    check_closed(pattern)
+    assert any(f"these are {pattern.edge_length:.3g} long" in note for note in pattern.notes)
 
 
 def test_another_number_around_than_asked_for_is_told() -> None:

@@ -1,15 +1,20 @@
 """The whole way with singularities: cells close around them, panels are regular, nothing overlaps."""
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 
+from hexwrap_solver.arrays import no_progress
 from hexwrap_solver.conformal.types import BoundaryCondition
 from hexwrap_solver.errors import ConvergenceError, SingularitiesError
 from hexwrap_solver.panels.types import PanelSettings
+from hexwrap_solver.pattern.lattice import LATTICES
 from hexwrap_solver.pattern.types import PatternSettings
 from hexwrap_solver.pipeline import SolveSettings, solve
 from hexwrap_solver.singularities import solve as module
-from hexwrap_solver.singularities.types import SingularityAt, SingularitySettings
+from hexwrap_solver.singularities.place import Placing
+from hexwrap_solver.singularities.types import Proposal, SingularityAt, SingularitySettings
 from tests.solver.singularities import shapes
 
 SIDES = {"hex": 6, "quad": 4, "triangle": 3}
@@ -253,3 +258,54 @@ def test_where_they_cannot_be_closed_there_are_none(monkeypatch):
     assert found.quality.singularities.number[found.quality.singularities.taken] == 0
     with pytest.raises(ConvergenceError):
         solved(shapes.waist(), count=4, around=16)
+
+
+@dataclass(frozen=True)
+class Made:
+    """Stands for a map."""
+
+    width: float
+    count: int
+    notes: tuple[str, ...] = ()
+
+
+def first_that_closes(monkeypatch, sized, fewest, failing):
+    """The map that is made where so many attempts fail, and those attempts: width and number."""
+    asked = []
+
+    def close(surface, frame, proposal, progress):
+        asked.append((frame.width, proposal.count))
+        if len(asked) <= failing:
+            raise ConvergenceError(f"Reason {len(asked)}.")
+        return None, None
+
+    monkeypatch.setattr(module, "_closed", close)
+    monkeypatch.setattr(
+        module, "_as_map", lambda frame, chart, found, placing, _: Made(frame.width, placing.proposal.count)
+    )
+    proposals = tuple(
+        Proposal(np.arange(n), np.ones(n, dtype=np.int64), (), 0.1, 0.1, 1.0) for n in (fewest, 12, 14)
+    )
+    frame = module.Frame(LATTICES["hex"], None, 1.0, None, (), None, 0.05, sized)
+    placing = Placing(proposals, 1, others=(2, 0))
+    return module._first_that_closes(None, frame, placing, no_progress), asked
+
+
+def test_where_those_chosen_do_not_close_others_do(monkeypatch):
+    """A size that nobody asked for must not be what a closed surface fails for."""
+    made, asked = first_that_closes(monkeypatch, False, 10, 0)
+    assert asked == [(1.0, 12)]
+    assert not made.notes
+    made, _ = first_that_closes(monkeypatch, False, 10, 1)
+    assert (made.width, made.count) == (1.0, 14)
+    assert any("12 pentagons" in note and "cannot be moved" in note for note in made.notes)
+    made, _ = first_that_closes(monkeypatch, False, 10, 2)
+    assert (made.width, made.count) == (0.5, 12)
+    assert any("1/2 of the default size" in note for note in made.notes)
+
+
+@pytest.mark.parametrize(("sized", "fewest"), [(True, 10), (False, 0)])
+def test_cells_do_not_shrink_that_need_not(monkeypatch, sized, fewest):
+    """Where a size is asked for, or a map without any singularities will do; the first reason is given."""
+    with pytest.raises(ConvergenceError, match=r"^Reason 1\.$"):
+        first_that_closes(monkeypatch, sized, fewest, 2)
