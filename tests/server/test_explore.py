@@ -11,7 +11,13 @@ from typing import Any
 
 import pytest
 
+from hexwrap_server.input.requests import Exploration, Order
 from hexwrap_server.jobs.engine import ProcessEngine
+from hexwrap_server.jobs.explore import begin
+from hexwrap_solver.explore.foresee import Candidate
+from hexwrap_solver.explore.types import Figures
+from hexwrap_solver.panels.types import PanelSettings
+from hexwrap_solver.pipeline import SolveSettings
 from tests.server.bodies import tube
 from tests.server.live import Live, finished, running
 from tests.server.patience import until
@@ -75,7 +81,7 @@ def test_every_request_gives_what_is_said_to_be_measured(live: Live, result: dic
 
 def test_front_is_what_no_other_beats(result: dict[str, Any]) -> None:
     variants = result["variants"]
-    assert 2 <= len(variants) <= BODY["variants"]
+    assert len(variants) == BODY["variants"]
     assert result["front"] == [i for i, one in enumerate(variants) if one["front"]]
     assert result["best"] in result["front"]
     measured = [variants[i]["measured"] for i in result["front"]]
@@ -83,6 +89,25 @@ def test_front_is_what_no_other_beats(result: dict[str, Any]) -> None:
         for b in measured:
             names = ("uncovered", "types", "cost")
             assert a is b or not all(b[name] < a[name] for name in names)
+
+
+def test_as_many_variants_as_asked_for_though_some_are_alike_and_some_cannot_be_made() -> None:
+    def candidate(sizes: int, place: int, problem: str = "") -> Candidate:
+        settings = SolveSettings(panels=PanelSettings(sizes=sizes))
+        return Candidate(settings, None if problem else Figures(0.1, 10, sizes, 1.0), problem, place)
+
+    order = Order("id", b"", Exploration(variants=2), None)
+    drawn = [
+        candidate(1, 3),
+        candidate(5, 0, "there is none"),
+        candidate(2, 4),
+        candidate(1, 1),
+        candidate(3, 2),
+        candidate(5, 5, "not even looked at"),
+    ]
+    documents, _, refused = begin(lambda stage, fraction, what: None, order, "", drawn)
+    assert [one["request"]["panels"]["sizes"] for one in documents] == [1, 3]
+    assert refused == ["there is none"]
 
 
 def test_what_is_foreseen_is_near_what_is_measured(result: dict[str, Any]) -> None:

@@ -60,18 +60,24 @@ def look(
 
 def begin(
     report: Report, order: Order, name: str, candidates: list[Candidate]
-) -> tuple[list[Json], list[tuple[int, Wanted]]]:
-    """The variants as the wire says them, and which are worth solving: index and what is wanted.
+) -> tuple[list[Json], list[tuple[int, Wanted]], list[str]]:
+    """The variants as the wire says them, which are worth solving (index and what is wanted), and why others
+    cannot be made.
 
-    Those that cannot be made are left out, and of those that come to the same request, all but one. Raises
-    RequestError where nothing is left.
+    Those that cannot be made are left out, and of those that come to the same request, all but one; of the
+    others as many are taken as were asked for. Raises RequestError where nothing is left.
     """
     asked = _asked(order)
     listed: dict[str, tuple[Json, Candidate]] = {}
-    for one in candidates:
-        if one.foreseen is not None:
-            request = _request(one.settings, name, order.surface_id, asked)
-            listed.setdefault(json.dumps(request), (explored.variant(request, one.foreseen), one))
+    refused = []
+    for one in sorted(candidates, key=lambda one: one.place):
+        if len(listed) == asked.variants:
+            break
+        if one.foreseen is None:
+            refused.append(one.problem)
+            continue
+        request = _request(one.settings, name, order.surface_id, asked)
+        listed.setdefault(json.dumps(request), (explored.variant(request, one.foreseen), one))
     if not listed:
         raise RequestError(f"None of the {len(candidates)} variants can be made: {candidates[0].problem}")
     documents = [document for document, _ in listed.values()]
@@ -84,7 +90,7 @@ def begin(
         read = parse_request(documents[i]["request"], asked.max_vertices, asked.max_panels).wanted
         assert isinstance(read, Wanted)
         wanted.append((i, read))
-    return documents, wanted
+    return documents, wanted, refused
 
 
 def tell(report: Report, path: str, order: Order) -> Json:

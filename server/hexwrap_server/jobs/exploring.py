@@ -69,8 +69,7 @@ async def explore(
     told("foresee", LOOKING)
     looks = await _at_most(hands.at_once, [lambda group=group: look(group) for group in groups])
     candidates = [one for seen in looks for one in seen]
-    refused = [one.problem for one in candidates if one.foreseen is None]
-    documents, picked = await hands.errand(STEPS + "begin", order, name, candidates)
+    documents, picked, refused = await hands.errand(STEPS + "begin", order, name, candidates)
     for i, document in enumerate(documents):
         found(i, document)
     done = 0

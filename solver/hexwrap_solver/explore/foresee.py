@@ -28,11 +28,13 @@ METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048, "in": 0.0254}
 
 @dataclass(frozen=True)
 class Candidate:
-    """A variant as a request, and what it will come to; foreseen: None where it cannot be, and then why."""
+    """A variant as a request, and what it will come to; foreseen: None where it cannot be, and then why.
+    place: of the variant."""
 
     settings: SolveSettings
     foreseen: Figures | None
     problem: str = ""
+    place: int = 0
 
 
 def default_edge(
@@ -97,7 +99,8 @@ def _foresee(
         except HexwrapError as error:
             seen[count] = error.detail
     for variant, count in zip(listed, possible, strict=True):
-        yield _candidate(variant, settings, seats[count], seen[count], surface.unit)
+        found = _candidate(variant, settings, seats[count], seen[count], surface.unit)
+        yield replace(found, place=variant.place)
 
 
 def _seats(surface: Surface, frame: Frame, most: int) -> tuple[tuple[SingularityAt, ...], ...]:

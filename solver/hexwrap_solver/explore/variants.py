@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -23,6 +23,8 @@ AROUND_DEFAULT = (0.8, 1.25)
 JOINTS = 4
 #: Different variants are looked for among so many times as many points.
 PATIENCE = 20
+#: Some cannot be made, or come to the same as others: more are drawn than are asked for.
+SPARE = 2
 BASES = (2, 3, 5, 7, 11, 13, 17)
 
 
@@ -36,17 +38,18 @@ class Frame:
 
 @dataclass(frozen=True)
 class Variant:
-    """singularities: how many are wanted."""
+    """singularities: how many are wanted. place: in the order of the sequence."""
 
     frame: Frame
     singularities: int
     sizes: int
     joint: float
+    place: int = field(default=0, compare=False)
 
 
 def variants(settings: ExploreSettings, edge: float) -> list[Variant]:
-    """So many different ones as are asked for, or as there are: first what would be taken if nothing varied,
-    then in the order of the sequence.
+    """SPARE times as many different ones as are asked for, or as there are: first what would be taken if
+    nothing varied, then in the order of the sequence.
 
     edge: default edge length of the cells on the surface, for settings that give none.
     """
@@ -58,15 +61,16 @@ def variants(settings: ExploreSettings, edge: float) -> list[Variant]:
     choices = (vary.boundary, vary.singularities, kinds, shapes, rotations, sizes, joints)
     usual = panels.sizes if isinstance(panels.sizes, int) else vary.sizes[1]
     found = {Variant(Frame(BoundaryCondition(), settings.pattern), 0, usual, panels.joint): None}
-    for point in _halton(PATIENCE * settings.variants, settings.seed):
-        if len(found) == settings.variants:
+    most = SPARE * settings.variants
+    for point in _halton(PATIENCE * most, settings.seed):
+        if len(found) == most:
             break
         boundary, count, kind, shape, rotation, number, joint = (
             options[int(x * len(options))] for options, x in zip(choices, point, strict=True)
         )
         pattern = replace(shape, kind=kind, rotation=rotation)
         found[Variant(Frame(BoundaryCondition(boundary), pattern), count, number, joint)] = None
-    return list(found)
+    return [replace(variant, place=i) for i, variant in enumerate(found)]
 
 
 def _shapes(settings: ExploreSettings, edge: float) -> list[PatternSettings]:

@@ -6,21 +6,21 @@ import numpy as np
 
 from hexwrap_solver.arrays import Floats, Ints, Ragged
 from hexwrap_solver.geometry import dot
-from hexwrap_solver.panels.polygons import edge_lengths, edge_vectors, interior_angles
+from hexwrap_solver.panels.polygons import edge_lengths, edge_vectors
 
 #: Figures (relative to the mean edge, or radians) that differ by less are the same.
 TOLERANCE = 1e-7
 
 
-def congruence_classes(polygons: Ragged, normal: Floats) -> Ints:
-    """(q,) class of each polygon, numbered by first appearance; normal: (q, 3).
+def congruence_classes(polygons: Ragged, angle: Floats) -> Ints:
+    """(q,) class of each polygon, numbered by first appearance; angle: (·,) their ``interior_angles``.
 
     Edge length, interior angle and twist (signed volume of four successive corners) at every corner, read
     around the polygon, determine it up to a motion. They are made integers by merging figures closer than the
     tolerance, and read from the corner at which the sequence is lexicographically least.
     """
     unit = float(edge_lengths(polygons).mean()) if len(polygons.values) else 1.0
-    letter = _letters(polygons, normal, unit)
+    letter = _letters(polygons, angle, unit)
     key = np.full(polygons.n_rows, -1, dtype=np.int64)
     used = 0
     for n in np.unique(polygons.lengths):
@@ -34,13 +34,13 @@ def congruence_classes(polygons: Ragged, normal: Floats) -> Ints:
     return np.asarray(rank[member])
 
 
-def _letters(polygons: Ragged, normal: Floats, unit: float) -> Ints:
+def _letters(polygons: Ragged, angle: Floats, unit: float) -> Ints:
     """(·,) one integer per corner for its edge length, angle and twist."""
     following = polygons.next()
     edge = edge_vectors(polygons) / unit
     ahead = edge[following]
     twist = dot(np.cross(edge, ahead), ahead[following])
-    figures = [np.linalg.norm(edge, axis=1), interior_angles(polygons, normal), twist]
+    figures = [np.linalg.norm(edge, axis=1), angle, twist]
     merged = np.stack([_merge(figure) for figure in figures], axis=1)
     return _numbered(merged)
 

@@ -20,6 +20,7 @@ from hexwrap_solver.panels.polygons import (
     convex,
     edge_lengths,
     fan_areas,
+    interior_angles,
     mean_edges,
     means,
     row_maxima,
@@ -283,7 +284,7 @@ def _bent_note(shapes: Ragged) -> tuple[str, ...]:
 
 def _convex_note(shapes: Ragged, normal: Floats, pattern: Pattern, surface: Surface) -> tuple[str, ...]:
     """How many are not, and the pattern that would be."""
-    count = int(np.sum(~convex(shapes, normal)))
+    count = int(np.sum(~convex(shapes, interior_angles(shapes, normal))))
     if not count:
         return ()
     # Where three panels meet at each node, flat convex ones follow no saddle (Li, Liu and Wang 2015).

@@ -67,17 +67,17 @@ def interior_angles(polygons: Ragged, normal: Floats) -> Floats:
     back = np.empty_like(ahead)
     back[polygons.next()] = -ahead
     n = normal[polygons.row]
-    sine = dot(np.cross(ahead, back), n)
-    cosine = dot(ahead, back)
+    turn = np.cross(ahead, back)
+    sine, cosine = dot(turn, n), dot(ahead, back)
     # The full length of the cross product, not its part along n, gives the angle of bent corners.
-    length = np.linalg.norm(np.cross(ahead, back), axis=1)
+    length = np.linalg.norm(turn, axis=1)
     angle = np.arctan2(length, cosine)
     return np.asarray(np.where(sine >= 0, angle, 2 * np.pi - angle))
 
 
-def convex(polygons: Ragged, normal: Floats) -> Bools:
-    """(q,) polygons without a corner of more than π, seen along the unit normals (q, 3)."""
-    return np.asarray(row_maxima(interior_angles(polygons, normal), polygons.offsets) <= np.pi + STRAIGHT)
+def convex(polygons: Ragged, angle: Floats) -> Bools:
+    """(q,) polygons without a corner of more than π; angle: (·,) their ``interior_angles``."""
+    return np.asarray(row_maxima(angle, polygons.offsets) <= np.pi + STRAIGHT)
 
 
 def best_plane_distances(polygons: Ragged) -> Floats:

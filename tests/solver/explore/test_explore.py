@@ -14,7 +14,7 @@ from hexwrap_solver.errors import SettingError
 from hexwrap_solver.explore.front import best_of, front_of, non_dominated, to_solve, within
 from hexwrap_solver.explore.predict import FLOOR, outlook
 from hexwrap_solver.explore.types import Costs, ExploreSettings, Figures, Limits, Vary
-from hexwrap_solver.explore.variants import variants
+from hexwrap_solver.explore.variants import SPARE, variants
 from hexwrap_solver.panels import fit_panels, measure, quantize
 from hexwrap_solver.panels.types import PanelSettings
 from hexwrap_solver.pattern import lay_pattern
@@ -135,7 +135,8 @@ def test_variants_are_different_within_the_ranges_and_the_same_for_a_seed() -> N
     vary = Vary(around=(20, 40), sizes=(2, 6), joint=(0.0, 0.02), kind=("hex", "quad"), singularities=(0, 3))
     settings = ExploreSettings(vary=vary, variants=150, seed=4)
     listed = variants(settings, 1.0)
-    assert len(listed) == len(set(listed)) == 150
+    assert len(listed) == len(set(listed)) == 150 * SPARE
+    assert [one.place for one in listed] == list(range(len(listed)))
     assert variants(settings, 1.0) == listed
     assert variants(replace(settings, seed=5), 1.0) != listed
     assert listed[0].frame.boundary.mode == "auto"  # what would be taken without exploring
