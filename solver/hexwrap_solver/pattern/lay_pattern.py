@@ -41,6 +41,7 @@ from hexwrap_solver.pattern.trim.arrangement import Points
 from hexwrap_solver.pattern.trim.boundary import Boundary, boundary_of
 from hexwrap_solver.pattern.trim.enclosed import around_enclosed, met_by_pattern
 from hexwrap_solver.pattern.trim.folds import cut_open
+from hexwrap_solver.pattern.trim.tips import ending_at_tips
 from hexwrap_solver.pattern.trim.trim import Folded, TooCoarse, Trimmed, trim
 from hexwrap_solver.pattern.types import Pattern, PatternSettings
 from hexwrap_solver.surface.features import FeatureEdges
@@ -138,8 +139,10 @@ def _lay(cmap: ConformalMap, placing: Placing, settings: PatternSettings, progre
     progress(0.3, f"{nodes.n} nodes")
     edges, nodes = find_edges(layout, nodes)
     progress(0.6, "edges")
-    whole = whole_cells(lattice, edges)
     boundary = boundary_of(cmap.surface, layout)
+    if len(features):
+        edges = ending_at_tips(layout, nodes, edges, boundary)
+    whole = whole_cells(lattice, edges)
     met = met_by_pattern(layout, nodes, edges, boundary)
     met[boundary.loop[boundary.rim < 0]] = True  # where folds meet the boundary, cells are cut anyway
     if cmap.kind != "net":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -96,3 +97,29 @@ def test_drawn_lines_are_followed_as_creases_are(kind: Kind) -> None:
     area = fan_areas(pattern.cells)
     assert (area > 0).all()
     assert area.sum() == pytest.approx(60 * 100, rel=2e-3)
+
+
+@cache
+def slit() -> ConformalMap:
+    """Creases of a box that end inside, at both ends."""
+    surface = prism(RECTANGLE, edge=2.0)
+    part = tuple(replace(f, vertices=f.vertices[8:20]) for f in surface.features)
+    return conformal_map(replace(surface, features=part), BoundaryCondition("straight"))
+
+
+@pytest.mark.parametrize(
+    ("kind", "around", "rotation"),
+    [("quad", 37, "edge"), ("quad", 49, "vertex"), ("hex", 37, "vertex"), ("triangle", 30, 11.0)],
+)
+def test_folds_that_end_inside_lose_no_cell(kind: Kind, around: int, rotation: float | str) -> None:
+    settings = PatternSettings(kind, around=around, rotation=rotation, boundary="trim")
+    pattern = lay_pattern(slit(), settings)
+    assert euler(pattern) == 0
+    assert not any("touch themselves" in note or "share no edge" in note for note in pattern.notes)
+
+
+def test_edges_through_a_vertex_of_a_fold_are_found_once() -> None:
+    pattern = lay_pattern(solved("ell"), PatternSettings("quad", around=37, rotation=11.0, boundary="trim"))
+    assert euler(pattern) == 0
+    assert fan_areas(pattern.cells).sum() == pytest.approx(120 * 60, rel=1e-9)
+    assert not any("touch themselves" in note for note in pattern.notes)

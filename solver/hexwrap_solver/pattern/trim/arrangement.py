@@ -116,12 +116,14 @@ def _points_on_boundary(
     bends = np.flatnonzero(corners_of_boundary(layout, boundary) & ~taken)
     edge, t = np.concatenate([edge, bends]), np.concatenate([t, np.zeros(len(bends))])
     none = np.zeros((len(edge), 4), dtype=np.int64)
-    new = BoundaryPoints(n + np.arange(len(edge)), edge, t, none)
+    angle = np.concatenate([leaving.angle, chord.angle, chord.end_angle, np.zeros(len(bends))])
+    new = BoundaryPoints(n + np.arange(len(edge)), edge, t, none, angle)
     return BoundaryPoints(
         np.concatenate([at_node.point, new.point]),
         np.concatenate([at_node.edge, new.edge]),
         np.concatenate([at_node.t, new.t]),
         np.concatenate([at_node.isometry, new.isometry]),
+        np.concatenate([at_node.angle, new.angle]),
     ), new
 
 
@@ -171,7 +173,7 @@ def _pairs(
 def _along_boundary(layout: Layout, boundary: Boundary, on: BoundaryPoints) -> HalfEdges:
     """The boundary between successive points, inside and outside."""
     lattice = layout.lattice
-    order = np.lexsort((on.t, on.edge))
+    order = np.lexsort((-on.angle, on.t, on.edge))  # of lines that meet at a vertex, those from behind first
     point, edge, isometry = on.point[order], on.edge[order], on.isometry[order]
     loop = boundary.loop[edge]
     k = len(order)

@@ -124,13 +124,15 @@ class BoundaryPoints:
     """Points of the pattern on the boundary, in their order along it.
 
     point: (k,) number. edge, t: (k,) boundary edge and place on it, 0 ≤ t < 1. isometry: (k, 4)
-    from the coordinates of that edge's face to the point's own.
+    from the coordinates of that edge's face to the point's own. angle: (k,) from the edge to what comes
+    there, in which order points at one vertex stand; radians.
     """
 
     point: Ints
     edge: Ints
     t: Floats
     isometry: Ints
+    angle: Floats
 
     def places(self, boundary: Boundary) -> Complexes:
         """In the coordinates of the edge's face."""
@@ -163,7 +165,7 @@ def nodes_on_boundary(layout: Layout, nodes: Nodes, boundary: Boundary) -> Bound
     own = nodes.isometry[incidence]
     edge, t, isometry = snap(layout, boundary, edge, t, own, 4 * layout.tolerance)
     node, first = np.unique(nodes.node[incidence], return_index=True)
-    return BoundaryPoints(node, edge[first], t[first], isometry[first])
+    return BoundaryPoints(node, edge[first], t[first], isometry[first], np.zeros(len(node)))
 
 
 def corners_of_boundary(layout: Layout, boundary: Boundary) -> Bools:
@@ -180,13 +182,15 @@ def corners_of_boundary(layout: Layout, boundary: Boundary) -> Bools:
 @dataclass(frozen=True)
 class Exits:
     """Edges of the pattern that leave the domain: from a node by a slot to a place (edge, t) on the
-    boundary. isometry: (k, 4) from the coordinates of the face there to the node's own."""
+    boundary. isometry: (k, 4) from the coordinates of the face there to the node's own. angle: (k,) there,
+    back to the node."""
 
     node: Ints
     slot: Ints
     edge: Ints
     t: Floats
     isometry: Ints
+    angle: Floats
 
 
 def exits_of(layout: Layout, nodes: Nodes, edges: PatternEdges, boundary: Boundary) -> Exits:
@@ -200,10 +204,28 @@ def exits_of(layout: Layout, nodes: Nodes, edges: PatternEdges, boundary: Bounda
     way = edges.way[node, slot] - isometry[:, 0] * lattice.steps_per_turn
     heading = lattice.edge * lattice.headings[way % lattice.directions]
     t = _meeting(boundary, edge, start, heading)
+    t = np.where(_is_ahead(boundary, edge, start, heading, 4 * layout.tolerance), 0.0, t)
     away = abs(boundary.tail[edge] + t * (boundary.head - boundary.tail)[edge] - start)
     kept = (edge >= 0) & (away > 16 * layout.tolerance)
     place = snap(layout, boundary, edge[kept], t[kept], isometry[kept], 4 * layout.tolerance)
-    return Exits(node[kept], slot[kept], *place)
+    way = edges.way[node, slot][kept] + lattice.directions // 2
+    return Exits(node[kept], slot[kept], *place, _angle(layout, boundary, place[0], way, place[2]))
+
+
+def _angle(layout: Layout, boundary: Boundary, edge: Ints, way: Ints, isometry: Ints) -> Floats:
+    """(k,) from boundary edges to directions into the domain. isometry: (k, 4) from the coordinates of the
+    edge's face to those of the direction."""
+    lattice = layout.lattice
+    way = (way - isometry[:, 0] * lattice.steps_per_turn) % lattice.directions
+    along = (boundary.head - boundary.tail)[edge]
+    return np.asarray(np.mod(np.angle(lattice.headings[way] / along), 2 * np.pi))
+
+
+def _is_ahead(boundary: Boundary, edge: Ints, start: Complexes, heading: Complexes, near: float) -> Bools:
+    """(k,) whether lines meet a boundary edge that runs on along them: at its tail."""
+    unit = heading / abs(heading)
+    tail, head = ((p[edge] - start) * unit.conj() for p in (boundary.tail, boundary.head))
+    return np.asarray((abs(tail.imag) <= near) & (abs(head.imag) <= near) & (head.real > tail.real))
 
 
 def _meeting(boundary: Boundary, edge: Ints, start: Complexes, heading: Complexes) -> Floats:
@@ -220,13 +242,16 @@ def _meeting(boundary: Boundary, edge: Ints, start: Complexes, heading: Complexe
 @dataclass(frozen=True)
 class Chords:
     """Pieces of pattern edges whose both ends lie outside: from (edge, t) to (end_edge, end_t). isometry:
-    (k, 4) from the coordinates of the end's face to those of the first one's."""
+    (k, 4) from the coordinates of the end's face to those of the first one's. angle, end_angle: (k,) at
+    either end, to the other one."""
 
     edge: Ints
     t: Floats
     end_edge: Ints
     end_t: Floats
     isometry: Ints
+    angle: Floats
+    end_angle: Floats
 
 
 def chords(layout: Layout, boundary: Boundary) -> Chords:
@@ -249,10 +274,19 @@ def chords(layout: Layout, boundary: Boundary) -> Chords:
     none = np.zeros((len(edge), 4), dtype=np.int64)
     edge, t, first = snap(layout, boundary, edge, t, none, 4 * tolerance)
     end_edge, end_t, isometry = snap(layout, boundary, end_edge, end_t, isometry, 4 * tolerance)
+    angle = _angle(layout, boundary, edge, direction, first)
+    end_angle = _angle(layout, boundary, end_edge, direction + lattice.directions // 2, isometry)
     isometry = lattice.compose(lattice.invert(first), isometry)
     # Each is found from both of its ends: keep one.
     once = (went - came > 16 * tolerance) & ((edge < end_edge) | ((edge == end_edge) & (t < end_t)))
-    return Chords(edge[once], t[once], end_edge[once], end_t[once], isometry[once])
+    found_once = Chords(*(x[once] for x in (edge, t, end_edge, end_t, isometry, angle, end_angle)))
+    edge, t, end_edge = found_once.edge, found_once.t, found_once.end_edge
+    # One through a boundary vertex is found at both edges that meet there.
+    order = np.lexsort((t, end_edge, edge))
+    apart = np.diff(t[order]) * abs(boundary.head - boundary.tail)[edge[order[1:]]] > 16 * tolerance
+    apart |= (np.diff(edge[order]) != 0) | (np.diff(end_edge[order]) != 0)
+    order = order[np.concatenate([[True], apart])] if len(order) else order
+    return Chords(**{k: v[order] for k, v in vars(found_once).items()})
 
 
 def met_by_chords(met: Bools, layout: Layout, boundary: Boundary) -> Bools:

@@ -124,6 +124,8 @@ def trim(
         faces = faces.entries(~points.straight[faces.corner] | linked[faces.corner])
         area = _areas(layout, points, faces)
     small = area < sliver
+    # Small pieces that folds cut off, with no neighbour on their own side: dropped, they would leave holes.
+    small &= ~(faces.along_folds(half_edges) & (area > nothing))
     lost = int((small & (area > nothing)).sum())
     kept = faces.part(~small)
     together = _together(cells, side_of_edge, kept, half_edges, edges)
@@ -175,6 +177,12 @@ class _Faces:
         at_rim[self.half_edge.row[edges.rim[self.half_edge.values]]] = True
         return self.part(~at_rim)
 
+    def along_folds(self, edges: HalfEdges) -> Bools:
+        """(f,) faces with a side along a fold."""
+        outside = edges.twin[self.half_edge.values]
+        on_fold = edges.outer[outside] & ~edges.rim[outside]
+        return np.bincount(self.half_edge.row[on_fold], minlength=self.half_edge.n_rows) > 0
+
     def entries(self, keep: Bools) -> _Faces:
         """All faces with some of their corners; the side before a corner left out goes on to the next."""
         lengths = np.bincount(self.half_edge.row[keep], minlength=self.half_edge.n_rows)
@@ -196,6 +204,8 @@ def _trace(layout: Layout, edges: HalfEdges, used: Bools) -> _Faces:
     finished = np.zeros(len(start), dtype=bool)
     assert len(np.unique(following)) == len(following), "each half-edge follows one other"
     while len(walker):
+        if len(who) > len(following) + 1:
+            raise RuntimeError("half-edges that follow each other come to no end")
         who.append(walker)
         what.append(at)
         where.append(isometry)
