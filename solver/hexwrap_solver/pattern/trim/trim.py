@@ -202,7 +202,6 @@ def _trace(layout: Layout, edges: HalfEdges, used: Bools) -> _Faces:
     nothing = np.zeros(0, dtype=np.int64)
     who, what, where = [nothing], [nothing], [np.zeros((0, 4), dtype=np.int64)]
     finished = np.zeros(len(start), dtype=bool)
-    assert len(np.unique(following)) == len(following), "each half-edge follows one other"
     while len(walker):
         if len(who) > len(following) + 1:
             raise RuntimeError("half-edges that follow each other come to no end")
