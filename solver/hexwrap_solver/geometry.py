@@ -9,7 +9,7 @@ from scipy.sparse import csr_array
 
 from hexwrap_solver.arrays import Complexes, Floats, Ints
 
-Summed = TypeVar("Summed", Floats, Complexes)
+Summed = TypeVar("Summed", Ints, Floats, Complexes)
 
 
 def dot(a: Floats, b: Floats) -> Floats:

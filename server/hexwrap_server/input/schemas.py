@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Annotated, Any
+from typing import Annotated, Any, Generic, TypeVar
 
 import numpy as np
 
@@ -30,16 +30,19 @@ class NurbsForm:
     closed: Annotated[tuple[bool, bool], Setting("whether it closes up in u and in v")] = (False, False)
 
 
+Asked = TypeVar("Asked", Wanted, Exploration)
+
+
 @dataclass(frozen=True)
-class Request:
+class Request(Generic[Asked]):
     """surface: as sent, or the id of one that was sent before."""
 
     name: str
     surface: SentSurface | str
-    wanted: Wanted | Exploration
+    wanted: Asked
 
 
-def parse_request(body: object, max_vertices: int, max_panels: int) -> Request:
+def parse_request(body: object, max_vertices: int, max_panels: int) -> Request[Wanted]:
     """Raises FormError with a JSON pointer for each fault."""
     body, arrays, beside = _opened(body)
     asked = read(Body, body | {"surface": beside or None})
@@ -54,7 +57,7 @@ def parse_request(body: object, max_vertices: int, max_panels: int) -> Request:
     return Request(asked.name, surface, wanted)
 
 
-def parse_exploration(body: object, max_vertices: int, max_panels: int) -> Request:
+def parse_exploration(body: object, max_vertices: int, max_panels: int) -> Request[Exploration]:
     """The body of ``POST /v1/explore``. Raises FormError with a JSON pointer for each fault."""
     body, arrays, beside = _opened(body)
     asked = read(ExploreBody, body | {"surface": beside or None})
@@ -63,8 +66,8 @@ def parse_exploration(body: object, max_vertices: int, max_panels: int) -> Reque
     if wanted.surface is not None or "nurbs" in arrays:
         wanted = replace(wanted, surface=_limited(wanted.surface or SurfaceSettings(), max_vertices))
     pattern = replace(wanted.pattern, max_cells=max_panels)
-    limits = {"max_panels": max_panels, "max_vertices": max_vertices}
-    return Request(asked.name, surface, replace(wanted, pattern=pattern, **limits))
+    wanted = replace(wanted, pattern=pattern, max_panels=max_panels, max_vertices=max_vertices)
+    return Request(asked.name, surface, wanted)
 
 
 def _opened(body: object) -> tuple[dict[str, Any], dict[str, Any], dict[str, object]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from isal import igzip
 
@@ -112,7 +112,7 @@ def finish(report: Report, order: Order, documents: list[Json], refused: list[st
 
 def write_table(report: Report, path: str) -> bytes:
     """``explore.csv``. Raises GoneError, StorageError."""
-    return explored.explore_csv(json.loads(solution_at(path)["explored"]))
+    return explored.explore_csv(json.loads(cast(dict[str, Any], solution_at(path))["explored"]))
 
 
 def _asked(order: Order) -> Exploration:

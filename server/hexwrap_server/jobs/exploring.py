@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable
+from functools import partial
 from typing import Any, Protocol
 
 from hexwrap_server.errors import ShuttingDownError
@@ -36,8 +37,9 @@ class Hands(Protocol):
         """In a worker."""
         ...
 
-    async def errand(self, function: str, *arguments: Any) -> Any:
-        """Something short, on this machine, which sees the solutions."""
+    @property
+    def errand(self) -> Callable[..., Awaitable[Any]]:
+        """Has something short done on this machine, which sees the solutions."""
         ...
 
     async def solved(self, work: Work) -> str:
@@ -67,7 +69,7 @@ async def explore(
         return seen
 
     told("foresee", LOOKING)
-    looks = await _at_most(hands.at_once, [lambda group=group: look(group) for group in groups])
+    looks = await _at_most(hands.at_once, [partial(look, group) for group in groups])
     candidates = [one for seen in looks for one in seen]
     documents, picked, refused = await hands.errand(STEPS + "begin", order, name, candidates)
     for i, document in enumerate(documents):
@@ -88,7 +90,7 @@ async def explore(
         found(i, documents[i])
 
     told("solve", SOLVING)
-    await _at_most(hands.at_once, [lambda i=i, w=wanted: measure(i, w) for i, wanted in picked])
+    await _at_most(hands.at_once, [partial(measure, i, wanted) for i, wanted in picked])
     outcome: Outcome = await hands.errand(STEPS + "finish", order, documents, refused)
     return outcome
 

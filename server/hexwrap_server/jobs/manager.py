@@ -419,7 +419,8 @@ class JobManager:
     async def _explore(self, item: _Item) -> Outcome:
         jobs, work = item.jobs, item.work
         order = await self._order(work, next(iter(jobs), ""))
-        start, begun = time.monotonic(), {}
+        start = time.monotonic()
+        begun: dict[str, float] = {}
 
         def told(stage: str, fraction: float) -> None:
             begun.setdefault(stage, time.monotonic() - start)

@@ -9,7 +9,14 @@ import orjson
 
 from hexwrap_server.input.bodies import Body
 from hexwrap_server.input.json_text import loads
-from hexwrap_server.input.requests import CacheSettings, Intake, ParsedRequest, SentSurface
+from hexwrap_server.input.requests import (
+    CacheSettings,
+    Exploration,
+    Intake,
+    ParsedRequest,
+    SentSurface,
+    Wanted,
+)
 from hexwrap_server.input.schemas import Request, parse_exploration, parse_request, parse_surface
 from hexwrap_server.input.surface_files import FromFile
 from hexwrap_server.input.uploads import sent_file
@@ -34,7 +41,7 @@ def read_exploration(report: Report, body: Body, settings: Settings, folder: str
     return kept(parse_exploration(document, settings.max_vertices, settings.max_panels), folder)
 
 
-def kept(request: Request, folder: str) -> ParsedRequest:
+def kept(request: Request[Wanted] | Request[Exploration], folder: str) -> ParsedRequest:
     """The request, its surface written into folder and known by its content. Raises StorageError."""
     if isinstance(request.surface, str):
         return ParsedRequest(request.name, request.surface, request.wanted)

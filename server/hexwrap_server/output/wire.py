@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from hexwrap_server.output.colours import class_colours
 from hexwrap_server.output.unrolled import piece_of_cells
-from hexwrap_solver.arrays import Complexes, Floats, Ragged
+from hexwrap_solver.arrays import Bools, Complexes, Floats, Ragged
 from hexwrap_solver.conformal.net import Net
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.domain.apart import apart
@@ -287,7 +287,7 @@ def support(made: Support) -> dict[str, Any]:
     }
 
 
-def summary(values: Floats | None, *wanted: str) -> dict[str, float | None]:
+def summary(values: Floats | Bools | None, *wanted: str) -> dict[str, float | None]:
     """The named statistics of the finite values, null where there are none."""
     finite = np.zeros(0) if values is None else values[np.isfinite(values)]
     return {name: float(getattr(np, name)(finite)) if len(finite) else None for name in wanted}

@@ -30,7 +30,7 @@ FLOOR = {
     sides: c * m / np.pi * np.sin(np.pi / m) for sides, c, m in ((6, 1 / 2, 6), (4, 1 / 2, 4), (3, 1 / 3, 6))
 }
 #: Half a row of cells, in edges, where every other cell of a row stands half a cell higher.
-ROW = {6: np.sqrt(3) / 4, 4: 0.0, 3: 0.0}
+ROW = {6: 3**0.5 / 4, 4: 0.0, 3: 0.0}
 #: Cells that a boundary cuts, per cell of area that is left of them: those whose middle is nearer to it than
 #: they reach, on either side, of which half the area is inside.
 TRIMMED = 2.0
@@ -117,23 +117,24 @@ def outlook(cmap: ConformalMap, settings: PatternSettings, progress: Progress = 
     cells = abs(((q - p).conj() * (r - p)).imag) / (2 * lattice.cell_area)
     a, b, c = (surface.vertices[corner] for corner in surface.faces.T)
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
-    number = np.bincount(surface.faces.ravel(), np.repeat(cells, 3) / 3, len(surface.vertices))
+    n = len(surface.vertices)
+    number: Floats = np.bincount(surface.faces.ravel(), np.repeat(cells, 3) / 3, n).astype(np.float64)
     unit = lattice.sides / (4 * np.tan(np.pi / lattice.sides))
-    size = np.exp(-(cmap.log_scale - cmap.log_scale.mean()))
+    size: Floats = np.exp(-(cmap.log_scale - cmap.log_scale.mean()))
     size *= np.sqrt(area.sum() / (unit * float(number @ size**2)))
-    slope = np.bincount(surface.faces.ravel(), np.repeat(area * _slope(cmap, area), 3))
-    slope /= np.maximum(np.bincount(surface.faces.ravel(), np.repeat(area, 3)), 1e-300)
+    slope: Floats = np.bincount(surface.faces.ravel(), np.repeat(area * _slope(cmap, area), 3)).astype(float)
+    slope = slope / np.maximum(np.bincount(surface.faces.ravel(), np.repeat(area, 3)), 1e-300)
     shorter = np.minimum(FLOOR[lattice.sides] * slope * size, 1.0)
-    reach = lattice.sides / (2 * np.pi) * size
+    reach: Floats = np.asarray(lattice.sides / (2 * np.pi) * size)
     spread = np.sqrt(np.bincount(surface.faces.ravel(), np.repeat(area, 3) / 3, len(size)))
     regular, rest, alone, cut = number, 0.0, 0, 0
     if len(cmap.cones):
-        away = cKDTree(surface.vertices[cmap.cones.vertex]).query(surface.vertices)[0]
+        away: Floats = np.asarray(cKDTree(surface.vertices[cmap.cones.vertex]).query(surface.vertices)[0])
         regular = regular * _beyond(away, reach, spread)
         alone, rest = len(cmap.cones), unit * float((number - regular) @ size**2)
     whole = regular
     for i, loop in enumerate(surface.loops):
-        least = ROW[lattice.sides] * size if i in placing.loops else reach
+        least: Floats = ROW[lattice.sides] * size if i in placing.loops else reach
         whole = whole * _beyond(_distance(surface.vertices, surface.vertices[loop]), least, spread)
     if settings.boundary == "trim":
         rest += unit * float((regular - whole) @ size**2)
@@ -165,6 +166,7 @@ def _slope(cmap: ConformalMap, area: Floats) -> Floats:
 def _levels(length: Floats, number: Floats) -> tuple[Floats, Floats]:
     """Lengths ascending that differ by ``ALIKE`` at least, and how many cells have each."""
     level = np.floor(np.log(length / length.min()) / ALIKE).astype(np.int64)
-    total, whole = np.bincount(level, number), np.bincount(level, number * length**2)
+    total: Floats = np.bincount(level, number).astype(np.float64)
+    whole = np.bincount(level, number * length**2)
     there = total > 0
     return np.sqrt(whole[there] / total[there]), total[there]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -65,9 +66,8 @@ def variants(settings: ExploreSettings, edge: float) -> list[Variant]:
     for point in _halton(PATIENCE * most, settings.seed):
         if len(found) == most:
             break
-        boundary, count, kind, shape, rotation, number, joint = (
-            options[int(x * len(options))] for options, x in zip(choices, point, strict=True)
-        )
+        taken: list[Any] = [options[int(x * len(options))] for options, x in zip(choices, point, strict=True)]
+        boundary, count, kind, shape, rotation, number, joint = taken
         pattern = replace(shape, kind=kind, rotation=rotation)
         found[Variant(Frame(BoundaryCondition(boundary), pattern), count, number, joint)] = None
     return [replace(variant, place=i) for i, variant in enumerate(found)]

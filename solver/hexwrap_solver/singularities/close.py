@@ -435,7 +435,7 @@ class Closing:
         for _ in range(STEPS):
             if best <= DONE:
                 break
-            d = np.linalg.lstsq(slopes, off, rcond=1e-9)[0]
+            d: Floats = np.linalg.lstsq(slopes, off, rcond=1e-9)[0].astype(np.float64)
             stride = float(np.hypot(d[0:s:2], d[1:s:2]).max())
             d *= min(1.0, STRIDE / max(stride, 1e-300))
             d, new_seen = self._stepped(x, d)

@@ -48,11 +48,11 @@ def develop(mesh: MirrorMesh, metric: Metric, cone_angle: float) -> Development:
     via[head[on_tree]] = on_tree  # of several edges between two vertices any one will do
     below = np.flatnonzero(above >= 0)
     via, up = via[below], np.where(above >= 0, above, root)
-    lift = np.zeros(mesh.n, dtype=np.int64)
+    lift: Ints = np.zeros(mesh.n, dtype=np.int64)
     lift[below] = turn[via]
     lift = sums_to_root(lift, up, root)
     step = step * np.exp(1j * cone_angle * lift[tail])
-    uv = np.zeros(mesh.n, dtype=complex)
+    uv: Complexes = np.zeros(mesh.n, dtype=np.complex128)
     uv[below] = step[via]
     uv = sums_to_root(uv, up, root)
 

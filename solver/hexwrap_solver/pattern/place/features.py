@@ -166,7 +166,7 @@ def lines_from(
     return FeatureLines(
         Sides(
             own[first] / (1j * turn),
-            np.bincount(line[kept], weights=[chains[i].length for i in kept], minlength=len(first)),
+            np.bincount(line[kept], [chains[i].length for i in kept], len(first)).astype(np.float64),
             np.full(len(first), -1),
             np.array(
                 [any(chains[i].closed for i in kept if line[i] == k) for k in range(len(first))], dtype=bool

@@ -78,7 +78,10 @@ def ending_at_tips(layout: Layout, nodes: Nodes, edges: PatternEdges, boundary: 
             (back + over[:, 0] * lattice.steps_per_turn) % lattice.directions,
         ),
     )
-    seen = [_node_at(layout, nodes, edges, boundary.face[edge], *rest) for edge, *rest in sides]
+    seen = [
+        _node_at(layout, nodes, edges, boundary.face[edge], place, end, back)
+        for edge, place, end, back in sides
+    ]
     apart = seen[0][0] != seen[1][0]  # otherwise the fold is shorter than the edge, and has a tip there, too
     for node, slot, _ in seen:
         there = (node >= 0) & (slot >= 0) & apart
