@@ -7,6 +7,7 @@ import io
 import json
 import logging
 import shutil
+import struct
 import subprocess
 from dataclasses import replace
 from pathlib import Path
@@ -25,11 +26,15 @@ from hexwrap_server.output.meta import Meta
 from hexwrap_server.output.units import UNITS
 from hexwrap_server.output.writers import write
 from hexwrap_solver.arrays import Floats, Ragged
+from hexwrap_solver.conformal.types import BoundaryCondition
 from hexwrap_solver.panels import make_components
-from hexwrap_solver.panels.types import ComponentSettings
-from hexwrap_solver.pipeline import Solution
+from hexwrap_solver.panels.types import ComponentSettings, PanelSettings
+from hexwrap_solver.pattern.types import PatternSettings
+from hexwrap_solver.pipeline import Solution, SolveSettings, solve
+from hexwrap_solver.singularities.types import SingularityAt, SingularitySettings
 from hexwrap_solver.surface.types import Origin
 from tests.server.analytic import cylinder
+from tests.solver.singularities import shapes
 
 # ifcopenshell's rules leave files open.
 pytestmark = pytest.mark.filterwarnings(
@@ -371,3 +376,57 @@ def test_panel_table_names_the_unit_of_its_lengths(solution: Solution) -> None:
     plain = write("panels.csv", solution, Meta()).decode().splitlines()[0].split(",")
     assert "edge_length" in plain
     assert not any("[" in name for name in plain)
+
+
+# --- singularities ---------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def singular() -> Solution:
+    """A waisted tube with two heptagons and four pentagons, all with bodies and a support."""
+    listed = [(620, -1), (600, -1), (980, 1), (960, 1), (220, 1), (200, 1)]
+    asked = SingularitySettings(at=tuple(SingularityAt(k, vertex=v) for v, k in listed))
+    panels = PanelSettings(sizes=3, joint=0.02, components=ComponentSettings(inset=0.01, thickness=0.02))
+    settings = SolveSettings(
+        BoundaryCondition("isometric"), PatternSettings(around=16), panels, asked, support=True
+    )
+    return solve(shapes.waist, settings)
+
+
+def test_pentagons_and_heptagons_are_built_like_hexagons(singular: Solution) -> None:
+    assert singular.panels is not None
+    assert singular.components is not None
+    assert singular.support is not None
+    panels, outline = singular.panels, singular.components.outline
+    odd = np.flatnonzero(panels.polygons.lengths != 6)
+    assert sorted(panels.polygons.lengths[odd]) == [5, 5, 5, 5, 7, 7]
+    assert np.nanmin(singular.quality.gap_tangential) >= 0.02 - 1e-9
+    names = [f"size-{size:02d}" for size in range(len(panels.class_length))]
+    for i in odd:
+        corner, n = np.asarray(panels.polygons[i]), panels.normal[i]
+        edge = np.roll(corner, -1, axis=0) - corner
+        assert np.linalg.norm(edge, axis=1) == pytest.approx(panels.edge_length[i], rel=1e-9)
+        inward = np.cross(n, edge / panels.edge_length[i])
+        assert ((np.asarray(outline[i]) - corner) * inward).sum(axis=1) == pytest.approx(0.01, abs=1e-9)
+
+    model = opened(write("panels.ifc", singular, ODD))
+    assert ifc_messages(model) == []
+    assert sorted(kind.Name for kind in model.by_type("IfcPlateType")) == names
+    plates = {plate.Name: plate for plate in model.by_type("IfcPlate")}
+    for i in odd:
+        sides = int(panels.polygons.lengths[i])
+        corners = plate_corners(plates[labels(singular)[i]])
+        assert len(corners) == 2 * sides
+        assert corners[:sides] == pytest.approx(np.asarray(outline[i]), abs=1e-6)
+
+    rhino = rhino3dm.File3dm.FromByteArray(write("panels.3dm", singular, ODD))
+    assert [block.Name for block in rhino.InstanceDefinitions] == names
+    rows = list(csv.DictReader(io.StringIO(write("cutting-list.csv", singular, ODD).decode(), newline="")))
+    assert [row["sides"] for row in rows[:-1]] == panels.class_sides.astype(str).tolist()
+    cut = [e for e in sheets(write("flat.dxf", singular, ODD)).query("LWPOLYLINE") if "cut" in e.dxf.layer]
+    assert sorted(len(line) for line in cut if len(line) != 6) == [5, 5, 5, 5, 7, 7]
+    (head,) = struct.unpack("<I", (data := write("panels.glb", singular, ODD))[12:16])
+    scene = json.loads(data[20 : 20 + head])
+    assert len(scene["meshes"]) == len(names)
+    assert sum("mesh" in node for node in scene["nodes"]) == panels.n_panels
+    assert len(singular.support.strips) == singular.support.edges.shape[0]
