@@ -393,6 +393,7 @@ def singular() -> Solution:
     return solve(shapes.waist, settings)
 
 
+@pytest.mark.long
 def test_pentagons_and_heptagons_are_built_like_hexagons(singular: Solution) -> None:
     assert singular.panels is not None
     assert singular.components is not None

@@ -10,10 +10,11 @@ import httpx
 
 from tests.server.bodies import tube
 from tests.server.patience import PATIENCE
-from tests.server.process import free_port, served
-from tests.server.test_mutations import awake
+from tests.server.process import free_port, longest_step, served
 
 CLIENTS = 50
+#: Seconds of processor time for which the server may answer nobody else, such as /health.
+LONGEST_STEP = 0.5
 
 
 def test_fifty_clients_at_once(tmp_path: Path) -> None:
@@ -34,8 +35,8 @@ def test_fifty_clients_at_once(tmp_path: Path) -> None:
             answer = client.post("/v1/solve", json=body)
             return answer.status_code, answer.json()
 
-        with awake(client, 0.5):
-            answers = list(threads.map(one, range(2 * CLIENTS)))
+        answers = list(threads.map(one, range(2 * CLIENTS)))
+        assert longest_step(tmp_path) < LONGEST_STEP
         assert {status for status, _ in answers} == {200}
         for i, (_, result) in enumerate(answers):
             assert result == answers[i % 10][1]
