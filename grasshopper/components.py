@@ -6,6 +6,7 @@ still loads, and Rhino 8's own (CPython).
 
 from __future__ import annotations
 
+import ast
 import base64
 import json
 import re
@@ -118,6 +119,13 @@ def complete(code: str) -> str:
         return "\n\n".join(part.strip("\n") for part in parts)
 
     return INCLUDE.sub(shared, code)
+
+
+def offered(component: str, name: str) -> tuple[str, ...]:
+    """The choices that a component's source lists under a name."""
+    tree = ast.parse((SOURCE / component / "code.py").read_text(encoding="utf-8"))
+    lists = [node for node in tree.body if isinstance(node, ast.Assign)]
+    return next(tuple(ast.literal_eval(node.value)) for node in lists if ast.unparse(node.targets[0]) == name)
 
 
 def user_object(component: Component, form: Form) -> bytes:

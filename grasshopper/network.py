@@ -8,7 +8,7 @@ from uuid import UUID, uuid5
 
 from grasshopper import layout
 from grasshopper.archive import Chunk
-from grasshopper.components import Component, Form, parameter_guid, parameters, script
+from grasshopper.components import Component, Form, offered, parameter_guid, parameters, script
 from grasshopper.layout import ROW, Box
 
 #: All instances of the examples hang on this one, so that every build gives them the same names.
@@ -37,17 +37,6 @@ class Example:
     guide: str
     around: int = 24
     sizes: int = 11
-    kinds: tuple[str, ...] = (
-        "hex",
-        "triangle",
-        "quad",
-        "diamond",
-        "brick",
-        "trihexagonal",
-        "truncated-hexagonal",
-        "truncated-square",
-        "rhombitrihexagonal",
-    )
     rims: tuple[str, ...] = ("whole", "trim")
     corners: str = ""
     angles: str = "240"
@@ -334,7 +323,7 @@ def corners(net: Network, wanted: Example) -> None:
 
 def sizes(net: Network, wanted: Example) -> None:
     """Pattern and panels."""
-    net.value_list("Kind", "Kind", wanted.kinds, 20, 310)
+    net.value_list("Kind", "Kind", offered("Pattern", "KINDS"), 20, 310)
     net.slider("Around", "Around", wanted.around, 6, 200, 20, 346)
     net.value_list("Boundary", "Boundary", wanted.rims, 20, 380)
     net.script("Pattern", 275, 310, {"Kind": "Kind", "Around": "Around", "Boundary": "Boundary"})

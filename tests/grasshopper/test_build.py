@@ -10,7 +10,7 @@ import sys
 import zipfile
 import zlib
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 from uuid import UUID
 
 import pytest
@@ -18,6 +18,7 @@ import pytest
 from grasshopper import archive, build, components, draw, icons, layout, network
 from grasshopper.archive import Chunk
 from grasshopper.components import FORMS, RHINO7, RHINO8, Component, Form
+from hexwrap_solver.pattern.types import Kind
 
 FOLDERS = components.folders()
 NAMES = [
@@ -378,3 +379,7 @@ def test_examples_hold_the_components_of_the_figure_and_more(objects: list[Chunk
 def test_metadata_files_are_plain_json() -> None:
     for folder in FOLDERS:
         assert json.loads((folder / "metadata.json").read_text(encoding="ascii"))
+
+
+def test_all_kinds_of_patterns_are_offered() -> None:
+    assert components.offered("Pattern", "KINDS") == get_args(Kind)

@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.table import Table
 
 from hexwrap_server.cli.local import MAX_PANELS, MAX_VERTICES, read_body
-from hexwrap_server.cli.options import asked_body
+from hexwrap_server.cli.options import asked_body, word
 from hexwrap_server.errors import UsageError
 from hexwrap_server.input.form import ExploreBody, Leaf, leaves
 from hexwrap_server.input.requests import CacheSettings, Exploration, Order, SentSurface
@@ -54,20 +54,11 @@ def add_explore_options(parser: argparse.ArgumentParser) -> None:
             flag,
             dest="explore_" + "_".join(leaf.path),
             nargs="+" if several else None,
-            type=_word,
+            type=word,
             default=argparse.SUPPRESS,
             metavar="X",
             help=leaf.setting.help.replace("%", "%%"),
         )
-
-
-def _word(text: str) -> object:
-    for kind in (int, float):
-        try:
-            return kind(text)
-        except ValueError:
-            continue
-    return text
 
 
 def check_outputs(outputs: list[str]) -> None:

@@ -186,6 +186,11 @@ def _value(text: str) -> object:
     """A number where it reads as one, null for 'none', else the word."""
     if text.lower() in ("none", "null"):
         return None
+    return word(text)
+
+
+def word(text: str) -> object:
+    """A number where it reads as one, else the word."""
     for kind in (int, float):
         try:
             return kind(text)
