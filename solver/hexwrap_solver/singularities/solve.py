@@ -309,14 +309,8 @@ def _closed(surface: Surface, frame: Frame, proposal: Proposal, progress: Progre
     failed: ConvergenceError | None = None
     vertex, index = _ordered(proposal)
     finer = refined(surface, surface.vertices[vertex], frame.width)
-    slope = None
-    if frame.turn is not None:
-        corners = conformal_map(finer, BoundaryCondition("straight")).corners()
-        edge = np.roll(corners, -1, axis=1) - corners
-        slope = (edge.imag / np.abs(edge)) ** 2
-    angles = None
-    if frame.rules.angles is not None:
-        angles = np.concatenate([frame.rules.angles, np.zeros(len(finer.vertices) - len(frame.rules.angles))])
+    slope = _slope if frame.turn is not None else None
+    best: tuple[Chart, Closed] | None = None
     for _ in range(AGAIN + 1):
         chart = Chart(
             finer,
@@ -327,26 +321,44 @@ def _closed(surface: Surface, frame: Frame, proposal: Proposal, progress: Progre
             frame.lattice.quantum,
             frame.width,
             slope,
-            angles,
+            frame.rules.angles,
         )
-        closing = Closing(chart, frame.width, frame.line, frame.free_scale, frame.aligned)
+        closing, finer = (
+            Closing(chart, frame.width, frame.line, frame.free_scale, frame.aligned),
+            chart.surface,
+        )
         try:
             found = closing.solve(progress)
+            best, places = (chart, found), found.seen.surface.vertices[vertex]
             if found.moves.max() <= FAR:
-                return chart, found
+                break
         except ConvergenceError as error:
-            failed = error
-            found = None
-        if found is None:
+            if best is not None:
+                break
+            failed, places = failed or error, closing.aims
+            finer = refined(finer, places, frame.width)
+        seats = _nearest_inside(finer, places)
+        if (
+            (seats == vertex).all()
+            or len(np.unique(seats)) < len(seats)
+            or np.isin(seats, finer.boundary).any()
+        ):
             break
-        best = chart, found
-        seats = _nearest_inside(finer, found.seen.surface.vertices[vertex])
-        if (seats == vertex).all():
-            return best
         vertex = seats
-    if failed is not None:
+    if best is None:
+        assert failed is not None
         raise failed
     return best
+
+
+def _slope(surface: Surface) -> Floats:
+    """(m, 3) squared sine of the half-edges' angles to the horizontal in the cylinder without singularities,
+    which may be that of a refined mesh."""
+    tube = conformal_map(surface, BoundaryCondition("straight"))
+    corners = tube.uv[surface.faces]
+    edge = np.roll(corners, -1, axis=1) - corners
+    edge -= tube.circumference * np.rint(edge.real / tube.circumference)
+    return np.asarray((edge.imag / np.abs(edge)) ** 2)
 
 
 def _ordered(proposal: Proposal) -> tuple[Ints, Ints]:
