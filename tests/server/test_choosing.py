@@ -432,7 +432,7 @@ def test_inspect_prints_what_is_there_and_what_would_be_done(
     said = capsys.readouterr().out
     assert "unit m, tolerance 0.001" in said
     assert "Wall::Old" in said
-    assert "to be chosen" in said
+    assert "to choose" in said
     assert main(["inspect", str(path), "--object", "north"]) == 0
     assert "taken" in capsys.readouterr().out
     assert main(["inspect", str(tmp_path / "none.3dm")]) == 2
