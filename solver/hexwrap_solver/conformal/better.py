@@ -35,7 +35,7 @@ def corner_notes(surface: Surface, targets: Targets, u: Floats) -> tuple[str, ..
     area = _vertex_areas(surface)
     ratio = _ratio(u, area)
     corners = [
-        (int(loop[i]), loop, i)
+        (int(loop[i]), loop, int(i))
         for loop in surface.loops
         for i in np.flatnonzero(np.abs(targets.angle[loop] - np.pi) > 1e3 * ANGLE)
     ]
