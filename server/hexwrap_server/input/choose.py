@@ -32,7 +32,7 @@ from hexwrap_server.input.readers.found import FileContent, Found, Geometry
 from hexwrap_solver.surface import SentMesh
 
 #: Of several parts that could be meant, one that counts for this many times the next is meant.
-DOMINANT = 2.0
+DOMINANT = 1.3
 #: The area of what is no tube counts for so much of it, of ground, and of what is flat.
 NO_TUBE, GROUND, PLANE = 1 / 20, 1 / 400, 1e-6
 #: Parts are alike whose sizes and areas differ by no more than this part.
