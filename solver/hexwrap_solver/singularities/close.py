@@ -35,7 +35,7 @@ DIPOLE, STRETCH, TURN, SCALE = 0.15, 0.002, 0.1, 0.02
 #: accepted.
 STRIDE, STEPS, DONE, ACCEPTED = 0.6, 40, 1e-11, 1e-9
 #: A step beyond which there is no map is halved at most so often.
-HALVINGS = 5
+HALVINGS = 2
 #: Differences for the Jacobian, in units, to each of which the map is linear.
 DIFFERENCE = 1e-3
 #: Residual of the angle sums that will do on the way, radians per cell that is left to close.
