@@ -337,41 +337,34 @@ def _closed(
     vertex, index = _ordered(proposal)
     finer = refined(surface, surface.vertices[vertex], frame.width)
     slope = _slope if frame.turn is not None else None
-    best: tuple[Chart, Closed] | None = None
     quantum, ends, angles = frame.lattice.quantum, frame.rules.ends, frame.rules.angles
     for again in range(AGAIN + 1):
-        if again and work.left <= 0:
-            break
         try:
             chart = Chart(finer, vertex, index, proposal.loops, ends, quantum, frame.width, slope, angles)
+            closing = Closing(chart, frame.width, frame.line, frame.free_scale, frame.aligned)
         except ConvergenceError as error:
-            failed = failed or error
             work.left -= HARD * len(finer.vertices)
-            break
+            raise failed or error from None
         finer = chart.surface
         work.left -= len(finer.vertices)
-        closing = Closing(chart, frame.width, frame.line, frame.free_scale, frame.aligned)
-        try:
-            found = closing.solve(progress)
-            best, places = (chart, found), found.seen.surface.vertices[vertex]
-            if found.moves.max() <= FAR:
-                break
-        except ConvergenceError as error:
-            if best is not None:
-                break
-            failed, places = failed or error, closing.aims
-            work.left -= HARD * len(finer.vertices)
-            finer = refined(finer, places, frame.width)
-        seats = _nearest_inside(finer, places)
-        if (seats == vertex).all() or len(np.unique(seats)) < len(seats):
-            break
-        if np.isin(seats, finer.boundary).any():
+        last = again == AGAIN or work.left <= 0
+        if last or np.linalg.norm(closing.moves, axis=1).max() <= FAR:
+            try:
+                return chart, closing.solve(progress)
+            except ConvergenceError as error:
+                failed = failed or error
+                work.left -= HARD * len(finer.vertices)
+                if last or work.left <= 0:
+                    break
+                finer = refined(finer, closing.places, frame.width)
+        seats = _nearest_inside(finer, closing.places)
+        if len({*seats.tolist()} - {*finer.boundary.tolist()}) < len(seats) or (seats == vertex).all():
+            if failed is None:
+                return chart, closing.solve(progress)
             break
         vertex = seats
-    if best is None:
-        assert failed is not None
-        raise failed
-    return best
+    assert failed is not None
+    raise failed
 
 
 def _slope(surface: Surface) -> Floats:
