@@ -18,9 +18,9 @@ from hexwrap_solver.conformal.fixed import minimise
 from hexwrap_solver.conformal.layout import _develop
 from hexwrap_solver.errors import ConvergenceError
 from hexwrap_solver.linalg.factor import Factorisation
+from hexwrap_solver.linalg.integers import nearest_integers
 from hexwrap_solver.singularities.cut import Branches, branches
 from hexwrap_solver.singularities.drag import Grip, dragged, grips
-from hexwrap_solver.singularities.integers import nearest_integers
 from hexwrap_solver.singularities.linear import targets, vertex_areas
 from hexwrap_solver.singularities.types import End
 from hexwrap_solver.surface.topology import next_half_edge
