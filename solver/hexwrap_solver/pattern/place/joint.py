@@ -71,7 +71,7 @@ class Joint:
 
     def _energy(self, x: Ints, target: Floats) -> Floats:
         off = x - target
-        return np.maximum(np.einsum("ki,ij,kj->k", off, self.form, off), 0.0)
+        return np.asarray(np.maximum(np.einsum("ki,ij,kj->k", off, self.form, off), 0.0))
 
     def rows(self, x: Ints) -> Ints:
         """(t, 4) isometries of all motions."""
@@ -181,7 +181,8 @@ def _of_word(lattice: Lattice, motions: Motions, word: Ints) -> Ints:
 def _residues(matrix: Ints, count: int) -> list[Floats]:
     """One integer vector of each class modulo the columns of the matrix (2, 2), whose determinant is
     ±count."""
-    inverse, found = np.linalg.inv(matrix), []
+    inverse = np.linalg.inv(matrix)
+    found: list[Floats] = []
     for a in range(count):
         for b in range(count):
             v = np.array([a, b], dtype=float)
