@@ -3,7 +3,7 @@
 A cap is a flat or nearly flat region of faces, bounded by sharp folds all around, above whose rim nothing
 else of the surface rises. A closed prism has many such regions: its walls are some, too. Ends of a tube do
 not touch each other, and look in opposite directions; of several such pairs the upright one is taken, unless
-another is much longer.
+the mass lies: is much longer in another direction than in all others, as a bar is and a slab is not.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ ROUNDING = 1e-4
 OPPOSITE = 0.5
 #: A cap is upright whose normal is within 45° of the vertical.
 UPRIGHT = np.sqrt(0.5)
-#: Another pair is taken only if it is this many times longer than the upright one.
+#: Another pair is taken only if it is this many times longer than all others, the upright one included.
 LONGER = 2.5
 #: More flat regions than this make a faceted surface, not a mass with caps.
 MOST = 60
@@ -73,8 +73,8 @@ def caps_of(mesh: Triangles) -> tuple[list[Cap], str]:
         else:
             chosen = _opposite(mesh, found, loops[0])
     elif pairs:
-        best = max(pairs, key=_length)
-        if upright and _length(best) <= LONGER * _length(max(upright, key=_length)):
+        best, *others = sorted(pairs, key=_length, reverse=True)
+        if upright and any(_length(best) <= LONGER * _length(pair) for pair in others):
             best = max(upright, key=_length)
         chosen = list(best)
     else:
@@ -174,8 +174,13 @@ def _sentence(chosen: list[Cap], pairs: int) -> str:
         f"the {_side(cap.normal)} (around {_at(cap.centre)}, area {cap.area:.4g})" for cap in chosen
     )
     what = f"A flat cap at {places} was" if len(chosen) == 1 else f"Flat caps at {places} were"
-    others = f", one of {pairs} pairs of opposite flat sides" if pairs > 1 and len(chosen) == 2 else ""
-    return f'{what} taken off{others}; surface.caps "keep" leaves them on.'
+    if pairs > 1 and len(chosen) == 2:
+        return (
+            f"{what} taken off, one of {pairs} pairs of opposite flat sides. If another is meant, delete its "
+            'two faces (in Rhino: ExtractSrf); surface.caps "keep" leaves all of them on.'
+        )
+    them = "it" if len(chosen) == 1 else "them"
+    return f'{what} taken off; surface.caps "keep" leaves {them} on.'
 
 
 def _side(normal: Floats) -> str:

@@ -101,7 +101,14 @@ def test_a_closed_dome_loses_its_floor_and_stays_a_dome() -> None:
 
 @pytest.mark.parametrize(
     ("size", "axis"),
-    [((12.0, 9.0, 30.0), 2), ((12.0, 9.0, 8.0), 2), ((60.0, 9.0, 8.0), 0), ((9.0, 9.0, 9.0), 2)],
+    [
+        ((12.0, 9.0, 30.0), 2),
+        ((12.0, 9.0, 8.0), 2),
+        ((60.0, 9.0, 8.0), 0),
+        ((9.0, 9.0, 9.0), 2),
+        ((60.0, 40.0, 4.0), 2),  # a podium has walls, whatever its height
+        ((60.0, 4.0, 40.0), 2),
+    ],
 )
 def test_the_ends_of_a_box_are_below_and_above_unless_it_lies(
     size: tuple[float, float, float], axis: int
