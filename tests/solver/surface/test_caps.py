@@ -119,6 +119,27 @@ def test_the_ends_of_a_box_are_below_and_above_unless_it_lies(
     assert "one of 3 pairs" in surface.repairs[-1]
 
 
+def courtyard(height: float = 12.0) -> SentMesh:
+    """A closed block of 40 × 40 around a court of 20 × 20."""
+    square = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * 20.0
+    flat = np.concatenate([square, square / 2])
+    vertices = np.concatenate([np.column_stack([flat, np.full(8, z)]) for z in (0.0, height)])
+    k = np.arange(4)
+    j = (k + 1) % 4
+    outer, inner = np.stack([k, j, j + 8, k + 8], axis=1), np.stack([j + 4, k + 4, k + 12, j + 12], axis=1)
+    under, above = np.stack([j, k, k + 4, j + 4], axis=1), np.stack([k, j, j + 4, k + 4], axis=1) + 8
+    return SentMesh(vertices, Ragged.from_table(np.concatenate([outer, inner, under, above])))
+
+
+@pytest.mark.parametrize("height", [4.0, 12.0, 90.0])
+def test_a_block_around_a_courtyard_is_clad_outside(height: float) -> None:
+    """Closed, it has a handle; without its flat ends it is two tubes, and the outer one is the facade."""
+    surface = surface_from_mesh(courtyard(height))
+    assert len(surface.loops) == 2
+    assert surface.areas.sum() == pytest.approx(160 * height)
+    assert "walls of a courtyard around (0, 0," in surface.repairs[-1]
+
+
 def test_normals_at_the_ends_are_those_of_the_walls() -> None:
     surface = surface_from_brep(box(), SurfaceSettings(COARSE))
     assert np.abs(surface.normals[:, 2]).max() < 1e-9
