@@ -104,7 +104,7 @@ class Chart:
         self.area = vertex_areas(surface)
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             found = minimise(self.energy)
-        if not found.converged or found.broken:
+        if not found.converged or found.violating:
             raise ConvergenceError(
                 "With these singularities there is no map on the triangles of the surface as they are: send "
                 "a finer or more regular mesh, or ask for fewer singularities."
@@ -168,7 +168,7 @@ class Chart:
             seen = energy.corners(energy.scale_of(trial))
             new = energy.gradient(seen)
             after = float(np.abs(new).max())
-            good = after < residual and not seen.broken.any()
+            good = after < residual and not seen.violating.any()
             gain = after / max(residual, 1e-300)
             if good:
                 x, corners, gradient, residual = trial, seen, new, after
@@ -307,7 +307,7 @@ class Closing:
         cone = np.arange(len(kind)) < s
         self.divisor = np.where(cone, 1 - self.zeta**self.base.turn, 1.0)[self.kept]
 
-    def _depth(self, seen: Seen, factor: complex) -> Floats:
+    def depth(self, seen: Seen, factor: complex) -> Floats:
         """Of straight loops that are to be aligned, inwards."""
         if self.line is None:
             return np.zeros(0)
@@ -318,7 +318,7 @@ class Closing:
     def _values(self, seen: Seen, factor: complex) -> Floats:
         """All equations, real."""
         image = factor * seen.image[self.kept]
-        return np.concatenate([image.real, image.imag, self._depth(seen, factor)])
+        return np.concatenate([image.real, image.imag, self.depth(seen, factor)])
 
     def _jacobian(self) -> list[Seen]:
         """What is seen after a small change of each unknown."""
