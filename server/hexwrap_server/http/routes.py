@@ -285,10 +285,11 @@ async def _result(request: Request, job: Job, include: list[str] | None) -> Resp
     picked = "" if include is None else f"?include={','.join(include)}"
     headers = {"Content-Location": f"/v1/jobs/{job.id}/result{picked}"} | _timing(job)
     service = service_of(request)
-    if include is not None:
+    if include is None:
+        packed = await service.manager.result(job)
+    else:
         _is_solved(job)
-        return Response(await service.manager.parts(job, include, service.errand), 200, headers, JSON)
-    packed = await service.manager.result(job)
+        packed = await service.manager.parts(job, include, service.errand)
     if request.headers["accept-encoding"] == "gzip":  # as the middleware has found
         headers |= {"Content-Encoding": "gzip", "Vary": "Accept-Encoding"}
         return Response(packed, 200, headers, JSON)
