@@ -46,8 +46,9 @@ FLATNESS = (1e2, 1e4, 1e6, 1e8)
 USUAL = 3
 
 #: Most Gauss–Newton steps, and the fraction of its energy that a step takes away if another one is to follow
-#: in its stage: what is left undone, the next stage does along with its own work. The first has one step.
-MOST_STEPS, ENOUGH = 20, 0.35
+#: in its stage: what is left undone, the next stage does along with its own work. A heavier weight is no help
+#: where the planes are most of the energy; there it is less. The first stage has one step.
+MOST_STEPS, ENOUGH, LITTLE = 25, 0.35, 0.1
 
 #: The same where nothing is to become flat, and so nothing comes after.
 ONLY_STEPS, ONLY_ENOUGH = 15, 1e-4
@@ -167,7 +168,9 @@ def minimise_watertight(
         shortened = fraction < 1
         damping = max(TIGHTEN * damping, DAMPING * stages[stage]) if shortened else damping / EASE
         gain = 0.0 if found is None else 1 - found.energy / state.energy
-        if found is None or (gain < enough and not shortened) or (aims.flat and not stage):
+        bent = aims.flat and found is not None and found.planes > found.asked
+        tired = found is None or (gain < (LITTLE if bent else enough) and not shortened)
+        if tired or (aims.flat and not stage):
             stage += 1
             if stage == len(stages):
                 break
