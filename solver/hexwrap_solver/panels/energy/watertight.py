@@ -74,8 +74,9 @@ NUDGE = 0.03
 #: Cosine of the angle to the normal above which the way to the nearest point leads off a boundary.
 ASLANT = 0.7
 
-#: Newton's steps to the place whose interpolated normal leads to a point.
-PROJECTIONS, INSIDE = 3, 1e-9
+#: Newton's steps to the place whose interpolated normal leads to a point; barycentric coordinates below that
+#: lie outside a face, and normals whose cosine is less are not near each other.
+PROJECTIONS, INSIDE, ALIKE = 3, 1e-9, 0.8
 
 #: With the same derivatives at most so many corrections follow a step, as long as each leaves less than this
 #: fraction of the energy; and at most so many of Newton's steps follow each other.
@@ -368,18 +369,23 @@ def _beside(points: Floats, surface: Surface) -> tuple[Floats, Floats]:
     where the way back is not along normals, they are those from the nearest points.
     """
     nearest = surface.tree.nearest(points)
-    face, weight = nearest.face, nearest.barycentric
-    spoke = np.einsum("nc,ncd->nd", weight, points[:, None] - surface.vertices[surface.faces[face]])
-    weight, height, normal = _lifted(points, face, weight, surface)
-    beyond = np.abs(np.einsum("nd,nd->n", normal, spoke)) < ASLANT * nearest.distance
-    outside = np.flatnonzero((weight.min(axis=1) < -INSIDE) & ~beyond)
+    spoke = np.einsum(
+        "nc,ncd->nd", nearest.barycentric, points[:, None] - surface.vertices[surface.faces[nearest.face]]
+    )
+    normal = surface.normals_at(nearest.face, nearest.barycentric)
+    along = np.einsum("nd,nd->n", normal, spoke)
+    beyond = np.abs(along) < ASLANT * nearest.distance
+    weight, height, lifted = _lifted(points, nearest.face, nearest.barycentric, surface)
+    sound = ~beyond & (np.abs(height) < 2 * nearest.distance)
+    outside = np.flatnonzero(sound & (weight.min(axis=1) < -INSIDE))
     if len(outside):
-        down = points[outside] - height[outside, None] * normal[outside]
-        there = surface.tree.nearest(down)
-        _, height[outside], normal[outside] = _lifted(points[outside], there.face, there.barycentric, surface)
-    direction = spoke / np.maximum(nearest.distance, 1e-300)[:, None]
-    direction = np.where(beyond[:, None], direction, normal)
-    return np.where(beyond, nearest.distance, height), direction
+        down = surface.tree.nearest(points[outside] - height[outside, None] * lifted[outside])
+        _, height[outside], lifted[outside] = _lifted(points[outside], down.face, down.barycentric, surface)
+    # On coarse meshes normals may turn so much within a face that none of them leads to the point.
+    found = np.einsum("nd,nd->n", normal, lifted) > ALIKE
+    normal, along = np.where(found[:, None], lifted, normal), np.where(found, height, along)
+    direction = np.where(beyond[:, None], spoke / np.maximum(nearest.distance, 1e-300)[:, None], normal)
+    return np.where(beyond, nearest.distance, along), direction
 
 
 def _lifted(points: Floats, face: Ints, weight: Floats, surface: Surface) -> tuple[Floats, Floats, Floats]:
@@ -387,17 +393,18 @@ def _lifted(points: Floats, face: Ints, weight: Floats, surface: Surface) -> tup
     coordinates (n, 3), first guessed as weight, heights (n,) above them and unit normals (n, 3)."""
     vertex, normal = surface.vertices[surface.faces[face]], surface.normals[surface.faces[face]]
     height = np.zeros(len(points))
-    for _ in range(PROJECTIONS):
+    with np.errstate(all="ignore"):
+        for _ in range(PROJECTIONS):
+            mean = np.einsum("nc,ncd->nd", weight, normal)
+            lifted = vertex + height[:, None, None] * normal
+            miss = points - np.einsum("nc,ncd->nd", weight, lifted)
+            sides = lifted[:, 1:] - lifted[:, :1]
+            more = _solved(np.concatenate([sides, mean[:, None]], axis=1), miss)
+            weight = weight + np.concatenate([-more[:, :1] - more[:, 1:2], more[:, :2]], axis=1)
+            height = height + more[:, 2]
         mean = np.einsum("nc,ncd->nd", weight, normal)
-        lifted = vertex + height[:, None, None] * normal
-        miss = points - np.einsum("nc,ncd->nd", weight, lifted)
-        sides = lifted[:, 1:] - lifted[:, :1]
-        more = _solved(np.concatenate([sides, mean[:, None]], axis=1), miss)
-        weight = weight + np.concatenate([-more[:, :1] - more[:, 1:2], more[:, :2]], axis=1)
-        height = height + more[:, 2]
-    mean = np.einsum("nc,ncd->nd", weight, normal)
-    size = np.maximum(np.linalg.norm(mean, axis=1), np.finfo(float).tiny)
-    return weight, height * size, mean / size[:, None]
+        size = np.maximum(np.linalg.norm(mean, axis=1), np.finfo(float).tiny)
+        return weight, height * size, mean / size[:, None]
 
 
 def _solved(rows: Floats, right: Floats) -> Floats:
