@@ -148,6 +148,14 @@ def _isometric(
     return replace(second, notes=notes)
 
 
+def map_of_curvatures(surface: Surface, curvature: Floats, progress: Progress = no_progress) -> ConformalMap:
+    """The map with u constant along every loop, whose curvature is prescribed, (b,) radians; that of the
+    first is what Gauss–Bonnet leaves. Raises ConvergenceError."""
+    targets = boundary.targets(surface, [float(K) for K in curvature])
+    found = map_to(surface, targets, Cones.none(), None, progress)
+    return scaled(found, -_mean_on_area(found.surface, found.log_scale))
+
+
 def _rim_notes(found: ConformalMap, loops: list[int]) -> tuple[str, ...]:
     """How far edges of isometric loops are from their length, where flips have taken other edges for them."""
     if not found.flips:
