@@ -58,16 +58,18 @@ class Load:
             size = self._chance.choice([12, 12, 24, 120])
             body = {"surface": tube(size, size // 2, height=10 + i % 7), "pattern": {"around": 8 + i % 5}}
             with contextlib.suppress(httpx.TransportError):
-                answer = httpx.post(f"{self._base}/v1/jobs", json=body, trust_env=False, verify=False, timeout=PATIENCE)
+                answer = httpx.post(
+                    f"{self._base}/v1/jobs", json=body, trust_env=False, verify=False, timeout=PATIENCE
+                )
                 if answer.status_code == 202:
                     self.accepted.append(answer.json()["id"])
 
     def _look(self) -> None:
         while not self._over.wait(0.1):
             with contextlib.suppress(httpx.TransportError):
-                for job in httpx.get(f"{self._base}/v1/jobs", trust_env=False, verify=False, timeout=PATIENCE).json()[
-                    "jobs"
-                ]:
+                for job in httpx.get(
+                    f"{self._base}/v1/jobs", trust_env=False, verify=False, timeout=PATIENCE
+                ).json()["jobs"]:
                     if job["status"] == "done" and job["id"] not in self.done:
                         self.done[job["id"]] = fingerprint(self._base, job["id"])
 

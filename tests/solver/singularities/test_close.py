@@ -113,7 +113,7 @@ def test_a_straight_loop_becomes_a_lattice_line(line):
     _, newton = closing(shapes.waist(), ("straight", "free"), 300, 2, line=line)
     closed = newton.solve()
     assert closed.residual <= 1e-9
-    depth = newton._depth(closed.seen.holonomy, closed.factor)
+    depth = newton.depth(closed.seen.holonomy, closed.factor)
     rows = (depth - line.first) / line.period
     assert np.abs(rows - np.rint(rows)).max() < 1e-8
     number = as_complex(closed.motion[-2], 6) / line.step
