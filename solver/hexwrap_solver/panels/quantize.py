@@ -94,10 +94,11 @@ def quantize(fitted: FittedPanels, settings: PanelSettings, curve: TradeOff | No
         pick = min(range(len(lengths)), key=lambda k: _loss(fitted, lengths[k], smallest, settings))
     fitted, length = choices[pick], lengths[pick]
     sides = fitted.spokes.lengths
+    lengths_used, which = np.unique(length, return_inverse=True)
     classes, member, class_count = np.unique(
-        np.stack([-sides, length]), axis=1, return_inverse=True, return_counts=True
+        which - sides * len(lengths_used), return_inverse=True, return_counts=True
     )
-    class_length, member = classes[1], member.ravel()
+    class_length = lengths_used[classes % max(len(lengths_used), 1)]
     edge_length = fitted.limit.copy()
     edge_length[regular] = length
     size = np.full(len(fitted.face), -1, dtype=np.int64)

@@ -16,7 +16,7 @@ from hexwrap_solver.pattern import lay_pattern
 from hexwrap_solver.pattern.lattice import LATTICES
 from hexwrap_solver.pattern.place.choose import place_lattice
 from hexwrap_solver.pattern.place.joint import Joint
-from hexwrap_solver.pattern.place.motions import fixed_point, motions_of, word_around
+from hexwrap_solver.pattern.place.motions import fixed_point, holonomy_of, word_around
 from hexwrap_solver.pattern.types import Pattern, PatternSettings
 from hexwrap_solver.surface.topology import next_half_edge
 from hexwrap_solver.surface.types import Surface
@@ -124,7 +124,7 @@ def test_motions_compose_to_the_rotation_around_every_loop_and_singularity(
 def test_no_other_rounding_changes_the_domain_less(loops: int, index: tuple[int, ...]) -> None:
     """Against neighbours in all directions."""
     cmap, lattice = both(loops, index, "hex")[0], LATTICES["hex"]
-    joint = Joint.of(cmap, lattice, motions_of(cmap, lattice, cmap.net))
+    joint = Joint.of(cmap, lattice, holonomy_of(cmap, lattice, cmap.net))
     rng = np.random.default_rng(0)
     for A in rng.uniform(3, 6, 5) * np.exp(1j * rng.uniform(0, 1, 5)):
         for family, (_, steps, _) in enumerate(joint.families):

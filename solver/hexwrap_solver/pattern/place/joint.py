@@ -19,7 +19,7 @@ from hexwrap_solver.linalg.integers import NearestIntegers, integer_solutions
 from hexwrap_solver.pattern.lattice import Lattice
 from hexwrap_solver.pattern.place.deform import SIZE, System
 from hexwrap_solver.pattern.place.glued import Glued, around_vertices
-from hexwrap_solver.pattern.place.motions import Motions, pin_cones
+from hexwrap_solver.pattern.place.motions import Holonomy, pin_cones
 
 
 @dataclass(frozen=True)
@@ -29,12 +29,12 @@ class Joint:
     a change of x."""
 
     lattice: Lattice
-    motions: Motions
+    motions: Holonomy
     form: Floats
     families: list[tuple[Ints, Ints, NearestIntegers]]
 
     @classmethod
-    def of(cls, cmap: ConformalMap, lattice: Lattice, motions: Motions, along: Ints | None = None) -> Joint:
+    def of(cls, cmap: ConformalMap, lattice: Lattice, motions: Holonomy, along: Ints | None = None) -> Joint:
         """along: (t, 2) of which translations must be multiples, 0 where they need not. There is no family
         where not all singularities can stand at centres."""
         form = _form(cmap, lattice, motions)
@@ -78,7 +78,7 @@ class Joint:
         return _rows(self.lattice, self.motions, x)
 
 
-def _rows(lattice: Lattice, motions: Motions, x: Ints) -> Ints:
+def _rows(lattice: Lattice, motions: Holonomy, x: Ints) -> Ints:
     lead = motions.lead
     rows = np.zeros((len(motions.turn), 4), dtype=np.int64)
     rows[:, 0] = motions.turn
@@ -87,7 +87,7 @@ def _rows(lattice: Lattice, motions: Motions, x: Ints) -> Ints:
     return rows
 
 
-def _form(cmap: ConformalMap, lattice: Lattice, motions: Motions) -> Floats:
+def _form(cmap: ConformalMap, lattice: Lattice, motions: Holonomy) -> Floats:
     """The least energy of deformations, from the answers to one unit of each generator's translation."""
     lead, n = motions.lead, len(cmap.surface.vertices)
     shifts, fixed, system = [], [], None
@@ -114,7 +114,7 @@ def _form(cmap: ConformalMap, lattice: Lattice, motions: Motions) -> Floats:
     return np.asarray((form + form.T) / 2)
 
 
-def _families(lattice: Lattice, motions: Motions, along: Ints | None) -> list[tuple[Ints, Ints]]:
+def _families(lattice: Lattice, motions: Holonomy, along: Ints | None) -> list[tuple[Ints, Ints]]:
     """The translations that fulfil all equations. Moving the origin by a translation v of the tiling changes
     those of motions that turn by (1 − ζ^r)v and nothing else: one of these is kept to a family each of the
     residues modulo 1 − ζ^r, so that what differs by this only counts once."""
@@ -165,7 +165,7 @@ def _families(lattice: Lattice, motions: Motions, along: Ints | None) -> list[tu
     return found
 
 
-def _of_word(lattice: Lattice, motions: Motions, word: Ints) -> Ints:
+def _of_word(lattice: Lattice, motions: Holonomy, word: Ints) -> Ints:
     """(2, 2p) the translation of a product of motions, from those of the generators."""
     lead, mate = motions.lead, motions.mate
     total, turned = np.zeros((2, 2 * len(lead)), dtype=np.int64), 0

@@ -19,8 +19,8 @@ from hexwrap_solver.pattern.place.placement import NEARLY, PARTS, quantum_name
 
 
 @dataclass(frozen=True)
-class Motions:
-    """What the motions of a net must fulfil.
+class Holonomy:
+    """The motions that generate the holonomy of a net, and what they must fulfil.
 
     turn: (t,) rotations in steps of ζ. mate: (t,) the inverse of each. words: per singularity, then per
     vertex at which three or more pieces of the cut meet, the motions met on the way around it. index: (c,) of
@@ -40,7 +40,7 @@ class Motions:
         return every[every < self.mate]
 
 
-def motions_of(cmap: ConformalMap, lattice: Lattice, net: Net) -> Motions:
+def holonomy_of(cmap: ConformalMap, lattice: Lattice, net: Net) -> Holonomy:
     """Raises NotAdaptedError where a motion turns by no multiple of the quantum."""
     faces, twin = cmap.surface.faces, cmap.surface.twin
     steps, own = net.angle / lattice.step_angle, lattice.order // lattice.fold
@@ -68,7 +68,7 @@ def motions_of(cmap: ConformalMap, lattice: Lattice, net: Net) -> Motions:
     words = [
         word_around(net, twin, int(starts[v])) for v in [*cmap.cones.vertex.tolist(), *branching.tolist()]
     ]
-    return Motions(turn, net.inverse, net.translation, words, cmap.cones.index)
+    return Holonomy(turn, net.inverse, net.translation, words, cmap.cones.index)
 
 
 def word_around(net: Net, twin: Ints, corner: int) -> Ints:

@@ -3,10 +3,10 @@
 A similarity W = A·z + B turns a motion z ↦ ρz + t into W ↦ ρW + (A t + (1 − ρ) B). On the lattice ρ must be a
 power of ζ and the translation one of the tiling. They are rounded jointly (``joint``), so that the motions
 still fulfil what ties them together (``motions``), and so that the domain changes least. That change is made
-up for by the least deformation (``deform``), which is told as distortion; nothing is left over where the
-singularities were moved beforehand until all motions are exact.
-Where a uniform stretch was needed for that, the lattice lies on the chart of the stretched surface, whose
-faces are the domain's, and the stretch is the distortion.
+up for by the least deformation (``deform``), which is reported as distortion; nothing is left over where the
+singularities were moved beforehand until all motions are exact. Where a uniform stretch was needed for that,
+the lattice lies on the chart of the stretched surface, whose faces are the domain's, and the stretch is the
+distortion.
 
 Loops that are polygons of quantized corners, as the frames of doors and windows, or closed straight lines,
 may be asked to lie on lattice lines (``polygons``). The place of the lattice is chosen so that they are near
@@ -28,7 +28,7 @@ from hexwrap_solver.pattern.place.cone import boundary_direction
 from hexwrap_solver.pattern.place.deform import System, deform, distortion_of
 from hexwrap_solver.pattern.place.glued import Glued, around_vertices
 from hexwrap_solver.pattern.place.joint import Joint
-from hexwrap_solver.pattern.place.motions import Motions, motions_of, pin_cones
+from hexwrap_solver.pattern.place.motions import Holonomy, holonomy_of, pin_cones
 from hexwrap_solver.pattern.place.placement import (
     BEARABLE,
     NEARLY,
@@ -73,13 +73,13 @@ def place_on_net(
     cost = f"distort cells by {aligned.distortion:.2f}, more than {BEARABLE:g}"
     if not np.isfinite(aligned.distortion):
         cost = "fold the layout over"
-    told = f"To align {names} at this size would {cost}: smaller cells, or corners elsewhere, fit better."
+    sentence = f"To align {names} at this size would {cost}: smaller cells, or corners elsewhere, fit better."
     ends = [loop for loop in polygons.loops if loop < 2]
     if ends and len(ends) < len(polygons.loops):
         fewer = place_on_net(cmap, lattice, settings, ends)
     else:
         fewer = _placed(cmap, lattice, settings, None)
-    return replace(fewer, notes=(told, *fewer.notes))
+    return replace(fewer, notes=(sentence, *fewer.notes))
 
 
 def _placed(
@@ -87,7 +87,7 @@ def _placed(
 ) -> Placement:
     net, faces = cmap.net, cmap.surface.faces
     fitted = _on_fitted(cmap, lattice)
-    motions = motions_of(cmap, lattice, net)
+    motions = holonomy_of(cmap, lattice, net)
     angle = edge_angle(lattice, settings)
     scale = lattice.edge / wanted_edge(cmap, lattice, settings, angle)
     along = boundary_direction(cmap, lattice, anchor_vertex(cmap))
@@ -185,7 +185,7 @@ def _on_fitted(
     net = cmap.net if fitted.chart is None else fitted.chart
     e1 = complex(lattice.position(lattice.basis[0]))
     A, B = e1 * fitted.factor, e1 * fitted.shift + complex(lattice.position(np.array(lattice.centre)))
-    motions = motions_of(cmap, lattice, net)
+    motions = holonomy_of(cmap, lattice, net)
     rows = np.zeros((len(motions.turn), 4), dtype=np.int64)
     rows[:, 0] = motions.turn
     wanted = A * motions.translation + B * (1 - lattice.turns[motions.turn])
@@ -198,7 +198,7 @@ def _choices(
     cmap: ConformalMap,
     lattice: Lattice,
     settings: PatternSettings,
-    motions: Motions,
+    motions: Holonomy,
     factor: complex,
     phase: complex,
     alignment: Alignment | None,
@@ -238,7 +238,7 @@ def _choices(
 def _shifts(
     cmap: ConformalMap,
     lattice: Lattice,
-    motions: Motions,
+    motions: Holonomy,
     rows: Ints,
     A: complex,
     phase: complex,
