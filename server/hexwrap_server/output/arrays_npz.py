@@ -11,6 +11,7 @@ from hexwrap_server.output.meta import Meta
 from hexwrap_solver.arrays import Complexes, Floats, Ragged
 from hexwrap_solver.conformal.net import Net
 from hexwrap_solver.conformal.types import ConformalMap
+from hexwrap_solver.panels.folds import bend_angles, hinges_of
 from hexwrap_solver.panels.types import Components, Panels, Support
 from hexwrap_solver.pattern.types import Pattern
 from hexwrap_solver.pipeline import Solution
@@ -105,6 +106,7 @@ def _panels(panels: Panels) -> Arrays:
         for key in ("face", "size", "edge_length", "limit", "center", "normal", "whole")
     }
     arrays |= {"sizes.edge_length": panels.class_length, "sizes.count": panels.class_count}
+    arrays |= {"panels.bend": hinges_of(panels), "panels.bend_angle": bend_angles(panels)}
     if panels.energy is not None:
         arrays["panels.energy"] = panels.energy
     return arrays | _ragged("panels.polygons", panels.polygons)

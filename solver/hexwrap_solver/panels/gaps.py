@@ -8,7 +8,7 @@ import numpy as np
 
 from hexwrap_solver.arrays import Floats
 from hexwrap_solver.geometry import angles_between, dot
-from hexwrap_solver.panels.facing import edge_ends, facing_edges, mean_normals, widths
+from hexwrap_solver.panels.facing import edge_ends, facing_edges, widths
 from hexwrap_solver.panels.halfedges import HalfEdges
 from hexwrap_solver.panels.types import Panels
 from hexwrap_solver.pattern.types import Pattern
@@ -30,14 +30,18 @@ class Gaps:
 
 def gaps(pattern: Pattern, edges: HalfEdges, panels: Panels) -> Gaps:
     """Facing edges are those that came from the same edge of the pattern."""
-    facing = facing_edges(edges, pattern.faces.offsets[:-1], panels.face)
+    panel = np.full(pattern.n_cells, -1, dtype=np.int64)
+    panel[panels.face] = np.arange(panels.n_panels)
+    normal = np.zeros((pattern.n_cells, 3))
+    normal[panels.face] = panels.normal
+    corner = np.arange(len(edges.cell)) - pattern.faces.offsets[edges.cell]
+    facing = facing_edges(edges, panel, corner, normal)
     a, b = edge_ends(panels.polygons, facing.left, facing.start_left)
     c, d = edge_ends(panels.polygons, facing.right, facing.start_right)
     n1, n2 = panels.normal[facing.left], panels.normal[facing.right]
-    mean = mean_normals(facing, panels.normal)
     figures = (
-        widths(panels.polygons, facing, mean),
-        np.abs(dot((c + d - a - b) / 2, mean)),
+        widths(panels.polygons, facing),
+        np.abs(dot((c + d - a - b) / 2, facing.mean)),
         angles_between(n1, n2),
     )
     result = np.full((3, len(edges.cell)), np.nan)

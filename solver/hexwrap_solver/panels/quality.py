@@ -11,6 +11,7 @@ from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.geometry import dot
 from hexwrap_solver.panels.congruence import congruence_classes
 from hexwrap_solver.panels.fewest import SLACK
+from hexwrap_solver.panels.folds import parts_by_cell
 from hexwrap_solver.panels.gaps import gaps
 from hexwrap_solver.panels.halfedges import HalfEdges, half_edges
 from hexwrap_solver.panels.overlap import overlapping_pairs
@@ -49,27 +50,36 @@ def measure(
     progress(0.1, "measuring panels")
     polygons, cell_area = panels.polygons, float(fan_areas(pattern.cells).sum())
     edges = half_edges(pattern)
-    between = gaps(pattern, edges, panels)
+    parts, owner = parts_by_cell(panels)
+    between = gaps(pattern, edges, parts)
     angle = interior_angles(polygons, panels.normal)
+    part_angle = interior_angles(parts.polygons, parts.normal)
     row, count, mean = polygons.row, polygons.lengths, mean_edges(polygons)
     ideal = _ideal_angles(pattern, panels, angle, (np.pi * (count - 2) / count)[row])
     progress(0.5, "distances to the surface")
-    away = _surface_distances(cmap.surface, pattern, panels)
+    away = _surface_distances(cmap.surface, pattern, parts)
+
+    def worst(measured: Floats) -> Floats:
+        """(q,) of the parts of each panel."""
+        return np.asarray(np.maximum.reduceat(measured, np.flatnonzero(np.diff(owner, prepend=-1))))
+
+    bent = row_maxima(np.abs(best_plane_distances(parts.polygons)), parts.polygons.offsets)
+    hollow = ~convex(parts.polygons, part_angle)
     progress(0.9, "looking for overlaps")
     return replace(
         quality,
-        planarity=row_maxima(np.abs(best_plane_distances(polygons)), polygons.offsets) / mean,
+        planarity=worst(bent) / mean,
         edge_deviation=row_maxima(np.abs(edge_lengths(polygons) - mean[row]), polygons.offsets) / mean,
         angle_deviation=row_maxima(np.abs(angle - ideal), polygons.offsets),
-        surface_distance=away,
+        surface_distance=worst(away),
         gap_tangential=between.tangential,
         gap_normal=between.normal,
         kink=between.kink,
-        gaps_over=_count_wide(edges, panels, between.tangential),
-        convex=convex(polygons, angle),
+        gaps_over=_count_wide(edges, parts, between.tangential),
+        convex=~worst(hollow.astype(np.float64)).astype(bool),
         congruence=congruence_classes(polygons, angle),
-        overlaps=_count_overlaps(pattern, edges, panels),
-        coverage=float(fan_areas(polygons).sum()) / cell_area,
+        overlaps=_count_overlaps(pattern, edges, parts),
+        coverage=float(fan_areas(parts.polygons).sum()) / cell_area,
         movement=_movement(pattern, panels),
         notes=quality.notes + _bare_note(pattern, cell_area / float(area.sum())),
     )
