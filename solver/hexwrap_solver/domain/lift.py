@@ -10,7 +10,6 @@ from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.domain.interpolate import surface_weights
 from hexwrap_solver.domain.locate import find_places
-from hexwrap_solver.geometry import normalize
 
 #: No domain reaches so far; larger coordinates would overflow on the way.
 BEYOND = 1e300
@@ -53,5 +52,4 @@ def points_at(cmap: ConformalMap, face: Ints, weights: Floats) -> tuple[Floats, 
     surface = cmap.surface
     corners = surface.faces[face]
     points = np.einsum("kc,kcd->kd", weights, surface.vertices[corners])
-    normals = np.einsum("kc,kcd->kd", weights, surface.normals[corners])
-    return points, normalize(normals)
+    return points, surface.normals_at(face, weights)

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from hexwrap_solver.arrays import Floats
-from hexwrap_solver.geometry import normalize
 from hexwrap_solver.surface.normals import with_tangents
 from hexwrap_solver.surface.projection import project, start_parameters
 from hexwrap_solver.surface.types import Surface
@@ -17,10 +14,9 @@ def surface_normals(surface: Surface, points: Floats) -> Floats:
     From the tangents of the NURBS surface where there is one, else interpolated between the mesh's normals.
     """
     nearest = surface.tree.nearest(points)
-    corners = surface.normals[surface.faces[nearest.face]]
-    interpolated = np.einsum("kc,kcd->kd", nearest.barycentric, corners)
+    interpolated = surface.normals_at(nearest.face, nearest.barycentric)
     if surface.nurbs is None:
-        return normalize(interpolated)
+        return interpolated
     start = start_parameters(surface, nearest.face, nearest.barycentric)
     _, _, exact = project(surface.nurbs, points, start)
     return with_tangents(exact, interpolated)

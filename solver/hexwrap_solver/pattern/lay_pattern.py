@@ -16,6 +16,7 @@ from hexwrap_solver.domain.interpolate import surface_weights
 from hexwrap_solver.domain.lift import points_at
 from hexwrap_solver.domain.locate import barycentric
 from hexwrap_solver.errors import PatternError
+from hexwrap_solver.geometry import dot
 from hexwrap_solver.pattern.along import on_features, told
 from hexwrap_solver.pattern.lattice import LATTICES, Lattice
 from hexwrap_solver.pattern.lay.cells import (
@@ -227,16 +228,20 @@ def _finish(
     layout: Layout,
     cut: Trimmed,
 ) -> Pattern:
-    keep, narrow = _usable(cut.cells, placement.narrows or cut.seams is not None)
+    triangle, place = cut.points.face, cut.points.place
+    weights = barycentric(layout.corners[triangle], place)
+    on_surface = surface_weights(cmap, triangle, weights)
+    vertices, normals = _on_input_surface(cmap, triangle, on_surface)
+    outward = faces_outward(cut.cells.corner, vertices, normals)
+    folded = int(np.count_nonzero(~outward))
+    keep, narrow = _usable(cut.cells, outward, placement.narrows or cut.seams is not None)
     if not keep.any():
         raise _too_coarse(cmap, settings, placement)
     cells, whole = cut.cells.part(keep), cut.whole[keep]
     corner, point = manifold_corners(cells)
-    triangle, place = cut.points.face[point], cut.points.place[point]
-    weights = barycentric(layout.corners[triangle], place)
+    triangle, place, weights = triangle[point], place[point], weights[point]
+    on_surface, vertices, normals = on_surface[point], vertices[point], normals[point]
     uv = (weights * cmap.corners()[triangle]).sum(axis=1)
-    on_surface = surface_weights(cmap, triangle, weights)
-    vertices, normals = _on_input_surface(cmap, triangle, on_surface)
     faces, neighbours = Ragged(corner, cells.corner.offsets), cells.neighbours()
     net = cmap.kind == "net"
     if net:
@@ -275,7 +280,7 @@ def _finish(
         notes=(
             *placement.notes,
             *told(features),
-            *_told(cut, narrow, int(np.count_nonzero(~keep)) - narrow),
+            *_told(cut, narrow, folded, int(np.count_nonzero(~keep)) - narrow - folded),
         ),
         features=features,
         pieces=fold_pieces(layout.lattice, features, cells, corner, beside, whole) if features else None,
@@ -315,11 +320,21 @@ def _corners(
     return z
 
 
-def _usable(cells: Cells, narrows: bool) -> tuple[Bools, int]:
-    """(c,) the largest part without cells that no mesh of shared vertices can tell apart, and how many these
-    are. narrows: towards one end fewer go around, and those left out may be the few there; none are usable
-    otherwise."""
-    keep = np.ones(cells.n, dtype=bool)
+def faces_outward(corner: Ragged, points: Floats, normals: Floats) -> Bools:
+    """(c,) cells that run counter-clockwise seen from outside. Where the surface folds back within one, it
+    may have no side that looks there. points, normals: (p, 3)."""
+    at = corner.values.astype(np.int64)
+    first = points[at[corner.offsets[:-1]]][corner.row]
+    area = np.cross(points[at] - first, points[at[corner.next()]] - first)
+    area, side = (np.add.reduceat(x, corner.offsets[:-1], axis=0) for x in (area, normals[at]))
+    return np.asarray(dot(area, side) > 0)
+
+
+def _usable(cells: Cells, outward: Bools, narrows: bool) -> tuple[Bools, int]:
+    """(c,) the largest part of the outward cells (c,) without those that no mesh of shared vertices can tell
+    apart, and how many these are. narrows: towards one end fewer go around, and those left out may be the few
+    there; none are usable otherwise."""
+    keep = outward.copy()
     narrow = 0
     while keep.any():
         members = np.flatnonzero(keep)
@@ -335,7 +350,7 @@ def _usable(cells: Cells, narrows: bool) -> tuple[Bools, int]:
     return keep, narrow
 
 
-def _told(cut: Trimmed, narrow: int, apart: int) -> list[str]:
+def _told(cut: Trimmed, narrow: int, folded: int, apart: int) -> list[str]:
     notes = []
     if cut.joined:
         notes.append(f"{cut.joined} slivers at the boundary were joined to the cut cell beside them.")
@@ -354,6 +369,11 @@ def _told(cut: Trimmed, narrow: int, apart: int) -> list[str]:
         notes.append(
             f"{cut.holed} cells were left out because an opening lies inside them; smaller cells would go "
             "around it."
+        )
+    if folded:
+        notes.append(
+            f"{folded} cells were left out because the surface folds back within them; smaller cells would "
+            "follow it."
         )
     if apart:
         notes.append(f"{apart} cells share no edge with the rest of the pattern and were left out.")

@@ -10,11 +10,13 @@ import numpy as np
 
 from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged
 from hexwrap_solver.errors import SettingError
-from hexwrap_solver.geometry import face_areas
+from hexwrap_solver.geometry import dot, face_areas, face_normals, normalize
 from hexwrap_solver.setting import Setting
 from hexwrap_solver.surface.closest import TriangleTree
 from hexwrap_solver.surface.topology import edge_groups, edge_lengths, half_edges, twins_of
 
+#: Least cosine of the angle between the normal at a place and that of the triangle it lies in.
+STEEPEST = 0.17
 #: Of all drawn lines together.
 MOST_POINTS = 20_000
 
@@ -256,6 +258,19 @@ class Surface(Triangles):
     def boundary(self) -> Ints:
         """(b,) the vertices of all loops."""
         return np.concatenate([np.zeros(0, dtype=np.int64), *self.loops])
+
+    def normals_at(self, face: Ints, weights: Floats) -> Floats:
+        """(k, 3) unit normals on the outside at barycentric coordinates (k, 3) of faces (k,): interpolated
+        between those of the vertices, and nowhere steeper than ``STEEPEST`` to the face itself, as they would
+        be beside edges where a coarse mesh folds back."""
+        corner = self.faces[face]
+        normal = normalize(np.einsum("kc,kcd->kd", weights, self.normals[corner]))
+        own = normalize(face_normals(self.vertices, corner))
+        rise = dot(normal, own)
+        low = np.flatnonzero((rise < STEEPEST) & own.any(axis=1))
+        along = normalize(normal[low] - rise[low, None] * own[low])
+        normal[low] = normalize(STEEPEST * own[low] + np.sqrt(1 - STEEPEST**2) * along)
+        return normal
 
     @cached_property
     def tree(self) -> TriangleTree:

@@ -13,16 +13,21 @@ import numpy as np
 import pytest
 
 from hexwrap_solver.arrays import Ragged
+from hexwrap_solver.conformal import conformal_map
 from hexwrap_solver.conformal.net import Net
-from hexwrap_solver.conformal.types import ConformalMap
+from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap
 from hexwrap_solver.domain import flatten, lift
 from hexwrap_solver.errors import NotAdaptedError
+from hexwrap_solver.geometry import face_normals, normalize
 from hexwrap_solver.pattern import lay_pattern
 from hexwrap_solver.pattern.lattice import LATTICES
 from hexwrap_solver.pattern.place.choose import place_lattice
 from hexwrap_solver.pattern.types import Pattern, PatternSettings
+from hexwrap_solver.surface import surface_from_mesh
 from hexwrap_solver.surface.topology import next_half_edge
+from hexwrap_solver.surface.types import STEEPEST
 from tests.solver.pattern import annuli, nets
+from tests.solver.pattern.folded import grid
 
 SIDES = {"hex": 6, "triangle": 3, "quad": 4}
 DEGREE = {"hex": 3, "triangle": 6, "quad": 4}
@@ -267,6 +272,31 @@ def test_a_cell_around_a_small_opening_is_left_out_and_told(boundary):
         else:
             assert euler(pattern) <= -1
     assert told or boundary == "trim"
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_on_coarse_meshes_that_fold_back_every_cell_looks_outward(seed):
+    """Triangles larger than cells, at vertices whose normals look away from some of them."""
+    rng = np.random.default_rng(seed)
+    turn, height = np.meshgrid(np.arange(9) * 2 * np.pi / 9, np.arange(7.0))
+    radius = rng.uniform(1.0, 4.0, turn.shape)
+    rings = np.stack([radius * np.cos(turn), radius * np.sin(turn), 2 * height], axis=2)
+    surface = surface_from_mesh(grid(rings + rng.normal(0, 0.5, rings.shape)))
+    own = normalize(face_normals(surface.vertices, surface.faces))
+    middle = np.full((len(own), 3), 1 / 3)
+    every = surface.normals_at(np.repeat(np.arange(len(own)), 3), np.tile(np.eye(3), (len(own), 1)))
+    rise = np.einsum("kd,kd->k", every, np.repeat(own, 3, axis=0))
+    at_vertices = np.einsum("mcd,md->mc", surface.normals[surface.faces], own).ravel()
+    assert at_vertices.min() < 0
+    assert rise.min() >= STEEPEST - 1e-12
+    np.testing.assert_allclose(rise[at_vertices > STEEPEST], at_vertices[at_vertices > STEEPEST])
+    assert (np.einsum("kd,kd->k", surface.normals_at(np.arange(len(own)), middle), own) > 0).all()
+    pattern = lay_pattern(conformal_map(surface, BoundaryCondition("straight")), PatternSettings(around=60))
+    area = area_vectors(pattern.vertices, pattern.faces)
+    corner = pattern.faces.values
+    side = np.add.reduceat(pattern.normals[corner], pattern.faces.offsets[:-1], axis=0)
+    assert (np.einsum("kd,kd->k", area, side) > 0).all()
+    assert pattern.n_cells > 1000
 
 
 def test_a_quantum_that_does_not_suit_the_pattern_is_refused():

@@ -314,8 +314,7 @@ def _beside(points: Floats, surface: Surface) -> tuple[Floats, Floats]:
     nearest = surface.tree.nearest(points)
     face = surface.faces[nearest.face]
     spoke = np.einsum("nc,ncd->nd", nearest.barycentric, points[:, None] - surface.vertices[face])
-    normal = np.einsum("nc,ncd->nd", nearest.barycentric, surface.normals[face])
-    normal /= np.maximum(np.linalg.norm(normal, axis=1), np.finfo(float).tiny)[:, None]
+    normal = surface.normals_at(nearest.face, nearest.barycentric)
     along = np.einsum("nd,nd->n", normal, spoke)
     beyond = np.abs(along) < ASLANT * nearest.distance
     direction = np.where(beyond[:, None], spoke / np.maximum(nearest.distance, 1e-300)[:, None], normal)
