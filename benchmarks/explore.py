@@ -1,16 +1,21 @@
 """What explorations foresee against what is measured, on all samples; and one exploration, timed.
 
-    python benchmarks/explore.py [SAMPLE …]            the table
+    python benchmarks/explore.py [--write] [SAMPLE …]  the table
     python benchmarks/explore.py --run [SAMPLE]        an exploration of 200 variants on two processes
+    python benchmarks/explore.py --same [SAMPLE]       ten explorations of 20 variants with the same seed
 
 Foreseen / measured: the part of the cells that is left uncovered, per cent. Samples with their own pattern,
-under each boundary condition that they can have.
+under each boundary condition that they can have. ``--write`` puts the table into docs/results.md.
 """
 
 from __future__ import annotations
 
-import sys
+import argparse
 import time
+from pathlib import Path
+from typing import Any
+
+import orjson
 
 from hexwrap_server import samples
 from hexwrap_server.cli.explore import explore_here
@@ -22,25 +27,53 @@ from hexwrap_solver.conformal import conformal_map
 from hexwrap_solver.conformal.types import BoundaryCondition
 from hexwrap_solver.errors import HexwrapError
 from hexwrap_solver.explore.predict import outlook
-from hexwrap_solver.panels import fit_panels, measure, quantize
+from hexwrap_solver.panels import fit_panels, quantize
+from hexwrap_solver.panels.polygons import fan_areas
 from hexwrap_solver.panels.types import PanelSettings
 from hexwrap_solver.pattern import lay_pattern
+from hexwrap_solver.pattern.types import PatternSettings
+from hexwrap_solver.surface.types import Surface
 
-SIZES = (3, 6, 11, None)
+SIZES = (1, 2, 3, 4, 6, 8, 11, None)
+PAGE = Path(__file__).resolve().parents[1] / "docs" / "results.md"
+BEGIN, END = "<!-- explore: made by its benchmark -->", "<!-- end of explore -->"
 
 
-def main(names: list[str]) -> None:
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("samples", nargs="*", metavar="SAMPLE")
+    parser.add_argument("--write", action="store_true", help="write the table into docs/results.md")
+    parser.add_argument("--run", action="store_true", help="explore the first sample, or the tower")
+    parser.add_argument("--same", action="store_true", help="explore it ten times with the same seed")
+    asked = parser.parse_args()
+    if asked.run or asked.same:
+        (run if asked.run else same)((asked.samples or ["tower"])[0])
+        return
+    worst = 0.0
     columns = ("sample", "ends", "cells", *(f"{k or 'own'} sizes" for k in SIZES), "s")
-    print("| " + " | ".join(columns) + " |\n" + "|---" * len(columns) + "|")
-    for name in names:
+    table = ["| " + " | ".join(columns) + " |", "| --- " * len(columns) + "|"]
+    print("\n".join(table))
+    for name in asked.samples or samples.names():
         request = parse_request(samples.load(name), 10**7, 10**6)
         assert isinstance(request.surface, SentSurface)
         surface = take_in(request.surface, request.wanted.surface)
         for mode in ("straight", "isometric"):
-            print_row(name, surface, mode, request.wanted.pattern)
+            found = row(name, surface, mode, request.wanted.pattern)
+            if found is not None:
+                worst = max(worst, found[1])
+                table.append(found[0])
+                print(found[0], flush=True)
+    print(f"The greatest difference: {worst:.2f}")
+    if asked.write:
+        text = f"\n{chr(10).join(table)}\n\nThe greatest difference is {worst:.2f} per cent of the area.\n"
+        before, rest = PAGE.read_text(encoding="utf-8").split(BEGIN)
+        PAGE.write_text(f"{before}{BEGIN}{text}{END}{rest.split(END)[1]}", encoding="utf-8")
 
 
-def print_row(name, surface, mode, pattern) -> None:  # type: ignore[no-untyped-def]
+def row(name: str, surface: Surface, mode: str, pattern: PatternSettings) -> tuple[str, float] | None:
+    """A line of the table and its greatest difference; None where there is no such condition, as on disks."""
     try:
         cmap = conformal_map(surface, BoundaryCondition(mode).adapted(pattern.kind))
         start = time.process_time()
@@ -48,28 +81,40 @@ def print_row(name, surface, mode, pattern) -> None:  # type: ignore[no-untyped-
         seconds = time.process_time() - start
         laid = lay_pattern(cmap, pattern)
         fitted = fit_panels(cmap, laid, PanelSettings())
-    except HexwrapError:  # no such condition on a disk
-        return
-    row = [name, mode, str(laid.n_cells)]
+    except HexwrapError:
+        return None
+    cells, figures = float(fan_areas(laid.cells).sum()), []
     for sizes in SIZES:
-        found = seen.foresee(sizes)
-        measured = 1 - measure(cmap, laid, quantize(fitted, PanelSettings(sizes=sizes))).coverage
-        row.append(f"{100 * found.uncovered:.2f} / {100 * measured:.2f}")
-    print("| " + " | ".join([*row, f"{seconds:.2f}"]) + " |", flush=True)
+        panels = quantize(fitted, PanelSettings(sizes=sizes)).polygons
+        measured = 1 - float(fan_areas(panels).sum()) / cells
+        figures.append((100 * seen.foresee(sizes).uncovered, 100 * measured))
+    words = (f"{foreseen:.2f} / {measured:.2f}" for foreseen, measured in figures)
+    line = "| " + " | ".join([name, mode, str(laid.n_cells), *words, f"{seconds:.2f}"]) + " |"
+    return line, max(abs(foreseen - measured) for foreseen, measured in figures)
+
+
+def explored(name: str, variants: int) -> dict[str, Any]:
+    body = {"name": name, "surface": samples.load(name)["surface"], "variants": variants}
+    request = parse_exploration(body, 10**7, 10**6)
+    return explore_here(name, request.surface, request.wanted, nobody)  # type: ignore[arg-type]
 
 
 def run(name: str) -> None:
-    body = {"name": name, "surface": samples.load(name)["surface"], "variants": 200}
-    request = parse_exploration(body, 10**7, 10**6)
-    start = time.perf_counter()
-    result = explore_here(name, request.surface, request.wanted, nobody)  # type: ignore[arg-type]
-    print(f"{name}: {result['notes'][0]} {time.perf_counter() - start:.0f} s")
+    start, used = time.perf_counter(), time.process_time()
+    result = explored(name, 200)
+    spent = time.perf_counter() - start, time.process_time() - used
+    print(f"{name}: {result['notes'][0]} {spent[0]:.0f} s, {spent[1]:.0f} s of this process")
     for i in sorted(result["front"], key=lambda i: result["variants"][i]["measured"]["uncovered"]):
         print("*" if i == result["best"] else " ", i, result["variants"][i]["measured"])
 
 
+def same(name: str) -> None:
+    """Whether everything that an exploration says comes out the same each time, to the last digit."""
+    first = orjson.dumps(explored(name, 20), option=orjson.OPT_SERIALIZE_NUMPY)
+    again = [orjson.dumps(explored(name, 20), option=orjson.OPT_SERIALIZE_NUMPY) for _ in range(9)]
+    front = orjson.loads(first)["front"]
+    print(f"{name}: {1 + again.count(first)} of 10 the same, a front of {len(front)}")
+
+
 if __name__ == "__main__":
-    if sys.argv[1:2] == ["--run"]:
-        run((sys.argv[2:] or ["tower"])[0])
-    else:
-        main(sys.argv[1:] or samples.names())
+    main()

@@ -267,6 +267,13 @@ def example(all_components: Sequence[Component], form: Form, wanted: Example) ->
     net.toggle("Run", "Run", 660, 96)
     net.script("Send", 800, -50, wires)
     net.panel("Status", "Status", (1050, -50, 170, 130), "Send.Status")
+    net.slider("MaxSizes", "MaxSizes", 8, 1, 12, 560, 443)
+    net.toggle("Try", "Explore", 640, 543)
+    net.script("Explore", 800, 420, {"Job": "Send.Job", "MaxSizes": "MaxSizes", "Run": "Try"})
+    net.panel("Requests", "Requests, best first", (1020, 420, 225, 84), "Explore.Requests")
+    net.panel("Uncovered", "Uncovered", (1020, 514, 105, 70), "Explore.Uncovered")
+    net.panel("Cost", "Cost", (1140, 514, 105, 70), "Explore.Cost")
+    net.panel("Found", "Notes", (800, 594, 445, 54), "Explore.Notes")
     net.script("Collect", 1280, -50, {"Job": "Send.Job"})
     net.preview("Preview", 1530, 140, {"Geometry": "Collect.Shapes", "Material": "Collect.ShapeColours"})
     net.panel("Labels", "Labels", (1530, -50, 170, 90), "Collect.Labels")
@@ -294,6 +301,8 @@ def example(all_components: Sequence[Component], form: Form, wanted: Example) ->
     net.group("6  Collect", (110, 100, 181, 246), ["Collect", "Preview", "Labels", "Report"])
     net.group("7  Bake", (90, 77, 182, 172), ["Press", "Bake", "Baked"])
     net.group("The unrolled domain", (90, 179, 157, 219), ["Domain", "Summary"])
+    tried = ["MaxSizes", "Try", "Explore", "Requests", "Uncovered", "Cost", "Found"]
+    net.group("What pays: one of Requests goes to Pattern of another Send", (110, 150, 150, 200), tried)
     return net.archive(wanted.name, wanted.title)
 
 

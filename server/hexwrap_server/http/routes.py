@@ -287,10 +287,11 @@ async def _result(request: Request, job: Job, include: list[str] | None) -> Resp
     headers = {"Content-Location": f"/v1/jobs/{job.id}/result{picked}", "Vary": "Accept-Encoding"}
     headers |= _timing(job)
     service = service_of(request)
-    if include is not None:
+    if include is None:
+        packed = await service.manager.result(job)
+    else:
         _is_solved(job)
-        return Response(await service.manager.parts(job, include, service.errand), 200, headers, JSON)
-    packed = await service.manager.result(job)
+        packed = await service.manager.parts(job, include, service.errand)
     if takes_gzip(request.headers):
         return Response(packed, 200, headers | {"Content-Encoding": "gzip"}, JSON)
     return Response(await asyncio.to_thread(igzip.decompress, packed), 200, headers, JSON)

@@ -62,6 +62,16 @@ class StageCache:
         self._keep(key, value)
         return value, "disk"
 
+    def remembered(self, key: str, make: Callable[[], T]) -> T:
+        """What was made under that key before, if it is still in memory; it is not worth a file."""
+        if key in self._kept:
+            self._kept.move_to_end(key)
+            known: T = self._kept[key][0]
+            return known
+        value = make()
+        self._keep(key, value)
+        return value
+
     def put(self, key: str, value: Any) -> None:
         self._keep(key, value)
         if self.folder is None:
@@ -146,11 +156,18 @@ class CachingRunner:
         self.timings[stage] = time.perf_counter() - start
         return result
 
+    def remembered(self, what: str, stages: tuple[str, ...], make: Callable[[], T]) -> T:
+        """What follows from a finished stage, the last of these that was run."""
+        run = [self._keys[stage] for stage in stages if stage in self._keys]
+        return self.cache.remembered(f"{run[-1]} {what}", make) if run else make()
+
 
 def size_of(value: Any) -> int:
     """Bytes of the arrays inside a dataclass of arrays, and of those that it has derived and keeps."""
     if isinstance(value, np.ndarray):
         return value.nbytes
+    if isinstance(value, bytes):
+        return len(value)
     if isinstance(value, (list, tuple)):
         return sum(size_of(v) for v in value)
     if is_dataclass(value):

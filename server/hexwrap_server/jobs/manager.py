@@ -32,6 +32,7 @@ from hexwrap_server.jobs.endings import Ledger
 from hexwrap_server.jobs.engine import Engine, nobody
 from hexwrap_server.jobs.exploring import explore
 from hexwrap_server.jobs.store import Job, Kind, Store, Work
+from hexwrap_server.output.packed import picked
 from hexwrap_server.problems import plain, problem
 from hexwrap_server.settings import MIB, Settings
 from hexwrap_server.version import service_version
@@ -279,7 +280,10 @@ class JobManager:
         return self._hot[job.identity]
 
     async def parts(self, job: Job, names: list[str], errand: Callable[..., Awaitable[bytes]]) -> bytes:
-        """Some parts of the Result as JSON. Raises GoneError, StorageError."""
+        """Some parts of the Result, packed. Raises GoneError, StorageError."""
+        some = picked(await self.result(job), names)
+        if some is not None:
+            return some
         timings = self._kept(job).timings
         path = str(self.store.solution_path(job.identity))
         return await errand("hexwrap_server.jobs.work:result_parts", path, names, timings)

@@ -6,7 +6,7 @@ import contextlib
 from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from hexwrap_server.jobs.cache import CachingRunner, StageCache
 from hexwrap_server.jobs.disk import read_whole, write_whole
 from hexwrap_server.jobs.worker import Report
 from hexwrap_server.output import wire
+from hexwrap_server.output.packed import LEVEL, Packed, document, packed_part
 from hexwrap_server.output.writers import Meta, write
 from hexwrap_solver import pipeline
 from hexwrap_solver.surface import surface_from_mesh, with_openings
@@ -29,8 +30,9 @@ from hexwrap_solver.surface.types import Origin, Surface, SurfaceSettings
 
 #: Finished solutions that a worker keeps for lift, flatten and files.
 KEPT_SOLUTIONS = 4
-#: Higher ones take longer and hardly make numbers smaller.
-GZIP_LEVEL = 1
+#: The stages on which parts of the Result depend that are often the same as before, the last of each that
+#: was run; ``map`` says where cells are drawn.
+DEPENDS = {"mesh": ("map",), "map": ("map", "pattern"), "pattern": ("pattern",)}
 
 
 def solve(report: Report, order: Order, caching: CacheSettings) -> Outcome:
@@ -41,7 +43,7 @@ def solve(report: Report, order: Order, caching: CacheSettings) -> Outcome:
     assert isinstance(order.wanted, Wanted)
     solution = _staged(order.surface_id, lambda: sent_surface_of(order), order.wanted, runner)
     kept = codec.pieces(solution)
-    result = igzip.compress(wire.result_json(solution, runner.timings), GZIP_LEVEL)
+    result = packed_result(solution, runner)
     cache.weigh()
     size = len(result) + sum(map(len, kept))
     if order.files is None:
@@ -49,6 +51,17 @@ def solve(report: Report, order: Order, caching: CacheSettings) -> Outcome:
     write_whole(Path(order.files[0]), [result])
     write_whole(Path(order.files[1]), kept)
     return Outcome(None, None, size, runner.timings, runner.found)
+
+
+def packed_result(solution: pipeline.Solution, runner: CachingRunner) -> bytes:
+    """The whole Result, see ``output.packed``."""
+
+    def made(name: str) -> Packed:
+        return packed_part(name, wire.dump(wire.part(solution, name, runner.timings)))
+
+    return document(
+        {name: runner.remembered(name, DEPENDS.get(name, ()), partial(made, name)) for name in wire.PARTS}
+    )
 
 
 def sent_surface_of(order: Order) -> SentSurface:
@@ -98,8 +111,8 @@ def take_in(sent: SentSurface, asked: SurfaceSettings | None = None) -> Surface:
 
 
 def result_parts(report: Report, path: str, names: list[str], timings: dict[str, float]) -> bytes:
-    """Some parts of the Result as JSON. Raises GoneError."""
-    return wire.result_json(solution_at(path), timings, names)
+    """Some parts of the Result, gzip. Raises GoneError."""
+    return igzip.compress(wire.result_json(solution_at(path), timings, names), LEVEL)
 
 
 def write_file(

@@ -158,7 +158,9 @@ class _Model:
         return add("IFCPLATE", self.guid(label), "$", text(label), "$", "$", place, whole, "$", kind)
 
     def mapped(self, shown: str) -> str:
-        item = self.lines.add("IFCMAPPEDITEM", shown, self.as_it_is)
+        if ("mapped", shown) not in self.shared:  # plates differ by their placement only
+            self.shared["mapped", shown] = self.lines.add("IFCMAPPEDITEM", shown, self.as_it_is)
+        item = self.shared["mapped", shown]
         return self.lines.add(
             "IFCSHAPEREPRESENTATION", self.body, "'Body'", "'MappedRepresentation'", listed([item])
         )

@@ -191,7 +191,9 @@ export const api = {
   /** The finished work as a file, through the token where there is one. */
   file: (id: string, name: string) => call(`/v1/jobs/${id}/files/${name}`).then((answer) => answer.blob()),
   cancel: (id: string) => call(`/v1/jobs/${id}`, { method: "DELETE" }),
-  result: (id: string) => json<Result>(`/v1/jobs/${id}/result`),
+  /** include: the parts that are wanted; all unless given. */
+  result: (id: string, include?: readonly string[]) =>
+    json<Partial<Result>>(`/v1/jobs/${id}/result${include ? `?include=${include.join(",")}` : ""}`),
   request: (id: string) => json<Request>(`/v1/jobs/${id}/request`),
   settings: () => json<Schema>("/v1/settings"),
   samples: () => json<{ samples: { name: string }[] }>("/v1/samples").then((answer) => answer.samples),

@@ -122,6 +122,7 @@ async function solve(request = state.surface ? currentRequest() : null): Promise
     const job = await api.submit(request);
     if (turn !== state.turn) return void api.cancel(job.id).catch(() => undefined);
     state.request = request;
+    sent = { id: job.id, from: beforePanels(request) };
     await follow(job, turn, sameSurface());
   } catch (error) {
     if (turn === state.turn) report(error);
@@ -158,10 +159,32 @@ async function follow(job: Job, turn: number, keepView: boolean): Promise<void> 
     if (!sameSurface()) forget();
     return note(`This job was ${job.status}.`);
   }
-  const result = await api.result(job.id);
+  const [before, same] = [state.result, unchanged(job)];
+  const result = { ...(same ? before : {}), ...(await api.result(job.id, same ? OF_PANELS : DRAWN)) } as Result;
   if (turn !== state.turn) return;
+  shown = asked(job);
   present(job, result, keepView);
 }
+
+/** The parts of a result that are drawn, and those that follow from the settings of panels alone. */
+const OF_PANELS = ["panels", "sizes", "quality", "support", "timings"] as const;
+const DRAWN = ["mesh", "map", "pattern", ...OF_PANELS] as const;
+
+/** What the mesh, map and pattern on the screen follow from, and those of the job sent last. */
+let shown = "";
+let sent: { id: string; from: string } | null = null;
+
+const asked = (job: Job) => (sent?.id === job.id ? sent.from : "");
+
+/** All that the map and the pattern of a request follow from, but the surface; "" where sizes count, too. */
+function beforePanels({ surface, boundary, pattern, singularities }: Request): string {
+  const whole = new Set(["vertices", "faces", "normals", "nurbs"]);
+  return singularities ? "" : JSON.stringify({ surface, boundary, pattern }, (key, value) => (whole.has(key) ? undefined : value));
+}
+
+/** Whether a job differs from the one on the screen by its panels only. */
+const unchanged = (job: Job) =>
+  state.result !== null && !state.result.map.cones.length && sameSurface() && asked(job) !== "" && asked(job) === shown;
 
 /** Nothing to look at any more: what comes next is of another surface. */
 function forget(): void {

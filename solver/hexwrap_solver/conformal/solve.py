@@ -8,6 +8,7 @@ import numpy as np
 
 from hexwrap_solver.arrays import Floats, Progress, no_progress
 from hexwrap_solver.conformal import boundary
+from hexwrap_solver.conformal.better import corner_notes
 from hexwrap_solver.conformal.corners import boundary_angles
 from hexwrap_solver.conformal.energy import Energy
 from hexwrap_solver.conformal.fixed import Minimum, minimise
@@ -66,6 +67,8 @@ def conformal_map(
         targets = boundary.targets(surface, [a for a in angles if a is not None], cones)
         found = map_to(surface, targets, cones, None, progress)
         found = scaled(found, -_mean_on_area(found.surface, found.log_scale))
+        if found.surface is surface and not found.flips and not len(cones):
+            found = replace(found, notes=(*found.notes, *corner_notes(surface, targets, found.log_scale)))
     if condition.mode == "angles" and not condition.angles:
         found = replace(found, notes=(NO_ANGLES, *found.notes))
     return found

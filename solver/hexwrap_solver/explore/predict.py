@@ -15,10 +15,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from hexwrap_solver.arrays import Floats, Progress, no_progress
+from hexwrap_solver.arrays import Complexes, Floats, Ints, Progress, no_progress
 from hexwrap_solver.conformal.types import ConformalMap
+from hexwrap_solver.domain.locate import barycentric
 from hexwrap_solver.panels.sizes import partition_by_area
-from hexwrap_solver.pattern.lattice import LATTICES
+from hexwrap_solver.pattern.lattice import LATTICES, Lattice
+from hexwrap_solver.pattern.lay.nodes import lattice_points_in_triangles
 from hexwrap_solver.pattern.place.choose import Placing
 from hexwrap_solver.pattern.place.rotation import with_rotation
 from hexwrap_solver.pattern.types import PatternSettings
@@ -36,6 +38,9 @@ ROW = {6: 3**0.5 / 4, 4: 0.0, 3: 0.0}
 TRIMMED = 2.0
 #: Points on each edge of the boundary from which distances are taken.
 FINE = 4
+#: Middles are taken this far beside where they stand, in periods of the lattice, so that hardly one lies on
+#: an edge between triangles; they lie in a triangle to within rounding.
+ASIDE, ROUNDING = 1e-4 * (1 + 0.6j), 1e-9
 #: Cells whose sizes differ by less than this (relatively) count as one.
 ALIKE = 1e-3
 
@@ -57,16 +62,14 @@ class Foreseen:
 class Outlook:
     """The cells that a map and a placed lattice lead to.
 
-    sides: of a regular cell. number: (n,) whole cells around each vertex of the mesh, a fraction mostly.
-    size: (n,) edge of a regular polygon as large as such a cell, model units; limit: (n,) edge of its largest
-    panel without a joint. Whole cells are those whose middle is as far from the boundary as they reach, on
-    the average over all directions (perimeter/2π); along a loop that is a line of the pattern, what the first
-    row of middles stands for begins half a row from the loop. special: cells with another number of sides,
-    and trimmed: cut at the boundary; rest: the area of both, which their panels are taken to cover.
+    sides: of a regular cell. size: (c,) edge of a regular polygon as large as each whole cell, model units;
+    limit: (c,) edge of its largest panel without a joint. Whole cells are those whose middle is as far from
+    the boundary as they reach, on the average over all directions (perimeter/2π); along a loop that is a line
+    of the pattern, half a row. special: cells with another number of sides, and trimmed: cut at the boundary;
+    rest: the area of both, which their panels are taken to cover.
     """
 
     sides: int
-    number: Floats
     size: Floats
     limit: Floats
     special: int = 0
@@ -77,25 +80,24 @@ class Outlook:
         """With so many size classes (None: a length for each panel) and joints at least so wide."""
         limit = np.maximum(self.limit - joint * np.tan(np.pi / self.sides), 0.0)
         unit = self.sides / (4 * np.tan(np.pi / self.sides))
-        roomy = (limit > 0) & (self.number > 0)
-        limit, number = limit[roomy], self.number[roomy]
+        limit = limit[limit > 0]
         others = self.special + self.trimmed
         if not len(limit):
             return Foreseen(1.0, 0, 0, 0.0, 0.0)
-        length, count = _levels(limit, number)
-        used = min(len(length), round(float(count.sum())))
+        length, count = _levels(limit)
+        used = len(length)
         if sizes is not None:
             made = partition_by_area(length, sizes, count)
             start = made.start[-1]
             length = np.repeat(length[start], np.diff(np.append(start, len(length))))
             used = len(start)
         area = unit * float(count @ length**2) + self.rest
-        cells = unit * float(self.number @ self.size**2) + self.rest
+        cells = unit * float(self.size @ self.size) + self.rest
         # a piece of a cell is as compact as the cell, more or less
         around = float(np.sqrt(others * self.rest / unit)) * self.sides
         return Foreseen(
             1 - area / cells,
-            round(float(count.sum())) + others,
+            len(limit) + others,
             used + others,
             area,
             self.sides * float(count @ length) + around,
@@ -118,33 +120,46 @@ def outlook(cmap: ConformalMap, settings: PatternSettings, progress: Progress = 
     a, b, c = (surface.vertices[corner] for corner in surface.faces.T)
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
     n = len(surface.vertices)
-    number: Floats = np.bincount(surface.faces.ravel(), np.repeat(cells, 3) / 3, n).astype(np.float64)
+    around: Floats = np.bincount(surface.faces.ravel(), np.repeat(cells, 3) / 3, n).astype(np.float64)
     unit = lattice.sides / (4 * np.tan(np.pi / lattice.sides))
     size: Floats = np.exp(-(cmap.log_scale - cmap.log_scale.mean()))
-    size *= np.sqrt(area.sum() / (unit * float(number @ size**2)))
+    size *= np.sqrt(area.sum() / (unit * float(around @ size**2)))
     slope: Floats = np.bincount(surface.faces.ravel(), np.repeat(area * _slope(cmap, area), 3)).astype(float)
     slope = slope / np.maximum(np.bincount(surface.faces.ravel(), np.repeat(area, 3)), 1e-300)
     shorter = np.minimum(FLOOR[lattice.sides] * slope * size, 1.0)
+    face, weight = _middles(lattice, placement.glued.corners(surface.faces, placement.place))
+    here, shorter, middle = (
+        np.einsum("kc,kc...->k...", weight, values[surface.faces[face]])
+        for values in (np.log(size), shorter, surface.vertices)
+    )
+    size = np.exp(here)
     reach: Floats = np.asarray(lattice.sides / (2 * np.pi) * size)
-    spread = np.sqrt(np.bincount(surface.faces.ravel(), np.repeat(area, 3) / 3, len(size)))
-    regular, rest, alone, cut = number, 0.0, 0, 0
-    if len(cmap.cones):
-        away: Floats = np.asarray(cKDTree(surface.vertices[cmap.cones.vertex]).query(surface.vertices)[0])
-        regular = regular * _beyond(away, reach, spread)
-        alone, rest = len(cmap.cones), unit * float((number - regular) @ size**2)
-    whole = regular
+    regular, alone = np.ones(len(face), dtype=bool), len(cmap.cones)
+    if alone:
+        regular = cKDTree(surface.vertices[cmap.cones.vertex]).query(middle)[0] > reach
+    whole = regular.copy()
     for i, loop in enumerate(surface.loops):
         least: Floats = ROW[lattice.sides] * size if i in placing.loops else reach
-        whole = whole * _beyond(_distance(surface.vertices, surface.vertices[loop]), least, spread)
+        whole &= _distance(middle, surface.vertices[loop]) > least
+    beside, cut = ~regular, 0
     if settings.boundary == "trim":
-        rest += unit * float((regular - whole) @ size**2)
-        cut = round(TRIMMED * float((regular - whole).sum()))
-    return Outlook(lattice.sides, whole, size, size * (1 - shorter), alone, cut, rest)
+        beside, cut = ~whole, round(TRIMMED * float((regular & ~whole).sum()))
+    rest = unit * float((size[beside] ** 2).sum())
+    size, shorter = size[whole], shorter[whole]
+    return Outlook(lattice.sides, size, size * (1 - shorter), alone, cut, rest)
 
 
-def _beyond(distance: Floats, least: Floats, spread: Floats) -> Floats:
-    """(n,) which part of what stands around each vertex, within half of ``spread``, is farther away."""
-    return np.asarray(np.clip((distance - least) / spread + 0.5, 0.0, 1.0))
+def _middles(lattice: Lattice, corners: Complexes) -> tuple[Ints, Floats]:
+    """Where the middles of cells lie: (k,) triangles and (k, 3) barycentric coordinates. corners: (m, 3) in
+    the plane of the lattice."""
+    period = complex(lattice.position(lattice.basis[0]))
+    found = []
+    for middle in lattice.middles + ASIDE * period:
+        face, point = lattice_points_in_triangles(lattice.coordinates((corners - middle) / period), ROUNDING)
+        place = middle + period * np.asarray(lattice.position(point))
+        found.append((face, barycentric(corners[face], place)))
+    face, weight = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    return face, weight
 
 
 def _distance(points: Floats, rim: Floats) -> Floats:
@@ -163,10 +178,10 @@ def _slope(cmap: ConformalMap, area: Floats) -> Floats:
     return np.asarray(np.linalg.norm(turned, axis=1) / np.maximum(2 * area, 1e-300))
 
 
-def _levels(length: Floats, number: Floats) -> tuple[Floats, Floats]:
+def _levels(length: Floats) -> tuple[Floats, Floats]:
     """Lengths ascending that differ by ``ALIKE`` at least, and how many cells have each."""
     level = np.floor(np.log(length / length.min()) / ALIKE).astype(np.int64)
-    total: Floats = np.bincount(level, number).astype(np.float64)
-    whole = np.bincount(level, number * length**2)
+    total: Floats = np.bincount(level).astype(np.float64)
+    whole = np.bincount(level, length**2)
     there = total > 0
     return np.sqrt(whole[there] / total[there]), total[there]

@@ -6,7 +6,7 @@ import numpy as np
 
 from hexwrap_solver.arrays import Floats, Ints, Ragged
 from hexwrap_solver.geometry import dot
-from hexwrap_solver.panels.polygons import edge_lengths, edge_vectors
+from hexwrap_solver.panels.polygons import edge_vectors, row_maxima, row_minima
 
 #: Figures (relative to the mean edge, or radians) that differ by less are the same.
 TOLERANCE = 1e-7
@@ -19,30 +19,32 @@ def congruence_classes(polygons: Ragged, angle: Floats) -> Ints:
     around the polygon, determine it up to a motion. They are made integers by merging figures closer than the
     tolerance, and read from the corner at which the sequence is lexicographically least.
     """
-    unit = float(edge_lengths(polygons).mean()) if len(polygons.values) else 1.0
-    letter = _letters(polygons, angle, unit)
+    letter = _letters(polygons, angle)
     key = np.full(polygons.n_rows, -1, dtype=np.int64)
     used = 0
     for n in np.unique(polygons.lengths):
         rows = np.flatnonzero(polygons.lengths == n)
-        words = _least_rotation(letter[polygons.offsets[rows][:, None] + np.arange(n)])
-        key[rows] = used + _numbered(words)
-        used = int(key.max()) + 1
+        words = letter[polygons.offsets[rows][:, None] + np.arange(n)]
+        regular = (words == words[:, :1]).all(axis=1)  # and turned as they are
+        for some, word in ((regular, words[regular][:, :1]), (~regular, _least_rotation(words[~regular]))):
+            key[rows[some]] = used + _numbered(word)
+            used = int(key.max()) + 1
     _, first, member = np.unique(key, return_index=True, return_inverse=True)
     rank = np.zeros(len(first), dtype=np.int64)
     rank[np.argsort(first)] = np.arange(len(first))
     return np.asarray(rank[member])
 
 
-def _letters(polygons: Ragged, angle: Floats, unit: float) -> Ints:
+def _letters(polygons: Ragged, angle: Floats) -> Ints:
     """(·,) one integer per corner for its edge length, angle and twist."""
     following = polygons.next()
-    edge = edge_vectors(polygons) / unit
+    edge = edge_vectors(polygons)
+    length = np.sqrt(dot(edge, edge))
+    unit = float(length.mean()) if len(length) else 1.0
     ahead = edge[following]
-    twist = dot(np.cross(edge, ahead), ahead[following])
-    figures = [np.linalg.norm(edge, axis=1), angle, twist]
-    merged = np.stack([_merge(figure) for figure in figures], axis=1)
-    return _numbered(merged)
+    twist = dot(np.cross(edge, ahead), ahead[following]) / unit**3
+    merged = [_merge(figure, polygons) for figure in (length / unit, angle, twist)]
+    return _numbered(np.stack(merged, axis=1))
 
 
 def _numbered(words: Ints) -> Ints:
@@ -57,12 +59,24 @@ def _numbered(words: Ints) -> Ints:
     return np.asarray(np.unique(number, return_inverse=True)[1], dtype=np.int64)
 
 
-def _merge(values: Floats) -> Ints:
-    """Integers in the order of the values; neighbours in that order closer than the tolerance share one."""
-    order = np.argsort(values, kind="stable")
-    label = np.zeros(len(values), dtype=np.int64)
-    label[order[1:]] = np.cumsum(np.diff(values[order]) > TOLERANCE)
-    return label
+def _merge(values: Floats, polygons: Ragged) -> Ints:
+    """Integers in the order of the values; neighbours in that order closer than the tolerance share one.
+
+    Polygons whose values all lie within the tolerance, as the regular ones' do, are sorted as one.
+    """
+    low, high = row_minima(values, polygons.offsets), row_maxima(values, polygons.offsets)
+    alike = high - low <= TOLERANCE
+    others = ~alike[polygons.row]
+    start = np.concatenate([low[alike], values[others]])
+    end = np.concatenate([high[alike], values[others]])
+    order = np.argsort(start, kind="stable")
+    label = np.zeros(len(start), dtype=np.int64)
+    label[order[1:]] = np.cumsum(start[order[1:]] - np.maximum.accumulate(end[order])[:-1] > TOLERANCE)
+    of_row = np.zeros(len(low), dtype=np.int64)
+    of_row[alike] = label[: int(alike.sum())]
+    merged = of_row[polygons.row]
+    merged[others] = label[int(alike.sum()) :]
+    return merged
 
 
 def _least_rotation(words: Ints) -> Ints:

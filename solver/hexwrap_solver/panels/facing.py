@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexwrap_solver.arrays import Floats, Ints, Ragged
-from hexwrap_solver.geometry import dot, normalize
+from hexwrap_solver.arrays import Complexes, Floats, Ints, Ragged
+from hexwrap_solver.geometry import dot, normalize, plane_axes
 from hexwrap_solver.panels.halfedges import HalfEdges
 
 
@@ -53,16 +53,18 @@ def widths(polygons: Ragged, facing: Facing) -> Floats:
     mean = facing.mean
     a, b = edge_ends(polygons, facing.left, facing.start_left)
     c, d = edge_ends(polygons, facing.right, facing.start_right)
-    a, b, c, d = (x - dot(x, mean)[:, None] * mean for x in (a, b, c, d))
-    ends = [(c, a, b), (d, a, b), (a, c, d), (b, c, d)]
-    return np.asarray(np.min([_signed_distance(*end, mean) for end in ends], axis=0))
+    x_axis, y_axis = plane_axes(mean).transpose(1, 0, 2)
+    o, p, q, r = (dot(end - a, x_axis) + 1j * dot(end - a, y_axis) for end in (a, b, c, d))
+    ends = [(q, o, p), (r, o, p), (o, q, r), (p, q, r)]
+    return np.asarray(np.min([_signed_distance(*end) for end in ends], axis=0))
 
 
-def _signed_distance(point: Floats, a: Floats, b: Floats, mean: Floats) -> Floats:
+def _signed_distance(point: Complexes, a: Complexes, b: Complexes) -> Floats:
     """Distance to segment ab, negative on its left (inside the polygon that runs along ab)."""
-    along, spoke = b - a, point - a
-    squared = dot(along, along)
-    t = dot(spoke, along) / np.where(squared > 0, squared, 1.0)
-    distance = np.linalg.norm(spoke - np.clip(t, 0.0, 1.0)[:, None] * along, axis=1)
-    inside = dot(np.cross(along, spoke), mean) > 0
-    return np.asarray(np.where(inside & (t >= 0) & (t <= 1), -distance, distance))
+    along = b - a
+    length = np.abs(along)
+    ahead = np.where(length > 0, along, 1.0) / np.where(length > 0, length, 1.0)
+    place = (point - a) * ahead.conj()  # along the edge, and to its left
+    beyond = np.maximum(-place.real, place.real - length)
+    distance = np.hypot(np.maximum(beyond, 0.0), place.imag)
+    return np.asarray(np.where((place.imag > 0) & (beyond <= 0), -distance, distance))

@@ -8,10 +8,8 @@ import numpy as np
 
 from hexwrap_solver.arrays import Floats
 from hexwrap_solver.geometry import angles_between, dot
-from hexwrap_solver.panels.facing import edge_ends, facing_edges, widths
-from hexwrap_solver.panels.halfedges import HalfEdges
+from hexwrap_solver.panels.facing import Facing, edge_ends, widths
 from hexwrap_solver.panels.types import Panels
-from hexwrap_solver.pattern.types import Pattern
 
 
 @dataclass(frozen=True)
@@ -28,14 +26,8 @@ class Gaps:
     kink: Floats
 
 
-def gaps(pattern: Pattern, edges: HalfEdges, panels: Panels) -> Gaps:
-    """Facing edges are those that came from the same edge of the pattern."""
-    panel = np.full(pattern.n_cells, -1, dtype=np.int64)
-    panel[panels.face] = np.arange(panels.n_panels)
-    normal = np.zeros((pattern.n_cells, 3))
-    normal[panels.face] = panels.normal
-    corner = np.arange(len(edges.cell)) - pattern.faces.offsets[edges.cell]
-    facing = facing_edges(edges, panel, corner, normal)
+def gaps(facing: Facing, panels: Panels, n_half_edges: int) -> Gaps:
+    """n_half_edges: of the pattern."""
     a, b = edge_ends(panels.polygons, facing.left, facing.start_left)
     c, d = edge_ends(panels.polygons, facing.right, facing.start_right)
     n1, n2 = panels.normal[facing.left], panels.normal[facing.right]
@@ -44,6 +36,6 @@ def gaps(pattern: Pattern, edges: HalfEdges, panels: Panels) -> Gaps:
         np.abs(dot((c + d - a - b) / 2, facing.mean)),
         angles_between(n1, n2),
     )
-    result = np.full((3, len(edges.cell)), np.nan)
+    result = np.full((3, n_half_edges), np.nan)
     result[:, facing.here] = result[:, facing.there] = figures
     return Gaps(*result)

@@ -6,7 +6,7 @@ import numpy as np
 import shapely
 
 from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged
-from hexwrap_solver.geometry import normalize, plane_axes
+from hexwrap_solver.geometry import dot, normalize, plane_axes
 
 #: Two panels overlap when they share more area than this, times the squared edge length.
 AREA_TOLERANCE = 1e-9
@@ -16,12 +16,26 @@ AREA_TOLERANCE = 1e-9
 DEPTH_TOLERANCE = 1e-10
 
 
-def overlap_areas(polygons: Ragged, normal: Floats, edge_length: Floats, first: Ints, second: Ints) -> Floats:
+def overlap_areas(
+    polygons: Ragged,
+    normal: Floats,
+    edge_length: Floats,
+    first: Ints,
+    second: Ints,
+    across: Floats | None = None,
+) -> Floats:
     """(k,) area shared by panels first[i] and second[i], projected along the mean of their normals.
 
     Pairs that an edge direction of either polygon separates (separating-axis theorem) share nothing; the few
-    others are intersected as polygons in the plane.
+    others are intersected as polygons in the plane. across: (k, 3) directions along which the pairs are
+    believed to lie one behind the other: whether they do is seen first, in a fraction of the time.
     """
+    area = np.zeros(len(first))
+    if across is not None:
+        slack = DEPTH_TOLERANCE * np.minimum(edge_length[first], edge_length[second])
+        left = np.flatnonzero(~_lie_apart(polygons, normal, first, second, across, slack))
+        area[left] = overlap_areas(polygons, normal, edge_length, first[left], second[left])
+        return area
     mean = normalize(normal[first] + normal[second])
     x_axis, y_axis = plane_axes(mean).transpose(1, 0, 2)
     origin = np.asarray(polygons.values[polygons.offsets[first]], dtype=np.float64)
@@ -31,25 +45,49 @@ def overlap_areas(polygons: Ragged, normal: Floats, edge_length: Floats, first: 
     open_pairs = np.flatnonzero(~(_facing_edge_separates(a, b, slack) | _facing_edge_separates(b, a, slack)))
     a, b, slack = a[..., open_pairs], b[..., open_pairs], slack[open_pairs]
     still = ~(_any_edge_separates(a, b, slack) | _any_edge_separates(b, a, slack))
-    area = np.zeros(len(first))
     shapes = [shapely.make_valid(shapely.polygons(_closed(side[..., still].T))) for side in (a, b)]
     area[open_pairs[still]] = shapely.area(shapely.intersection(*shapes))
     return area
 
 
-def overlapping_pairs(polygons: Ragged, normal: Floats, edge_length: Floats, pairs: Ints) -> Ints:
-    """Which of the pairs (k, 2) overlap, as positions in ``pairs``."""
+def overlapping_pairs(
+    polygons: Ragged, normal: Floats, edge_length: Floats, pairs: Ints, across: Floats | None = None
+) -> Ints:
+    """Which of the pairs (k, 2) overlap, as positions in ``pairs``. across: see ``overlap_areas``."""
     first, second = pairs.T
-    area = overlap_areas(polygons, normal, edge_length, first, second)
+    area = overlap_areas(polygons, normal, edge_length, first, second, across)
     bound = AREA_TOLERANCE * np.minimum(edge_length[first], edge_length[second]) ** 2
     return np.flatnonzero(area > bound)
 
 
+def _lie_apart(
+    polygons: Ragged, normal: Floats, first: Ints, second: Ints, across: Floats, slack: Floats
+) -> Bools:
+    """(k,) whether the shadows of the panels on the directions, made square to the mean of the normals, are
+    apart."""
+    mean = normal[first] + normal[second]
+    flat = across - (dot(across, mean) / dot(mean, mean))[:, None] * mean
+    axis = np.ascontiguousarray(normalize(flat).T)
+    points = np.ascontiguousarray(polygons.values.T)
+    origin = points[:, polygons.offsets[first]]
+    own, other = (
+        sum((points[d][at] - origin[d]) * axis[d] for d in range(3))
+        for at in (_corners(polygons, which) for which in (first, second))
+    )
+    return np.asarray((other.min(axis=0) >= own.max(axis=0) - slack) & flat.any(axis=1))
+
+
+def _corners(polygons: Ragged, which: Ints) -> Ints:
+    """(most corners, k) places of the corners of each panel; the last again where there are fewer."""
+    most = int(polygons.lengths[which].max(initial=3))
+    return np.asarray(
+        polygons.offsets[which] + np.minimum(np.arange(most)[:, None], polygons.lengths[which] - 1)
+    )
+
+
 def _project(polygons: Ragged, which: Ints, origin: Floats, x: Floats, y: Floats) -> Floats:
     """(2, most corners, k), so that NumPy runs along the pairs; shorter polygons repeat their last corner."""
-    most = int(polygons.lengths[which].max(initial=3))
-    corner = np.minimum(np.arange(most)[:, None], polygons.lengths[which] - 1)
-    place = np.ascontiguousarray(polygons.values.T)[:, polygons.offsets[which] + corner]
+    place = np.ascontiguousarray(polygons.values.T)[:, _corners(polygons, which)]
     spoke = place - origin.T[:, None]
     return np.stack([(spoke * axis.T[:, None]).sum(axis=0) for axis in (x, y)])
 

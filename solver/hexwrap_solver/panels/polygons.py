@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged
-from hexwrap_solver.geometry import dot
+from hexwrap_solver.geometry import dot, normalize
 
+#: Corners this near to a plane, relative to their distance from the middle, lie in it but for rounding.
+FLAT = 1e-12
 #: Corners whose angle exceeds π by less, radians, are straight.
 STRAIGHT = 1e-9
 
@@ -40,7 +42,8 @@ def edge_vectors(polygons: Ragged) -> Floats:
 
 def edge_lengths(polygons: Ragged) -> Floats:
     """(·,) length of the edge from each corner to the next."""
-    return np.asarray(np.linalg.norm(edge_vectors(polygons), axis=1))
+    edge = edge_vectors(polygons)
+    return np.asarray(np.sqrt(dot(edge, edge)))
 
 
 def mean_edges(polygons: Ragged) -> Floats:
@@ -81,11 +84,23 @@ def convex(polygons: Ragged, angle: Floats) -> Bools:
 
 
 def best_plane_distances(polygons: Ragged) -> Floats:
-    """(·,) signed distance of each corner from its polygon's least-squares plane."""
-    spoke = polygons.values - means(polygons)[polygons.row]
-    moment = row_sums(np.einsum("hd,he->hde", spoke, spoke), polygons.offsets)
-    _, axes = np.linalg.eigh(moment)
-    return dot(spoke, axes[:, :, 0][polygons.row])
+    """(·,) signed distance of each corner from its polygon's least-squares plane.
+
+    The area vector stands on the plane of a flat polygon; of the others the moments are needed.
+    """
+    row = polygons.row
+    spoke = np.asarray(polygons.values - means(polygons)[row])
+    normal = normalize(row_sums(np.cross(spoke, spoke[polygons.next()]), polygons.offsets))
+    distance = dot(spoke, normal[row])
+    reach = row_maxima(dot(spoke, spoke), polygons.offsets)
+    bent = np.flatnonzero(
+        ~(row_maxima(np.abs(distance), polygons.offsets) <= FLAT * np.sqrt(reach)) | ~normal.any(axis=1)
+    )
+    some, at = take_rows(Ragged(spoke, polygons.offsets), bent)
+    outer = np.einsum("hd,he->hde", some.values, some.values)
+    _, axes = np.linalg.eigh(row_sums(outer, some.offsets))
+    distance[at] = dot(spoke[at], axes[:, :, 0][some.row])
+    return distance
 
 
 def take_rows(table: Ragged, rows: Ints) -> tuple[Ragged, Ints]:

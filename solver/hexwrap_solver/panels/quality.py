@@ -10,6 +10,7 @@ from hexwrap_solver.arrays import Floats, Progress, no_progress
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.geometry import dot
 from hexwrap_solver.panels.congruence import congruence_classes
+from hexwrap_solver.panels.facing import Facing, edge_ends, facing_edges
 from hexwrap_solver.panels.fewest import SLACK
 from hexwrap_solver.panels.folds import parts_by_cell
 from hexwrap_solver.panels.gaps import gaps
@@ -23,6 +24,7 @@ from hexwrap_solver.panels.polygons import (
     interior_angles,
     mean_edges,
     row_maxima,
+    row_sums,
 )
 from hexwrap_solver.panels.types import Panels, Quality
 from hexwrap_solver.pattern.lattice import LATTICES
@@ -51,10 +53,12 @@ def measure(
     polygons, cell_area = panels.polygons, float(fan_areas(pattern.cells).sum())
     edges = half_edges(pattern)
     parts, owner = parts_by_cell(panels)
-    between = gaps(pattern, edges, parts)
+    facing = _facing(pattern, edges, parts)
+    between = gaps(facing, parts, len(edges.cell))
     angle = interior_angles(polygons, panels.normal)
     part_angle = interior_angles(parts.polygons, parts.normal)
-    row, count, mean = polygons.row, polygons.lengths, mean_edges(polygons)
+    row, count, edge = polygons.row, polygons.lengths, edge_lengths(polygons)
+    mean = row_sums(edge, polygons.offsets) / count
     ideal = _ideal_angles(pattern, panels, angle, (np.pi * (count - 2) / count)[row])
     progress(0.5, "distances to the surface")
     away = _surface_distances(cmap.surface, pattern, parts)
@@ -69,7 +73,7 @@ def measure(
     return replace(
         quality,
         planarity=worst(bent) / mean,
-        edge_deviation=row_maxima(np.abs(edge_lengths(polygons) - mean[row]), polygons.offsets) / mean,
+        edge_deviation=row_maxima(np.abs(edge - mean[row]), polygons.offsets) / mean,
         angle_deviation=row_maxima(np.abs(angle - ideal), polygons.offsets),
         surface_distance=worst(away),
         gap_tangential=between.tangential,
@@ -78,7 +82,7 @@ def measure(
         gaps_over=_count_wide(edges, parts, between.tangential),
         convex=~worst(hollow.astype(np.float64)).astype(bool),
         congruence=congruence_classes(polygons, angle),
-        overlaps=_count_overlaps(pattern, edges, parts),
+        overlaps=_count_overlaps(facing, parts, mean_edges(parts.polygons)),
         coverage=float(fan_areas(parts.polygons).sum()) / cell_area,
         movement=_movement(pattern, panels),
         notes=quality.notes + _bare_note(pattern, cell_area / float(area.sum())),
@@ -112,6 +116,16 @@ def _surface_distances(surface: Surface, pattern: Pattern, panels: Panels) -> Fl
     return tree.farthest(points, row, n, np.concatenate([beside, tree.centroids.query(panels.center)[1]]))
 
 
+def _facing(pattern: Pattern, edges: HalfEdges, panels: Panels) -> Facing:
+    """Of flat panels, corners in step with those of their cells."""
+    panel = np.full(pattern.n_cells, -1, dtype=np.int64)
+    panel[panels.face] = np.arange(panels.n_panels)
+    normal = np.zeros((pattern.n_cells, 3))
+    normal[panels.face] = panels.normal
+    corner = np.arange(len(edges.cell)) - pattern.faces.offsets[edges.cell]
+    return facing_edges(edges, panel, corner, normal)
+
+
 def _count_wide(edges: HalfEdges, panels: Panels, gap: Floats) -> int | None:
     """Panels with a joint wider than ``max_gap``; joints as wide as that but for rounding are not."""
     if panels.max_gap is None:
@@ -120,14 +134,14 @@ def _count_wide(edges: HalfEdges, panels: Panels, gap: Floats) -> int | None:
     return int(np.isin(wide, panels.face).sum())
 
 
-def _count_overlaps(pattern: Pattern, edges: HalfEdges, panels: Panels) -> int:
-    panel_of = np.full(pattern.n_cells, -1, dtype=np.int64)
-    panel_of[panels.face] = np.arange(panels.n_panels)
-    once = edges.pairs()
-    pairs = np.stack([panel_of[edges.cell[once]], panel_of[edges.across[once]]], axis=1)
-    low, high = np.sort(pairs[(pairs >= 0).all(axis=1)], axis=1).T
-    pairs = np.stack(np.divmod(np.unique(low * panels.n_panels + high), max(panels.n_panels, 1)), axis=1)
-    return len(overlapping_pairs(panels.polygons, panels.normal, mean_edges(panels.polygons), pairs))
+def _count_overlaps(facing: Facing, panels: Panels, mean_edge: Floats) -> int:
+    """Pairs of neighbours. As a rule the line of an edge that faces the other panel lies between them."""
+    polygons, normal = panels.polygons, panels.normal
+    pairs = np.stack([facing.left, facing.right], axis=1)
+    start, end = edge_ends(polygons, facing.left, facing.start_left)
+    outwards = np.cross(end - start, normal[facing.left] + normal[facing.right])
+    found = np.sort(pairs[overlapping_pairs(polygons, normal, mean_edge, pairs, outwards)], axis=1)
+    return len(np.unique(found, axis=0))
 
 
 def _bare_note(pattern: Pattern, share: float) -> tuple[str, ...]:

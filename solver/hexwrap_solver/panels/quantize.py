@@ -93,10 +93,12 @@ def quantize(fitted: FittedPanels, settings: PanelSettings, curve: TradeOff | No
         pick = min(range(len(lengths)), key=lambda k: _loss(fitted, lengths[k], smallest, settings))
     fitted, length = choices[pick], lengths[pick]
     kind = _kinds(fitted)
+    lengths_used, which = np.unique(length, return_inverse=True)
     classes, member, class_count = np.unique(
-        np.stack([kind, length]), axis=1, return_inverse=True, return_counts=True
+        which + kind * len(lengths_used), return_inverse=True, return_counts=True
     )
-    class_length, member = classes[1], member.ravel()
+    class_kind = classes // max(len(lengths_used), 1)
+    class_length = lengths_used[classes % max(len(lengths_used), 1)]
     edge_length = fitted.limit.copy()
     edge_length[regular] = length
     size = np.full(len(fitted.face), -1, dtype=np.int64)
@@ -117,9 +119,7 @@ def quantize(fitted: FittedPanels, settings: PanelSettings, curve: TradeOff | No
         whole=fitted.whole,
         class_length=np.concatenate([class_length, edge_length[alone]]),
         class_count=np.concatenate([class_count, np.ones(len(alone), dtype=np.int64)]).astype(np.int64),
-        class_sides=np.concatenate(
-            [_sides(fitted)[classes[0].astype(np.int64)], polygons.lengths[alone]]
-        ).astype(np.int64),
+        class_sides=np.concatenate([_sides(fitted)[class_kind], polygons.lengths[alone]]).astype(np.int64),
         trade_off=curve or trade_off(fitted, settings),
         energy=fitted.energy,
         notes=(
@@ -130,7 +130,7 @@ def quantize(fitted: FittedPanels, settings: PanelSettings, curve: TradeOff | No
         ),
         outside=outside,
         max_gap=settings.max_gap,
-        n_special=len(alone) + int((classes[0] >= fitted.pieces).sum()),
+        n_special=len(alone) + int((class_kind >= fitted.pieces).sum()),
         bends=fitted.bends,
     )
 

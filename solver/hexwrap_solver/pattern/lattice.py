@@ -261,6 +261,14 @@ class Lattice:
         return max(self.outlines)
 
     @cached_property
+    def middles(self) -> Complexes:
+        """(k,) the middles of all cells up to translations."""
+        every = [self.stand(np.array(self.cell(start, step))).mean() for start, step in self._every_edge]
+        along = self.coordinates(np.array(every) / complex(self.position(self.basis[0])))
+        _, first = np.unique(np.rint(along % 1 * 1e6) % 1e6, axis=0, return_index=True)
+        return np.asarray(np.array(every)[first])
+
+    @cached_property
     def cell_area(self) -> float:
         """Mean area of a cell in square lattice units."""
         around = [1 / len(self.cell(start, step)) for start, step in self._every_edge]

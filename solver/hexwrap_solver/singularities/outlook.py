@@ -13,13 +13,15 @@ from hexwrap_solver.pattern.types import Kind, Pattern
 from hexwrap_solver.singularities.linear import linear_model, vertex_areas
 from hexwrap_solver.singularities.place import number_of
 from hexwrap_solver.singularities.search import Search, ranked
-from hexwrap_solver.singularities.sizes import uncovered
+from hexwrap_solver.singularities.sizes import uncovered, uncovered_by
 from hexwrap_solver.singularities.solve import told
 from hexwrap_solver.singularities.types import Choices, End, Proposal, Rules
 from hexwrap_solver.surface.types import Surface
 
 #: A coarse look: so many patches and singularities; larger meshes are not looked at.
 PATCHES, MOST, LARGEST = 200, 4, 30_000
+#: Numbers of sizes that are told apart; more leave hardly less open.
+CURVE = 24
 #: What singularities must save to be told, as a share of the area and of what is uncovered.
 SAVED, SHARE = 0.01, 0.3
 
@@ -29,12 +31,11 @@ class Prospects:
     """Singularities that a map could have, the best of each number from none upwards, the ends being free.
 
     proposals: their ``uncovered`` is with a length for each cell, per width of a cell, which it grows with.
-    u: (c, p) scale factors of the patches then. weight: (p,) share of the area of each.
+    left: (c, CURVE) what 1 … CURVE sizes leave open then.
     """
 
     proposals: tuple[Proposal, ...]
-    u: Floats
-    weight: Floats
+    left: Floats
 
 
 @dataclass(frozen=True)
@@ -75,14 +76,13 @@ def prospects(surface: Surface, key: ProspectKey) -> Prospects:
     rules = Rules(LATTICES[key.kind].quantum, cell, None, ends, most=MOST)
     model = linear_model(surface, rules, patches=PATCHES, steps=False)
     if not len(model.seat):
-        return Prospects((), np.zeros((0, len(model.weight))), model.weight)
+        return Prospects((), np.zeros((0, CURVE)))
     search = Search(model, rules)
     best = [states[0] for states in ranked(search, starts=0, refine=False) if states]
     proposals = [search.proposal(state) for state in best]
     return Prospects(
         tuple(replace(one, uncovered=one.uncovered / cell) for one in proposals),
-        np.array([search.scale(state) for state in best]),
-        model.weight,
+        np.array([uncovered_by(search.scale(state), model.weight, CURVE) for state in best]),
     )
 
 
@@ -93,7 +93,7 @@ def outlook(found: Prospects, surface: Surface, laid: Pattern, sizes: int, left:
         return None
     choices = Choices.of(found.proposals, 0, sizes, surface.vertices)
     then = choices.uncovered * _width(laid)
-    then += [uncovered(u, found.weight, sizes) for u in found.u]
+    then += found.left[:, min(sizes, CURVE) - 1]
     then[0] = left  # measured, and with the ends as they are now
     return replace(choices, uncovered=then, coarse=True)
 

@@ -18,16 +18,19 @@ def uncovered(u: Floats, weight: Floats, sizes: int | None) -> float:
 
     u: (p,) weight: (p,) shares of the area. The lengths are the best there are (see ``partition_by_area``).
     """
-    if sizes is None:
-        return 0.0
+    return 0.0 if sizes is None else float(uncovered_by(u, weight, sizes)[-1])
+
+
+def uncovered_by(u: Floats, weight: Floats, most: int) -> Floats:
+    """(most,) the same for each number of sizes from 1 to most ≥ 1."""
     u = u - u.max()
     level = np.floor(-u / ALIKE).astype(np.int64)
     number = level.max() + 1
     share = np.bincount(level, weight, number)
     there = np.flatnonzero(share)
     length = np.exp((there + 0.5) * ALIKE)
-    made = partition_by_area(length, sizes, share[there] / length**2)
-    return float(made.loss[-1] / share.sum())
+    made = partition_by_area(length, most, share[there] / length**2)
+    return np.asarray(made.loss[np.minimum(np.arange(most), len(made.loss) - 1)] / share.sum())
 
 
 def uncovered_of_many(u: Floats, weight: Floats, sizes: int) -> Floats:

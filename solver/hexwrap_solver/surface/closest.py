@@ -78,14 +78,14 @@ class TriangleTree:
             highs.append(np.maximum(highs[-1][:, ::2], highs[-1][:, 1::2]))
         return cls(corners, KDTree(centroid), order, lows[::-1], highs[::-1])
 
-    def nearest(self, points: Floats) -> Nearest:
-        """points: (k, 3), finite.
+    def nearest(self, points: Floats, near: Ints | None = None) -> Nearest:
+        """points: (k, 3), finite. near: (k,) a triangle believed to be near each point, to begin with.
 
         Of a point beyond FAR sizes of the mesh the nearest point is exact to 1/FAR of the mesh's size; a
         distance that no number can hold is given as the largest number.
         """
-        far, near = self._moved_near(points)
-        found = self._nearest_of_all(near)
+        far, moved = self._moved_near(points)
+        found = self._nearest_of_all(moved, near)
         gap = points[far] - np.einsum("kc,kcd->kd", found.barycentric[far], self.corners[found.face[far]])
         found.distance[far] = _length(gap)
         return found
@@ -101,11 +101,10 @@ class TriangleTree:
         bound = nearest_in_triangles(points, self.corners[near])[1]
         greatest = np.zeros(rows)
         order = np.lexsort((-bound, row))
-        while len(order):
-            first = order[np.diff(row[order], prepend=-1) > 0]
-            np.maximum.at(greatest, row[first], self.nearest(points[first]).distance)
-            rest = order[np.diff(row[order], prepend=-1) == 0]
-            order = rest[bound[rest] > greatest[row[rest]]]
+        first = order[np.diff(row[order], prepend=-1) > 0]
+        greatest[row[first]] = self.nearest(points[first], near[first]).distance
+        rest = np.setdiff1d(np.flatnonzero(bound > greatest[row]), first, assume_unique=True)
+        np.maximum.at(greatest, row[rest], self.nearest(points[rest], near[rest]).distance)
         return greatest
 
     def _moved_near(self, points: Floats) -> tuple[Ints, Floats]:
@@ -120,26 +119,40 @@ class TriangleTree:
         near[far] = middle + limit * direction / np.linalg.norm(direction, axis=1)[:, None]
         return far, near
 
-    def _nearest_of_all(self, points: Floats) -> Nearest:
+    def _nearest_of_all(self, points: Floats, near: Ints | None) -> Nearest:
         face = np.zeros(len(points), dtype=np.int64)
         barycentric = np.zeros((len(points), 3))
         distance = np.zeros(len(points))
-        along_curve = np.argsort(_morton(points), kind="stable") if len(points) else face
+        along_curve = np.arange(len(points))
+        if self._together(len(points)) > 1:
+            along_curve = np.argsort(_morton(points), kind="stable")
         for i in range(0, len(points), CHUNK):
             part = along_curve[i : i + CHUNK]
-            face[part], barycentric[part], distance[part] = self._nearest(points[part])
+            face[part], barycentric[part], distance[part] = self._nearest(
+                points[part], None if near is None else near[part]
+            )
         return Nearest(face, barycentric, distance)
 
-    def _nearest(self, points: Floats) -> tuple[Ints, Floats, Floats]:
-        """The triangle with the nearest centroid bounds the search of the others."""
-        first = np.asarray(self.centroids.query(points)[1])
-        bound = nearest_in_triangles(points, self.corners[first])[1]
+    def _nearest(self, points: Floats, near: Ints | None = None) -> tuple[Ints, Floats, Floats]:
+        """The triangle with the nearest centroid bounds the search of the others, or one that is believed to
+        be near, where it is: as near as it is large."""
+        first, bound = np.zeros(len(points), dtype=np.int64), np.full(len(points), np.inf)
+        if near is not None:
+            corners = self.corners[near]
+            first, bound = near.copy(), nearest_in_triangles(points, corners)[1]
+            bound[bound > np.abs(corners[:, 1] - corners[:, 0]).max(axis=1)] = np.inf
+        lost = np.flatnonzero(np.isinf(bound))
+        if len(lost):
+            first[lost] = self.centroids.query(points[lost])[1]
+            bound[lost] = nearest_in_triangles(points[lost], self.corners[first[lost]])[1]
         # Rounding, of the distance as of the boxes, must not prune the guess itself.
         reach = bound * (1 + 1e-9) + ROUNDINGS * np.finfo(float).eps * np.abs(points).max(axis=1)
         reach += np.finfo(float).tiny
         found = self._within(points, reach)
         if found is None:
-            halves = (self._nearest(half) for half in np.array_split(points, 2))
+            halves = (
+                self._nearest(points[half], first[half]) for half in np.array_split(np.arange(len(points)), 2)
+            )
             face, barycentric, distance = (np.concatenate(parts) for parts in zip(*halves, strict=True))
             return face, barycentric, distance
         point, leaf = found
@@ -154,13 +167,17 @@ class TriangleTree:
         best = best[np.diff(point[best], prepend=-1) > 0]
         return face[best], barycentric[best], distance[best]
 
+    def _together(self, points: int) -> int:
+        """How many of so many points descend the tree as one."""
+        return min(LARGEST_GROUP, 1 + points // len(self.order))
+
     def _within(self, points: Floats, reach: Floats) -> tuple[Ints, Ints] | None:
         """All pairs (point, leaf) whose box comes within reach of the point; None where several points have
         too many.
 
         Points that are neighbours along the curve descend the tree together, in one box.
         """
-        together = min(LARGEST_GROUP, 1 + len(points) // len(self.order))
+        together = self._together(len(points))
         start = np.arange(0, len(points), together)
         place = np.ascontiguousarray(points.T)
         low = np.minimum.reduceat(place - reach, start, axis=1)
@@ -202,8 +219,8 @@ def nearest_in_triangles(points: Floats, corners: Floats) -> tuple[Floats, Float
     barycentric = np.stack([1 - v - w, v, w], axis=1)
     outer = np.flatnonzero(~inside)
     barycentric[outer] = _nearest_on_sides(points[outer], corners[outer])
-    offset = np.einsum("kc,kcd->kd", barycentric, corners - points[:, None])
-    return barycentric, np.linalg.norm(offset, axis=1)
+    offset = ap - barycentric[:, 1:2] * ab - barycentric[:, 2:] * ac
+    return barycentric, np.sqrt(dot(offset, offset))
 
 
 def _nearest_on_sides(points: Floats, corners: Floats) -> Floats:
@@ -213,7 +230,8 @@ def _nearest_on_sides(points: Floats, corners: Floats) -> Floats:
         start, along = corners[:, k], corners[:, (k + 1) % 3] - corners[:, k]
         squared = dot(along, along)
         t = np.clip(dot(points - start, along) / np.where(squared > 0, squared, 1.0), 0.0, 1.0)
-        distance = np.linalg.norm(start + t[:, None] * along - points, axis=1)
+        gap = start + t[:, None] * along - points
+        distance = dot(gap, gap)
         nearer = distance < best
         best = np.where(nearer, distance, best)
         side = np.zeros((len(points), 3))
