@@ -6,11 +6,12 @@ What is cut lies on layers ``cut-…``, one per size; what is engraved, all of i
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hexwrap_server.output.blocks import frames
 from hexwrap_server.output.drawing import drawing, encode
 from hexwrap_server.output.layers import size_layers
 from hexwrap_server.output.meta import Group, Meta, SheetError, panels_of
@@ -147,17 +148,13 @@ def lay_flat(panels: Panels) -> Outlines:
     """The outlines in their planes, unfolded where they are bent, seen from outside, with the first edge
     along x."""
     polygons, normal = blanks(panels)
-    points: Floats = np.asarray(polygons.values, dtype=np.float64)
     rows, first = polygons.row, polygons.offsets[:-1]
-    x_axis = points[first + 1] - points[first]
-    x_axis -= np.sum(x_axis * normal, axis=1, keepdims=True) * normal
-    x_axis /= np.linalg.norm(x_axis, axis=1, keepdims=True)
-    y_axis = np.cross(normal, x_axis)
-    arms = points - panels.center[rows]
-    flat = np.stack([np.sum(arms * x_axis[rows], axis=1), np.sum(arms * y_axis[rows], axis=1)], axis=1)
+    axes = frames(replace(panels, polygons=polygons, normal=normal))[:, :2]
+    arms = np.asarray(polygons.values, dtype=np.float64) - panels.center[rows]
+    flat = np.einsum("kij,kj->ki", axes[rows], arms)
     low = np.minimum.reduceat(flat, first)
-    upward = np.where(np.abs(normal[:, 2]) > LEVEL, 1, 2)[:, None]
-    up = np.stack([np.take_along_axis(axis, upward, 1)[:, 0] for axis in (x_axis, y_axis)], axis=1)
+    upward = np.where(np.abs(normal[:, 2]) > LEVEL, 1, 2)
+    up = axes[np.arange(len(axes)), :, upward]
     up /= np.linalg.norm(up, axis=1, keepdims=True)
     return Outlines(Ragged(flat - low[rows], polygons.offsets), np.maximum.reduceat(flat, first) - low, up)
 
@@ -250,10 +247,16 @@ def _write(
     space.add_text(words, height=height, dxfattribs={**attributes, "halign": 1, "valign": 2})
 
 
+def measures(flat: Ragged) -> tuple[Floats, Floats]:
+    """(n,) area and (n,) perimeter of plane polygons, rows of points (·, 2)."""
+    points, rows, n = np.asarray(flat.values), flat.row, flat.n_rows
+    after = points[flat.next()]
+    twice = points[:, 0] * after[:, 1] - points[:, 1] * after[:, 0]
+    around: Floats = np.bincount(rows, np.linalg.norm(after - points, axis=1), n).astype(np.float64)
+    return np.abs(np.bincount(rows, twice, n)) / 2, around
+
+
 def _inradius(laid: Ragged) -> Floats:
     """(q,) twice the area over the perimeter: the incircle's radius of a regular polygon."""
-    points, rows, n = np.asarray(laid.values), laid.row, laid.n_rows
-    following = points[laid.next()]
-    cross = points[:, 0] * following[:, 1] - points[:, 1] * following[:, 0]
-    around = np.bincount(rows, np.linalg.norm(following - points, axis=1), n)
-    return np.asarray(np.abs(np.bincount(rows, cross, n)) / around)
+    area, around = measures(laid)
+    return 2 * area / around

@@ -27,6 +27,15 @@ WIDTH, ROW, DPI = 420, 54, 100
 ROWS = 24
 #: Letters of the title in a line, and lines before it becomes smaller.
 LETTERS, LINES = 18, 4
+NAMES = {
+    3: "triangles",
+    4: "quads",
+    5: "pentagons",
+    6: "hexagons",
+    7: "heptagons",
+    8: "octagons",
+    12: "dodecagons",
+}
 INK, GREY = "#23262b", "#70757d"
 
 
@@ -42,7 +51,7 @@ def compose(image: Floats, panels: Panels, meta: Meta, unit: str | None = None) 
     axes = figure.add_axes((0, 0, 1, 1))
     axes.set(xlim=(0, WIDTH), ylim=(height, 0))
     axes.set_axis_off()
-    _legend(axes, height, panels, meta, behind(unit))
+    (_shapes if panels.mode == "watertight" else _legend)(axes, height, panels, meta, behind(unit))
     with warnings.catch_warnings():  # a name in a script that the bundled font lacks shows boxes, no warning
         warnings.simplefilter("ignore", UserWarning)
         canvas.draw()
@@ -94,6 +103,27 @@ def _legend(axes: Axes, height: int, panels: Panels, meta: Meta, unit: str) -> N
         _swatch(axes, y, panels, colours.UNSIZED)
         axes.text(64, y, words, size=17, color=GREY, va="center")
         axes.text(WIDTH - 60, y, f"{count:,}", size=17, color=GREY, va="center", ha="right")
+
+
+def _shapes(axes: Axes, height: int, panels: Panels, meta: Meta, unit: str) -> None:
+    """Of watertight panels, which have no sizes: one row per shape, its mean edges below its name."""
+    index, kinds, tints = colours.shapes(panels)
+    rows = [
+        (i, tint, sides, f"{NAMES.get(sides, f'{sides}-gons')}{'' if plain else ', not convex'}")
+        for i, ((sides, plain), tint) in enumerate(zip(kinds, tints, strict=True))
+    ]
+    if (index < 0).any():
+        rows.append((-1, colours.UNSIZED, 0, "cut at the boundary"))
+    top = (height - ROW * len(rows)) / 2
+    _title(axes, top - 96, text.one_line(meta.name))
+    axes.text(0, top - 48, f"{panels.n_panels:,} flat panels", size=17, color=GREY, va="center")
+    for k, (i, tint, sides, name) in enumerate(rows):
+        y, edge = top + ROW * (k + 0.5), panels.edge_length[index == i]
+        _swatch(axes, y, panels, tint, sides)
+        words = sorted({text.length(float(end)) for end in (edge.min(), edge.max())}, key=float)
+        axes.text(64, y - 9, name, size=15, color=INK, va="center")
+        axes.text(64, y + 14, f"edges {' to '.join(words)}{unit}", size=11, color=GREY, va="center")
+        axes.text(WIDTH - 30, y, f"{len(edge):,}", size=15, color=GREY, va="center", ha="right")
 
 
 def _swatches(axes: Axes, top: float, panels: Panels, unit: str, shown: int) -> None:

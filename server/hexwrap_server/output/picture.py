@@ -1,4 +1,5 @@
-"""``panels.png``: the panels in space, lit and coloured by size, with a legend; drawn without a display."""
+"""``panels.png``: the panels in space, lit and coloured by size (watertight ones by shape), with a legend;
+drawn without a display."""
 
 from __future__ import annotations
 
@@ -24,7 +25,7 @@ def panels_png(solution: Solution, meta: Meta) -> bytes:
 
 
 def panels_scene(solution: Solution) -> Scene:
-    """The panels in the colours of their sizes before the surface that they cover."""
+    """The panels in the colours of their sizes, or shapes, before the surface that they cover."""
     _, panels = panels_of(solution, "panels.png")
     surface = solution.map.surface
     middle = (surface.vertices.max(axis=0) + surface.vertices.min(axis=0)) / 2
@@ -33,9 +34,14 @@ def panels_scene(solution: Solution) -> Scene:
     sunk = surface.vertices - middle - SINK * _typical(panels.edge_length) * surface.normals
     # A watertight mesh has no joints to look through, and may lie far from the surface.
     faces = surface.faces if panels.mode == "split" else surface.faces[:0]
+    if panels.mode == "watertight":
+        shape, _, tints = colours.shapes(panels)
+        colour = colours.panel_colours(shape, tints)
+    else:
+        colour = colours.panel_colours(panels.size, colours.class_colours(panels))
     return Scene(
         Polygons.of(outline),
-        colours.panel_colours(panels.size[owner], colours.class_colours(panels)),
+        colour[owner],
         Polygons.of(Ragged.from_table(sunk[faces])),
         viewpoint(solution.map),
     )

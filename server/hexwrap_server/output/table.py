@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import csv
-import io
-
 import numpy as np
 
 from hexwrap_server.output.meta import Meta, panels_of
+from hexwrap_server.output.text import csv_table
 from hexwrap_server.output.units import heading
 from hexwrap_solver.arrays import Floats, Ints
 from hexwrap_solver.panels.folds import bend_angles, places_of
@@ -28,11 +26,8 @@ def panels_csv(solution: Solution, meta: Meta) -> bytes:
     """
     panels_of(solution, "panels.csv")
     known = columns(solution)
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\r\n")  # RFC 4180
-    writer.writerow(heading(name, meta.unit if name.startswith(LENGTHS) else None) for name in known)
-    writer.writerows(zip(*known.values(), strict=True))
-    return text.getvalue().encode()
+    headings = [heading(name, meta.unit if name.startswith(LENGTHS) else None) for name in known]
+    return csv_table([headings, *zip(*known.values(), strict=True)])
 
 
 def columns(solution: Solution) -> dict[str, list[object]]:

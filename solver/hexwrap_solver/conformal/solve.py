@@ -15,7 +15,7 @@ from hexwrap_solver.conformal.fixed import Minimum, minimise
 from hexwrap_solver.conformal.layout import lay_out
 from hexwrap_solver.conformal.net import Net
 from hexwrap_solver.conformal.openings import cut_openings
-from hexwrap_solver.conformal.orientation import faithful, positive
+from hexwrap_solver.conformal.orientation import faithful, positively_oriented
 from hexwrap_solver.conformal.robust import FlatMetric, metric_with_flips, solve_with_flips, with_inserted
 from hexwrap_solver.conformal.span import MAX_SPAN, check_reach, check_span, cone_angle_of
 from hexwrap_solver.conformal.types import (
@@ -148,6 +148,14 @@ def _isometric(
     return replace(second, notes=notes)
 
 
+def map_of_curvatures(surface: Surface, curvature: Floats, progress: Progress = no_progress) -> ConformalMap:
+    """The map with u constant along every loop, whose curvature is prescribed, (b,) radians; that of the
+    first is what Gauss–Bonnet leaves. Raises ConvergenceError."""
+    targets = boundary.targets(surface, [float(K) for K in curvature])
+    found = map_to(surface, targets, Cones.none(), None, progress)
+    return scaled(found, -_mean_on_area(found.surface, found.log_scale))
+
+
 def _rim_notes(found: ConformalMap, loops: list[int]) -> tuple[str, ...]:
     """How far edges of isometric loops are from their length, where flips have taken other edges for them."""
     if not found.flips:
@@ -203,7 +211,7 @@ class _Plain:
     @property
     def holds(self) -> bool:
         """Whether it is a flat metric."""
-        return self.minimum.converged and not self.minimum.broken
+        return self.minimum.converged and not self.minimum.violating
 
     @property
     def metric(self) -> FlatMetric:
@@ -237,7 +245,7 @@ def map_to(
         plain = _plain(surface, targets, start, progress)
         if plain.holds:
             found = _finish(plain, cones)
-            if positive(found.corners()).all() and faithful(found):
+            if positively_oriented(found.corners()).all() and faithful(found):
                 return found
         start = start if plain.start is None else plain.start
     return solve_with_flips(surface, targets, progress, start, cones)

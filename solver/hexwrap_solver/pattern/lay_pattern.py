@@ -17,7 +17,7 @@ from hexwrap_solver.domain.lift import points_at
 from hexwrap_solver.domain.locate import barycentric
 from hexwrap_solver.errors import PatternError
 from hexwrap_solver.geometry import dot
-from hexwrap_solver.pattern.along import on_features, told
+from hexwrap_solver.pattern.along import feature_notes, on_features
 from hexwrap_solver.pattern.lattice import LATTICES, Lattice
 from hexwrap_solver.pattern.lay.cells import (
     Cells,
@@ -279,8 +279,8 @@ def _finish(
         distortion=placement.distortion,
         notes=(
             *placement.notes,
-            *told(features),
-            *_told(cut, narrow, folded, int(np.count_nonzero(~keep)) - narrow - folded),
+            *feature_notes(features),
+            *_trim_notes(cut, narrow, folded, int(np.count_nonzero(~keep)) - narrow - folded),
         ),
         features=features,
         pieces=fold_pieces(layout.lattice, features, cells, corner, beside, whole) if features else None,
@@ -350,7 +350,7 @@ def _usable(cells: Cells, outward: Bools, narrows: bool) -> tuple[Bools, int]:
     return keep, narrow
 
 
-def _told(cut: Trimmed, narrow: int, folded: int, apart: int) -> list[str]:
+def _trim_notes(cut: Trimmed, narrow: int, folded: int, apart: int) -> list[str]:
     notes = []
     if cut.joined:
         notes.append(f"{cut.joined} slivers at the boundary were joined to the cut cell beside them.")

@@ -29,12 +29,11 @@ def nearest_integers(gram: Floats, centre: Floats) -> tuple[Ints, float]:
 def _reduced(basis: Floats) -> Ints:
     """Unimodular (n, n) that makes the columns of the basis short and nearly orthogonal."""
     n = basis.shape[1]
-    change = np.eye(n, dtype=np.int64)
+    change, upper = np.eye(n, dtype=np.int64), _triangular(basis)
     k = 1
     for _ in range(200 * n):
         if k >= n:
             break
-        upper = _triangular(basis @ change)
         for j in range(k - 1, -1, -1):
             q = int(np.rint(upper[j, k] / upper[j, j]))
             if q:
@@ -44,6 +43,11 @@ def _reduced(basis: Floats) -> Ints:
             k += 1
         else:
             change[:, [k - 1, k]] = change[:, [k, k - 1]]
+            upper[:, [k - 1, k]] = upper[:, [k, k - 1]]
+            cosine, sine = upper[k - 1 : k + 1, k - 1] / np.hypot(upper[k - 1, k - 1], upper[k, k - 1])
+            turned = np.array([[cosine, sine], [-sine, cosine]]) @ upper[k - 1 : k + 1]  # Givens rotation
+            turned[1, k - 1] = 0.0
+            upper[k - 1 : k + 1] = turned
             k = max(k - 1, 1)
     return change
 

@@ -71,7 +71,9 @@ def _frame(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings) -> _
     )
 
 
-def place_on_cone(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings, turns: int) -> Placement:
+def place_on_cone(
+    cmap: ConformalMap, lattice: Lattice, settings: PatternSettings, cone_index: int
+) -> Placement:
     """Paper, definition 2. The apex becomes the lattice point 0, a centre of the full symmetry.
 
     phase: moves the pattern around by cells at the middle ring, and up or down by edges there; whole edges
@@ -84,11 +86,13 @@ def place_on_cone(cmap: ConformalMap, lattice: Lattice, settings: PatternSetting
     factor = frame.factor * np.exp(1j * turn) * max(1 + up * lattice.edge / radius, LEAST_GROWTH)
     place = (cmap.uv - _middle(cmap)) * factor
     around = round(cmap.circumference * abs(factor) / frame.width)
-    return Placement.on_annulus(cmap, place, Isometry(lattice, turns, (0, 0)), frame.angle, around, 0.0, ())
+    return Placement.on_annulus(
+        cmap, place, Isometry(lattice, cone_index, (0, 0)), frame.angle, around, 0.0, ()
+    )
 
 
 def place_on_flat_ring(
-    cmap: ConformalMap, lattice: Lattice, settings: PatternSettings, turns: int
+    cmap: ConformalMap, lattice: Lattice, settings: PatternSettings, cone_index: int
 ) -> Placement:
     """K a multiple of 2π: g is a translation, usually not zero, and must become one of the lattice.
 
@@ -100,7 +104,7 @@ def place_on_flat_ring(
     wanted = frame.factor * cmap.deck.translation
     shift = lattice.translation_near(wanted)
     nearest = complex(lattice.position(shift))
-    motion = Isometry(lattice, turns, (int(shift[0]), int(shift[1])))
+    motion = Isometry(lattice, cone_index, (int(shift[0]), int(shift[1])))
     phase = lattice.without_translations(
         complex(frame.width * settings.phase[0], lattice.edge * settings.phase[1])
     )

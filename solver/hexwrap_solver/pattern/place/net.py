@@ -4,7 +4,7 @@ A similarity W = A·z + B turns a motion z ↦ ρz + t into W ↦ ρW + (A t + (
 power of ζ and the translation one of the tiling, so that each is rounded to the nearest one. Two kinds of
 equations tie the motions together: around a vertex inside, their product is the identity; around a
 singularity of index k it is the rotation by −k quanta about its place, which must be a centre of that
-symmetry. What rounding leaves over is made up for by the least deformation (``deform``), which is told as
+symmetry. What rounding leaves over is made up for by the least deformation (``deform``), which is reported as
 distortion; nothing is left over where the singularities were moved beforehand until all motions are exact.
 Where a uniform stretch was needed for that, the lattice lies on the chart of the stretched surface, whose
 faces are the domain's, and the stretch is the distortion.
@@ -54,8 +54,8 @@ DEFORMED, FINE = 4, 0.05
 
 
 @dataclass(frozen=True)
-class Motions:
-    """What the motions of a net must fulfil.
+class Holonomy:
+    """The motions that generate the holonomy of a net, and what they must fulfil.
 
     turn: (t,) rotations in quanta. mate: (t,) the inverse of each. words: per singularity, then per vertex
     at which three or more pieces of the cut meet, the motions met on the way around it. centre: (c,) place of
@@ -88,13 +88,13 @@ def place_on_net(
     cost = f"distort cells by {aligned.distortion:.2f}, more than {BEARABLE:g}"
     if not np.isfinite(aligned.distortion):
         cost = "fold the layout over"
-    told = f"To align {names} at this size would {cost}: smaller cells, or corners elsewhere, fit better."
+    sentence = f"To align {names} at this size would {cost}: smaller cells, or corners elsewhere, fit better."
     ends = [loop for loop in polygons.loops if loop < 2]
     if ends and len(ends) < len(polygons.loops):
         fewer = place_on_net(cmap, lattice, settings, ends)
     else:
         fewer = _placed(cmap, lattice, settings, None)
-    return replace(fewer, notes=(told, *fewer.notes))
+    return replace(fewer, notes=(sentence, *fewer.notes))
 
 
 def _placed(
@@ -204,7 +204,7 @@ def _on_fitted(
     return (net, (0.0, A, B, rows[0])) if misfit[0] < NEARLY else None
 
 
-def _motions(cmap: ConformalMap, lattice: Lattice, net: Net) -> Motions:
+def _motions(cmap: ConformalMap, lattice: Lattice, net: Net) -> Holonomy:
     faces, twin = cmap.surface.faces, cmap.surface.twin
     steps, own = net.angle / lattice.step_angle, lattice.order // lattice.fold
     used = np.unique(net.crossing)
@@ -230,7 +230,7 @@ def _motions(cmap: ConformalMap, lattice: Lattice, net: Net) -> Motions:
     branching = branching[~np.isin(branching, cmap.cones.vertex)]
     words = [_word(net, twin, int(starts[v])) for v in [*cmap.cones.vertex.tolist(), *branching.tolist()]]
     centre = net.corners.ravel()[starts[cmap.cones.vertex]]
-    return Motions(turn, net.inverse, net.translation, words, centre, cmap.cones.index)
+    return Holonomy(turn, net.inverse, net.translation, words, centre, cmap.cones.index)
 
 
 def _word(net: Net, twin: Ints, corner: int) -> Ints:
@@ -249,7 +249,7 @@ def _choices(
     cmap: ConformalMap,
     lattice: Lattice,
     settings: PatternSettings,
-    motions: Motions,
+    motions: Holonomy,
     factor: complex,
     phase: complex,
     alignment: Alignment | None,
@@ -287,7 +287,7 @@ def _cell(lattice: Lattice) -> Complexes:
     return np.asarray((e1 * share[:, None] + e2 * share).ravel())
 
 
-def _centres(cmap: ConformalMap, motions: Motions, phase: complex) -> tuple[Complexes, Complexes]:
+def _centres(cmap: ConformalMap, motions: Holonomy, phase: complex) -> tuple[Complexes, Complexes]:
     """Places that may become the origin of the lattice, and where it is shifted to: singularities, else the
     fixed points of motions that turn, which are exact then, else the anchor."""
     if len(motions.centre):
@@ -302,7 +302,7 @@ def _centres(cmap: ConformalMap, motions: Motions, phase: complex) -> tuple[Comp
 
 
 def _rounded(
-    lattice: Lattice, motions: Motions, A: Complexes, B: Complexes, along: Ints | None = None
+    lattice: Lattice, motions: Holonomy, A: Complexes, B: Complexes, along: Ints | None = None
 ) -> tuple[Ints, Floats]:
     """For k places of the lattice at once: rows (k, t, 4) of isometries for all motions, and (k,) how far the
     worst is from its own translation, lattice units; infinite where a singularity would stand at no centre.
