@@ -106,7 +106,10 @@ def _quality(result: dict[str, Any]) -> Rows:
     yield "off the surface", f"at most {_length(found['surface_distance']['max'])}"
     if result["panels"]["mode"] == "watertight":
         yield "moved", f"at most {_length(found['movement'])}"
-        yield "convex", f"{found['convex']:.1%}"
+        yield (
+            "convex",
+            f"{found['convex']:.1%}" + (f" ({left} are not)" if (left := found["not_convex"]) else ""),
+        )
         if found["kink"]["max"] is not None:
             yield "kinks", f"at most {angle(found['kink']['max'])}"
 

@@ -290,7 +290,7 @@ def _fit_watertight(
         *(STUCK_NOTE if stuck else ()),
         *(_bent_note(shapes) if aims.flat else ()),
         *collapsed_note(shapes),
-        *_crossing_note(crossing_themselves(shapes, center, normal)),
+        *_crossing_note(crossing_themselves(shapes, center, normal), pattern, surface),
         *_convex_note(shapes, normal, pattern, surface),
         *(_pulled_note if energies else _far_note)(away, settings.weights),
     )
@@ -326,19 +326,22 @@ def _convex_note(shapes: Ragged, normal: Floats, pattern: Pattern, surface: Surf
     count = int(np.sum(~convex(shapes, interior_angles(shapes, normal))))
     if not count:
         return ()
+    better = _better(pattern, surface)
+    return (f"Watertight panels that are not convex: {count} of {shapes.n_rows}; {better}.",)
+
+
+def _better(pattern: Pattern, surface: Surface) -> str:
+    """The pattern whose panels stay convex."""
     # Where three panels meet at each node, flat convex ones follow no saddle (Li, Liu and Wang 2015).
     saddle = saddle_share(surface)
-    best = "trihexagonal" if saddle > 0 else "hex"
-    if pattern.kind == best:
-        better = "smaller cells leave fewer"
-    elif saddle > 0:
-        better = (
+    if pattern.kind == ("trihexagonal" if saddle > 0 else "hex"):
+        return "smaller cells leave fewer"
+    if saddle > 0:
+        return (
             f"{max(saddle, 0.01):.0%} of the surface is curved like a saddle, which flat convex panels follow"
             " with kind trihexagonal"
         )
-    else:
-        better = "on this surface, which is nowhere curved like a saddle, ask for kind hex"
-    return (f"Watertight panels that are not convex: {count} of {shapes.n_rows}; {better}.",)
+    return "on this surface, which is nowhere curved like a saddle, ask for kind hex"
 
 
 def collapsed_note(shapes: Ragged) -> tuple[str, ...]:
@@ -354,13 +357,13 @@ def collapsed_note(shapes: Ragged) -> tuple[str, ...]:
     )
 
 
-def _crossing_note(crossing: Bools) -> tuple[str, ...]:
+def _crossing_note(crossing: Bools, pattern: Pattern, surface: Surface) -> tuple[str, ...]:
     count = int(crossing.sum())
     if not count:
         return ()
     return (
-        f"Watertight panels whose outline crosses itself: {count}; ask for another pattern, for smaller"
-        " cells, or for split panels, which cannot.",
+        f"Watertight panels whose outline crosses itself: {count} of {len(crossing)};"
+        f" {_better(pattern, surface)}; split panels cannot cross.",
     )
 
 

@@ -19,9 +19,9 @@ from hexwrap_solver.conformal.energy import Corners, corner_angles, opposite_len
 from hexwrap_solver.conformal.layout import FaceTree, develop
 from hexwrap_solver.errors import ConvergenceError
 from hexwrap_solver.linalg.factor import Factorisation
+from hexwrap_solver.linalg.integers import nearest_integers
 from hexwrap_solver.singularities.cut import Branches, branches
 from hexwrap_solver.singularities.drag import Grip, dragged, grips
-from hexwrap_solver.singularities.integers import nearest_integers
 from hexwrap_solver.singularities.linear import targets, vertex_areas
 from hexwrap_solver.singularities.solvable import solvable
 from hexwrap_solver.singularities.types import End
