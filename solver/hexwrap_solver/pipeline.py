@@ -25,6 +25,7 @@ from hexwrap_solver.setting import Setting
 from hexwrap_solver.singularities.outlook import ProspectKey, outlook, outlook_note, prospects, worth_a_look
 from hexwrap_solver.singularities.solve import SIZES, closed_map, needs_singularities, seated
 from hexwrap_solver.singularities.types import Choices, SingularitySettings
+from hexwrap_solver.surface.holes import fill_openings
 from hexwrap_solver.surface.types import Surface
 from hexwrap_solver.threads import one_blas_thread
 
@@ -198,4 +199,4 @@ def _map(
     )
     placing = seats.placing
     taken = next(i for i, one in enumerate(placing.proposals) if one.count == len(cmap.cones))
-    return cmap, Choices.of(placing.proposals, taken, classes or SIZES, surface.vertices)
+    return cmap, Choices.of(placing.proposals, taken, classes or SIZES, fill_openings(surface).vertices)

@@ -5,6 +5,8 @@ The scenarios themselves stand in ``headless/scenarios_*.py``, which both interp
 
 from collections.abc import Callable
 
+import pytest
+
 Runner = Callable[[str, dict[str, str]], None]
 
 
@@ -16,5 +18,8 @@ def test_against_a_live_server(run_scenarios: Runner, server_port: int) -> None:
     run_scenarios("scenarios_solve", {"HEXWRAP_PORT": str(server_port)})
 
 
+@pytest.mark.parametrize(
+    "run_scenarios", ["jython", pytest.param("cpython", marks=pytest.mark.long)], indirect=True
+)
 def test_servers_in_trouble(run_scenarios: Runner, server_port: int) -> None:
     run_scenarios("scenarios_trouble", {"HEXWRAP_PORT": str(server_port)})

@@ -59,7 +59,7 @@ def served(
 def answers(process: subprocess.Popen[bytes], data: Path, port: int) -> bool:
     assert process.poll() is None, (data / "log").read_text()
     try:
-        httpx.get(f"http://127.0.0.1:{port}/health", trust_env=False, timeout=PATIENCE)
+        httpx.get(f"http://127.0.0.1:{port}/health", trust_env=False, timeout=PATIENCE, verify=False)
     except httpx.TransportError:
         return False
     return True

@@ -172,11 +172,44 @@ def test_what_is_out_of_sight_counts_only_when_named(how: str) -> None:
     layer = {"off": "off", "locked": "locked", "above": "off::above"}.get(how, "")
     mode = how if how in ("Hidden", "Locked") else "Normal"
     model.add(mesh_at(50), "old", layer, mode)
-    with pytest.raises(NoObjectError, match=r"hidden, locked or on layers that are off.*'old'"):
+    with pytest.raises(
+        NoObjectError, match=r"The only surface .* hidden, locked or on a layer that is off.*'old'"
+    ):
         model.choose()
     model.add(mesh_at(), "new")
     assert names(model.choose()) == ["new"]
     assert names(model.choose("old")) == ["old"]
+
+
+def test_copies_in_place_count_once_and_are_told() -> None:
+    """Two copies of an open tube would be joined along both rims, to a torus."""
+    chosen = Model().add(cylinder(), "a").add(cylinder(), "b").choose()
+    assert names(chosen) == ["a"]
+    assert "covers another one exactly" in chosen.told[0]
+    loops = take_in(
+        sent_surface(Model().add(cylinder()).add(cylinder()).bytes(), "a.3dm", SurfaceSettings()).sent
+    )
+    assert len(loops.loops) == 2
+
+
+def test_one_of_several_alike_is_taken_unless_their_names_differ() -> None:
+    chosen = Model().add(mesh_at()).add(mesh_at(50)).add(mesh_at(100)).choose()
+    assert len(chosen.used) == 1
+    assert "Taken: object" in chosen.told[-1]
+    with pytest.raises(SeveralObjectsError):
+        Model().add(mesh_at(), "a").add(mesh_at(50), "b").choose()
+
+
+@pytest.mark.parametrize("side", [50, 500])
+def test_neither_ground_nor_a_small_tube_stands_for_a_building(side: float) -> None:
+    """A closed mass of 4 × 2 × 2 beside a railing, on flat ground."""
+    model = (
+        Model()
+        .add(cylinder(30, capped=True), "mass")
+        .add(mesh_at(60, 0.02), "railing")
+        .add(plane(60, side), "site")
+    )
+    assert names(model.choose()) == ["mass"]
 
 
 def test_a_file_without_surfaces_names_what_it_holds() -> None:
@@ -229,7 +262,7 @@ def test_meshes_whose_edges_meet_become_one() -> None:
 
 def test_edges_that_nearly_meet_are_told_with_where_and_how_far() -> None:
     model = parts(4e-3)
-    with pytest.raises(SeveralObjectsError):
+    with pytest.raises(SeveralObjectsError, match=r"comes within 0.004 of the surface at .* not joined"):
         model.choose()
     told = model.add(mesh_at(80), "tower").choose("[at]*").told
     assert any("'tower'" in sentence for sentence in told)
@@ -432,7 +465,7 @@ def test_inspect_prints_what_is_there_and_what_would_be_done(
     said = capsys.readouterr().out
     assert "unit m, tolerance 0.001" in said
     assert "Wall::Old" in said
-    assert "to be chosen" in said
+    assert "to choose" in said
     assert main(["inspect", str(path), "--object", "north"]) == 0
     assert "taken" in capsys.readouterr().out
     assert main(["inspect", str(tmp_path / "none.3dm")]) == 2

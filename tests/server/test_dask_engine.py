@@ -8,8 +8,8 @@ import signal
 import subprocess
 import sys
 import time
-from collections import OrderedDict
-from collections.abc import AsyncIterator, Coroutine
+import warnings
+from collections.abc import AsyncIterator, Coroutine, Iterator
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
@@ -207,7 +207,7 @@ def test_job_whose_machine_is_killed_fails_alone(tmp_path: Path) -> None:
         ) as made,
         running(tmp_path / "data", held_by(gate, made.scheduler_address)) as client,
     ):
-        bodies = [request(surface=tube(400, 150, height=10 + i), pattern={"around": 60}) for i in range(2)]
+        bodies = [request(surface=tube(60, 20, height=10 + i)) for i in range(2)]
         ids = [client.post("/v1/jobs", json=body).json()["id"] for body in bodies]
         for id in ids:
             until_at(client, id, "pattern")  # and both stay there: one on each machine
@@ -223,16 +223,22 @@ def test_job_whose_machine_is_killed_fails_alone(tmp_path: Path) -> None:
         assert finished(client, again)["status"] == "done"
 
 
-@pytest.mark.filterwarnings("ignore")
-def test_running_job_on_a_cluster_is_stopped(tmp_path: Path) -> None:
-    gate = tmp_path / "gate"
-    with (
-        distributed.LocalCluster(
+@pytest.fixture(scope="module")
+def one_machine() -> Iterator[str]:
+    """The address of a cluster that nobody kills."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        with distributed.LocalCluster(
             n_workers=1, threads_per_worker=1, dashboard_address=":0", protocol="tcp://", silence_logs=50
-        ) as made,
-        running(tmp_path / "data", held_by(gate, made.scheduler_address)) as client,
-    ):
-        body = request(surface=tube(400, 150), pattern={"around": 60})
+        ) as made:
+            yield made.scheduler_address
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_running_job_on_a_cluster_is_stopped(tmp_path: Path, one_machine: str) -> None:
+    gate = tmp_path / "gate"
+    with running(tmp_path / "data", held_by(gate, one_machine)) as client:
+        body = request(surface=tube(60, 20))
         id = client.post("/v1/jobs", json=body).json()["id"]
         until_at(client, id, "pattern")
         assert client.delete(f"/v1/jobs/{id}").status_code == 204
@@ -243,13 +249,8 @@ def test_running_job_on_a_cluster_is_stopped(tmp_path: Path) -> None:
 
 
 @pytest.mark.filterwarnings("ignore")
-def test_jobs_run_on_a_cluster(tmp_path: Path) -> None:
-    with (
-        distributed.LocalCluster(
-            n_workers=1, threads_per_worker=1, dashboard_address=":0", protocol="tcp://", silence_logs=50
-        ) as made,
-        running(tmp_path, engine="dask", scheduler=made.scheduler_address) as client,
-    ):
+def test_jobs_run_on_a_cluster(tmp_path: Path, one_machine: str) -> None:
+    with running(tmp_path, engine="dask", scheduler=one_machine) as client:
         job = finished(client, client.post("/v1/jobs", json=request()).json()["id"])
         assert job["status"] == "done"
         assert client.get(f"/v1/jobs/{job['id']}/files/panels.csv").status_code == 200
@@ -290,25 +291,18 @@ def test_scheduler_that_does_not_answer_is_not_waited_for(monkeypatch: pytest.Mo
         async def identity(self, n_workers: int) -> None:
             await asyncio.sleep(60)
 
-    async def story() -> None:
-        e = dask_engine.DaskEngine("tcp://127.0.0.1:1")
-        e._client = Silent()
-        e._client.scheduler = e._client
-        with pytest.raises(OSError):  # noqa: PT011 - as the loop that looks catches it
-            await e._look()
+        def subscribe_topic(self, *_: Any) -> None:
+            pass
+
+    async def client(*_: Any, **__: Any) -> Any:
+        silent = Silent()
+        silent.scheduler = silent
+        return silent
 
     monkeypatch.setattr(dask_engine, "LOOK_SECONDS", 0.05)
-    run(story())
-
-
-def test_stopped_calls_are_not_remembered_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
-    from hexwrap_server.jobs import dask_engine
-
-    monkeypatch.setattr(dask_engine, "MOST_STOPPED", 3)
-    monkeypatch.setattr(dask_engine, "_STOPPED", OrderedDict())
-    for i in range(5):
-        dask_engine._stop(str(i))
-    assert list(dask_engine._STOPPED) == ["2", "3", "4"]
+    monkeypatch.setattr(dask_engine, "Client", client)
+    with pytest.raises(OSError, match="does not answer"):
+        asyncio.run(dask_engine.DaskEngine("tcp://127.0.0.1:1").start())
 
 
 NO_SCHEDULER = """
@@ -338,16 +332,11 @@ def test_scheduler_that_is_down_at_start_is_told_in_a_sentence(tmp_path: Path, a
 
 
 @pytest.mark.filterwarnings("ignore")
-def test_explorations_run_there_too(tmp_path: Path) -> None:
+def test_explorations_run_there_too(tmp_path: Path, one_machine: str) -> None:
     from hexwrap_server.jobs.dask_engine import DaskEngine
 
     vary = {"around": [10, 12], "sizes": [1, 5], "singularities": [0]}
-    with (
-        distributed.LocalCluster(
-            n_workers=1, threads_per_worker=1, dashboard_address=":0", protocol="tcp://", silence_logs=50
-        ) as made,
-        running(tmp_path, DaskEngine(made.scheduler_address)) as client,
-    ):
+    with running(tmp_path, DaskEngine(one_machine)) as client:
         body = {"surface": tube(), "vary": vary, "variants": 3}
         job = finished(client, client.post("/v1/explore", json=body).json()["id"])
         assert job["status"] == "done", job

@@ -196,7 +196,7 @@ def test_curves_beside_the_surface_do_no_harm() -> None:
 
 def test_several_objects_are_named() -> None:
     vertices, quads = tube()
-    parts = rhino_mesh(vertices, quads.tolist()), rhino3dm.NurbsSurface.CreateFromCylinder(cylinder())
+    parts = rhino_mesh(2 * vertices, quads.tolist()), rhino3dm.NurbsSurface.CreateFromCylinder(cylinder())
     with pytest.raises(
         SeveralObjectsError, match=r"'old' \(mesh.*'new' \(surface|'new' \(surface.*'old' \(mesh"
     ):
@@ -216,7 +216,7 @@ def test_a_rhino_file_without_a_surface_is_refused() -> None:
         read_surface(rhino(line), "a.3dm")
 
 
-@pytest.mark.parametrize("name", ["a.step", "a", "obj"])
+@pytest.mark.parametrize("name", ["a.step", "a.dxf", "a", "obj"])
 def test_other_types_are_refused(name: str) -> None:
     with pytest.raises(FileTypeError, match=r"\.3dm, \.npz, \.obj"):
         read_surface(b"", name)

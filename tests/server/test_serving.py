@@ -19,11 +19,11 @@ from tests.server.process import PROGRAM, children, free_port, is_gone, served
 
 def heavy(i: int) -> dict[str, object]:
     """A job that takes a while."""
-    return request(surface=tube(300, 120, height=10 + i), pattern={"around": 90})
+    return request(surface=tube(200, 80, height=10 + i), pattern={"around": 60})
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])
 def test_signals_end_it_cleanly_while_it_works(tmp_path: Path, number: signal.Signals) -> None:
     port = free_port()
     with served(tmp_path, port, workers=1) as process, httpx.Client(trust_env=False) as client:
@@ -42,7 +42,7 @@ def test_signals_end_it_cleanly_while_it_works(tmp_path: Path, number: signal.Si
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize("number", [signal.SIGTERM, pytest.param(signal.SIGINT, marks=pytest.mark.long)])
 def test_signal_to_the_whole_group_costs_no_job(tmp_path: Path, number: signal.Signals) -> None:
     """As service managers and consoles send it: to the workers as well."""
     port = free_port()

@@ -14,6 +14,8 @@ from hexwrap_solver.surface.types import SurfaceSettings
 
 #: Rows that are printed; the loops of more objects are not counted either.
 MOST_ROWS = 200
+#: Letters of a layer's path that are shown on a console of usual width.
+LAYER = 20
 
 
 def print_content(console: Console, data: bytes, filename: str, settings: SurfaceSettings) -> int:
@@ -40,40 +42,52 @@ def print_content(console: Console, data: bytes, filename: str, settings: Surfac
 
 
 def _table(content: FileContent, chosen: Chosen | None, unit: str | None) -> Table:
+    """Numbers, sizes and loops stand on one line each; words wrap where the console is narrow."""
     table = Table(box=None, pad_edge=False, header_style="bold")
-    for heading in (
-        "no.",
-        "object",
-        "layer",
-        "kind",
-        f"size{f' ({unit})' if unit else ''}",
-        "loops",
-        "would be",
-    ):
-        table.add_column(heading, justify="right" if heading == "no." else "left", no_wrap=True)
+    table.add_column("no.", justify="right", no_wrap=True)
+    table.add_column("object", overflow="fold")
+    if any(item.layer for item in content.objects):
+        table.add_column("layer", overflow="fold")
+    table.add_column("kind")
+    table.add_column(f"size{f' ({unit})' if unit else ''}", no_wrap=True)
+    table.add_column("loops", no_wrap=True)
+    table.add_column("would be", overflow="fold")
     used = {id(item) for item in chosen.used} if chosen else set()
     for number, item in enumerate(content.objects[:MOST_ROWS]):
-        size = " × ".join(f"{x:.4g}" for x in item.size)
-        name = item.name or item.id
+        loops, fault = _loops(content, item)
         table.add_row(
-            str(number), name, item.layer, item.kind, size, _loops(content, item), _fate(item, used, chosen)
+            str(number),
+            item.name or "unnamed",
+            *([_short(item.layer)] if len(table.columns) == 7 else []),
+            item.kind,
+            "×".join(f"{x:.3g}" if x < 1000 else f"{x:.0f}" for x in item.size),
+            loops,
+            fault or _fate(item, used, chosen),
         )
     return table
 
 
-def _loops(content: FileContent, item: Found) -> str:
-    """The number of boundary curves of each of its pieces."""
+def _short(layer: str) -> str:
+    """The last steps of a layer's path, as many as fit; at least one, which --layer takes, too."""
+    steps, shown = layer.split("::"), ""
+    while steps and (not shown or len(steps[-1]) + len(shown) <= LAYER):
+        shown = steps.pop() + (f"::{shown}" if shown else "")
+    return f"…::{shown}" if steps else shown
+
+
+def _loops(content: FileContent, item: Found) -> tuple[str, str]:
+    """The number of boundary curves of each of its pieces, or why it cannot be read."""
     try:
         parts = parts_of(content, [item]).parts
     except HexwrapError as error:
-        return f"cannot be read: {error.detail[:60]}"
+        return "?", f"cannot be read: {error.detail[:60]}"
     counts = [str(part.loops) for part in parts]
-    return " + ".join(counts[:4]) + (" + …" if len(counts) > 4 else "")
+    return "+".join(counts[:3]) + ("+…" if len(counts) > 3 else ""), ""
 
 
 def _fate(item: Found, used: set[int], chosen: Chosen | None) -> str:
     if id(item) in used:
         return "joined" if len(used) > 1 else "taken"
     if not item.visible or item.locked:
-        return f"left out ({'locked' if item.visible else 'hidden'})"
-    return "left out" if chosen else "to be chosen"
+        return "hidden" if not item.visible else "locked"
+    return "left out" if chosen else "to choose"

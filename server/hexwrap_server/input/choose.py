@@ -1,8 +1,9 @@
 """Which of the objects of a file are meant, and what becomes of them: chosen, joined, strays left out.
 
-First, those that are named, or else all that are visible and not locked. Then what meets along its edges is
-joined. Of the parts that are left, the only one that can be meant is taken: a tube before a closed mass
-before a surface with one boundary curve, and of several such one that is far larger than the others.
+First, those that are named, or else all that are visible and not locked. Copies on top of each other count
+once, and what meets along its edges is joined. Of the parts that are left, the one that can be meant is
+taken: the largest, where a tube counts for more than a closed mass or a surface with one boundary curve, and
+low ground for least, unless another comes near it that has another shape or another name.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from scipy.spatial import cKDTree
 
 from hexwrap_server.input.object_words import (
     coarse_numbers,
+    copies,
     joint,
     label,
     listed,
@@ -29,8 +31,16 @@ from hexwrap_server.input.readers.errors import NoObjectError, SeveralObjectsErr
 from hexwrap_server.input.readers.found import FileContent, Found, Geometry
 from hexwrap_solver.surface import SentMesh
 
-#: Of several parts that could be meant, one whose area is this many times that of the next is meant.
-DOMINANT = 10.0
+#: Of several parts that could be meant, one that counts for this many times the next is meant.
+DOMINANT = 1.3
+#: A part that nearly meets the best one is left out only if that counts for this many times as much.
+TORN = 10.0
+#: The area of what is no tube counts for so much of it, of ground, and of what is flat.
+NO_TUBE, GROUND, PLANE = 1 / 20, 1 / 400, 1e-6
+#: Parts are alike whose sizes and areas differ by no more than this part.
+ALIKE = 0.01
+#: A part thinner than this part of its size is flat; ground is lower than this.
+FLAT, LOW = 1e-4, 0.1
 #: Edges that nearly meet are reported up to this many times the tolerance.
 NEARLY = 100.0
 #: At most this many such places are reported.
@@ -65,19 +75,56 @@ def choose(
     found = parts_of(content, meant)
     if not found.parts:
         raise UnreadableFileError(found.spoilt[0][1] if found.spoilt else "The file holds no faces.")
-    best = min(part.rank for part in found.parts)
-    fitting = sorted((part for part in found.parts if part.rank == best), key=lambda part: -part.area)
-    if len(fitting) > 1 and fitting[0].area < DOMINANT * fitting[1].area:
-        raise several(content, [meant[i] for part in fitting for i in part.members], len(fitting), unit)
-    part = fitting[0]
+    fitting = sorted(found.parts, key=_weight, reverse=True)
+    best = fitting[0]
+    alike = [other for other in fitting if _is_alike(other, best, meant)]
+    apart = _nearly(best, [other for other in fitting if other is not best], meant, content)
+    rivals = [
+        other
+        for other in fitting
+        if all(other is not one for one in alike)
+        and _weight(best) < (TORN if id(other) in apart else DOMINANT) * _weight(other)
+    ]
+    if rivals:
+        near = [other for other in fitting if other is best or any(other is one for one in rivals)]
+        gaps = [apart[id(other)] for other in rivals if id(other) in apart]
+        raise several(content, [meant[i] for part in near for i in part.members], len(near), unit, gaps)
+    part = next((other for other in alike if _is_exact(other, meant)), best)
     used = [meant[i] for i in part.members]
     geometry, told = brep_where_needed(part.make(), content.tolerance)
     for seam in found.joints if len(used) > 1 or len(meant) == 1 else ():
         told += joint(seam, content.tolerance or 0.0, len(used))
     told += strays([piece for members, piece in found.strays if members & set(part.members)])
-    told += _nearly(part, [other for other in found.parts if other is not part], meant, content)
+    told += list(apart.values())[:SHOWN]
     told += coarse_numbers(geometry, content.tolerance)
-    return Chosen(geometry, tuple(used), (*told, *others(content, used)))
+    return Chosen(geometry, tuple(used), (*told, *copies(len(found.copies)), *others(content, used)))
+
+
+def _weight(part: Part) -> float:
+    """How much speaks for a part: its area, and what it is."""
+    if part.loops > 1:
+        return part.area
+    size = np.ptp(part.box, axis=0)
+    if size.min() <= FLAT * np.linalg.norm(size):
+        return PLANE * part.area
+    is_ground = part.loops == 1 and size[2] <= LOW * np.linalg.norm(size)
+    return (GROUND if is_ground else NO_TUBE) * part.area
+
+
+def _is_alike(one: Part, other: Part, meant: Sequence[Found]) -> bool:
+    """Whether it makes no difference which of the two is taken: same size, and no names that differ."""
+    names = [{meant[i].name for i in part.members} - {""} for part in (one, other)]
+    if all(names) and names[0] != names[1]:
+        return False
+    size, other_size = np.sort(np.ptp(one.box, axis=0)), np.sort(np.ptp(other.box, axis=0))
+    near = np.abs(size - other_size).max() <= ALIKE * np.linalg.norm(size)
+    in_place = np.abs(one.box - other.box).max() <= ALIKE * np.linalg.norm(size)
+    return bool(near and (in_place or abs(one.area - other.area) <= ALIKE * one.area))
+
+
+def _is_exact(part: Part, meant: Sequence[Found]) -> bool:
+    """Whether it is a surface rather than the mesh of one."""
+    return all(meant[i].kind != "mesh" for i in part.members)
 
 
 def named(content: FileContent, object: str | None, layer: str | None) -> list[Found]:
@@ -94,8 +141,8 @@ def named(content: FileContent, object: str | None, layer: str | None) -> list[F
         if seen:
             return seen
         raise NoObjectError(
-            f"All {len(objects)} surfaces of the file are hidden, locked or on layers that are off: show "
-            f"them in Rhino, or name the one that is meant ({listed(objects, content.unit)}).",
+            f"{_all(len(objects))} hidden, locked or on a layer that is off: run Show, Unlock or LayerOn in "
+            f"Rhino, or name what is meant with --object or --layer ({listed(objects, content.unit)}).",
             data={"objects": rows(objects)},
         )
     on = [(i, item) for i, item in enumerate(objects) if _is_on(item, layer)]
@@ -111,6 +158,10 @@ def named(content: FileContent, object: str | None, layer: str | None) -> list[F
         f"No surface of the file {what}; there are {listed(objects, content.unit)}.",
         data={"objects": rows(objects)},
     )
+
+
+def _all(count: int) -> str:
+    return "The only surface of the file is" if count == 1 else f"All {count} surfaces of the file are"
 
 
 def _is_named(found: Found, number: int, object: str | None) -> bool:
@@ -132,31 +183,37 @@ def _is_on(found: Found, layer: str | None) -> bool:
     return any(fnmatchcase(path, word) for path in paths)
 
 
-def _nearly(part: Part, others: Sequence[Part], meant: Sequence[Found], content: FileContent) -> list[str]:
-    """Where edges of another part come near, but not within the tolerance."""
+def _nearly(
+    part: Part, others: Sequence[Part], meant: Sequence[Found], content: FileContent
+) -> dict[int, str]:
+    """Where edges of other parts come near, but not within the tolerance: a sentence by id of the part."""
     tolerance = content.tolerance
     number = {id(item): i for i, item in enumerate(content.objects)}
     if tolerance is None or not len(part.rim):
-        return []
-    told = []
+        return {}
+    told = {}
     tree = cKDTree(part.rim)
     for other in others:
         if not len(other.rim):
             continue
         distance = np.asarray(tree.query(other.rim)[0])
-        k = int(np.argmin(distance))
+        k = int(np.argmin(np.where(distance > tolerance, distance, np.inf)))
         if tolerance < distance[k] < NEARLY * tolerance:
             near = meant[other.members[0]]
-            told.append(
+            told[id(other)] = (
                 f"{label(near, number[id(near)])} comes within {distance[k]:.3g} of the "
                 f"surface at {point(other.rim[k])}, more than the file's tolerance of {tolerance:g}, and was "
                 "not joined: close the gap with Rhino's MatchSrf or JoinEdge."
             )
-    return told[:SHOWN]
+    return told
 
 
 def several(
-    content: FileContent, objects: Sequence[Found], count: int, unit: str | None
+    content: FileContent,
+    objects: Sequence[Found],
+    count: int,
+    unit: str | None,
+    gaps: Sequence[str] = (),
 ) -> SeveralObjectsError:
     distinct = list({id(found): found for found in objects}.values())
     if len(distinct) < 2:
@@ -169,6 +226,6 @@ def several(
         f"The file holds {len(distinct)} objects that could be meant: "
         f"{listed(distinct, unit, content.objects)}. Name one with --object or --layer ('object' or 'layer' "
         "of the surface in a request), or hide the others; edges that meet within the file's tolerance are "
-        "joined.",
+        f"joined. {' '.join(gaps[:SHOWN])}".rstrip(),
         data={"objects": rows(content.objects)},
     )

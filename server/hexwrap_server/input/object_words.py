@@ -43,6 +43,11 @@ def coarse_numbers(geometry: Geometry, tolerance: float | None) -> list[str]:
     ]
 
 
+def copies(count: int) -> tuple[str, ...]:
+    what = "1 object covers another one exactly" if count == 1 else f"{count} objects cover others exactly"
+    return (f"{what}: left out (Rhino's SelDup selects such).",) if count else ()
+
+
 def strays(strays: Sequence[Piece]) -> list[str]:
     """A sentence for small pieces that hang at a vertex or an edge of a larger one, another for the rest."""
     fins, others = ([piece for piece in strays if piece.is_fin is fin] for fin in (True, False))

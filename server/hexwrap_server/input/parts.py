@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from hexwrap_server.input.readers.found import STRAY, FileContent, Found, Geometry
 from hexwrap_solver.arrays import Floats, Ints
@@ -28,31 +30,29 @@ COARSEST = 1e-3
 class Part:
     """Something that hangs together. members: places of its objects. area: of a mesh, or of control nets.
 
-    make: its geometry. rim: (k, 3) points on its boundary.
+    make: its geometry. rim: (k, 3) points on its boundary. box: (2, 3) its lowest and highest coordinates.
     """
 
     members: tuple[int, ...]
     loops: int
     area: float
     rim: Floats
+    box: Floats
     make: Callable[[], Geometry]
-
-    @property
-    def rank(self) -> int:
-        return 0 if self.loops > 1 else 1 if self.loops == 0 else 2
 
 
 @dataclass(frozen=True)
 class Parts:
     """strays: small pieces that were left out, with the places of their objects. joints: what was joined.
 
-    spoilt: objects that cannot be read, with the reason.
+    spoilt: objects that cannot be read, with the reason. copies: objects that another one covers exactly.
     """
 
     parts: list[Part] = field(default_factory=list)
     strays: list[tuple[set[int], Piece]] = field(default_factory=list)
     joints: list[Joint] = field(default_factory=list)
     spoilt: list[tuple[int, str]] = field(default_factory=list)
+    copies: list[int] = field(default_factory=list)
 
 
 def parts_of(content: FileContent, meant: Sequence[Found]) -> Parts:
@@ -68,9 +68,15 @@ def parts_of(content: FileContent, meant: Sequence[Found]) -> Parts:
         return found
     meshes: list[tuple[int, SentMesh]] = []
     others: list[tuple[int, NurbsSurface | Brep]] = []
+    prints: list[Floats] = []
     for i, item in enumerate(meant):
         try:
             geometry = item.read()
+            if len(meant) > 1:
+                prints.append(_print_of(geometry))
+                if _is_copy(prints, content.tolerance):
+                    found.copies.append(i)
+                    continue
             if isinstance(geometry, SentMesh):
                 check_arrays(geometry)
                 meshes.append((i, geometry))
@@ -88,6 +94,32 @@ def parts_of(content: FileContent, meant: Sequence[Found]) -> Parts:
     return found
 
 
+def _print_of(geometry: Geometry) -> Floats:
+    """(13,) what tells a geometry from others whichever way its parameters run: the number, box, mean and
+    spread of the points that define it."""
+    if isinstance(geometry, SentMesh):
+        nets = [geometry.vertices[geometry.faces.values]]
+    elif isinstance(geometry, Brep):
+        nets = [geometry.vertices, *(face.surface.control_points[..., :3] for face in geometry.faces)]
+    else:
+        nets = [geometry.control_points[..., :3]]
+    points = np.concatenate([net.reshape(-1, 3) for net in nets])
+    if not len(points):
+        return np.zeros(13)
+    ends = np.concatenate([points.min(axis=0), points.max(axis=0)])
+    return np.concatenate([[len(points)], ends, points.mean(axis=0), points.std(axis=0)])
+
+
+def _is_copy(prints: list[Floats], tolerance: float | None) -> bool:
+    """Whether the last one is the print of an earlier one; if so, it is taken off the list."""
+    last, before = prints[-1], np.array(prints[:-1]).reshape(-1, len(prints[-1]))
+    near = _allowed(tolerance, float(np.linalg.norm(last[4:7] - last[1:4])))
+    same = ((before[:, 0] == last[0]) & (np.abs(before - last) <= near).all(axis=1)).any()
+    if same:
+        prints.pop()
+    return bool(same)
+
+
 def _add_meshes(mesh: SentMesh, owner: Ints, tolerance: float | None, found: Parts) -> None:
     if tolerance is not None:
         mesh, source, joint = joined(mesh, min(tolerance, COARSEST * _size(mesh.vertices[mesh.faces.values])))
@@ -103,7 +135,14 @@ def _add_meshes(mesh: SentMesh, owner: Ints, tolerance: float | None, found: Par
             found.strays.append((set(members), piece))
         else:
             found.parts.append(
-                Part(tuple(members), piece.loops, piece.area, piece.rim, partial(only, mesh, piece.faces))
+                Part(
+                    tuple(members),
+                    piece.loops,
+                    piece.area,
+                    piece.rim,
+                    np.array([piece.low, piece.high]),
+                    partial(only, mesh, piece.faces),
+                )
             )
 
 
@@ -126,7 +165,9 @@ def _add_breps(objects: list[tuple[int, NurbsSurface | Brep]], tolerance: float 
         own = [geometry for i, geometry in objects if i in members]
         rim, loops = _naked(whole, faces)
         make = partial(_same, own[0]) if len(own) == 1 else partial(_some, whole, faces)
-        found.parts.append(Part(members, loops, _net_area(whole, faces), rim, make))
+        nets = np.concatenate([whole.faces[f].surface.control_points[..., :3].reshape(-1, 3) for f in faces])
+        box = np.array([nets.min(axis=0), nets.max(axis=0)])
+        found.parts.append(Part(members, loops, _net_area(whole, faces), rim, box, make))
 
 
 def _same(geometry: Geometry) -> Geometry:
@@ -168,46 +209,31 @@ def _some(brep: Brep, faces: Iterable[int]) -> Brep:
 
 def _connected(brep: Brep) -> list[list[int]]:
     """Faces that hang together across edges."""
-    label = list(range(len(brep.faces)))
-
-    def root(f: int) -> int:
-        while label[f] != f:
-            label[f] = label[label[f]]
-            f = label[f]
-        return f
-
-    first: dict[int, int] = {}
-    for f, face in enumerate(brep.faces):
-        for loop in face.loops:
-            for trim in loop:
-                if trim.edge >= 0:
-                    label[root(f)] = root(first.setdefault(trim.edge, f))
-    groups: dict[int, list[int]] = {}
-    for f in range(len(brep.faces)):
-        groups.setdefault(root(f), []).append(f)
-    return list(groups.values())
+    uses = _uses(brep, range(len(brep.faces)))
+    n, nodes = len(brep.faces), len(brep.faces) + len(brep.edges)
+    label = _components(uses[:, 0], n + uses[:, 1], nodes)[:n]
+    return [np.flatnonzero(label == k).tolist() for k in dict.fromkeys(label.tolist())]
 
 
 def _naked(brep: Brep, faces: Sequence[int]) -> tuple[Floats, int]:
     """Ends of edges with one face only, and the number of closed curves that these edges make."""
-    uses: dict[int, int] = {}
-    for f in faces:
-        for loop in brep.faces[f].loops:
-            for trim in loop:
-                if trim.edge >= 0:
-                    uses[trim.edge] = uses.get(trim.edge, 0) + 1
-    naked = [e for e, count in uses.items() if count == 1]
-    label: dict[int, int] = {}
+    edge, count = np.unique(_uses(brep, faces)[:, 1], return_counts=True)
+    ends = np.array([(e.start, e.end) for e in (brep.edges[k] for k in edge[count == 1])], dtype=np.int64)
+    start, end = ends.reshape(-1, 2).T
+    used = np.unique(ends)
+    return brep.vertices[used], len(np.unique(_components(start, end, len(brep.vertices))[used]))
 
-    def root(v: int) -> int:
-        while label.setdefault(v, v) != v:
-            v = label[v]
-        return v
 
-    for e in naked:
-        label[root(brep.edges[e].start)] = root(brep.edges[e].end)
-    ends = sorted(label)
-    return brep.vertices[ends], len({root(v) for v in ends})
+def _uses(brep: Brep, faces: Iterable[int]) -> Ints:
+    """(k, 2) face and edge, wherever a face has an edge on its boundary."""
+    trims = ((f, trim.edge) for f in faces for loop in brep.faces[f].loops for trim in loop)
+    return np.array([use for use in trims if use[1] >= 0], dtype=np.int64).reshape(-1, 2)
+
+
+def _components(one: Ints, other: Ints, n: int) -> Ints:
+    """(n,) label of each node of a graph with these edges."""
+    graph = coo_array((np.ones(len(one)), (one, other)), shape=(n, n))
+    return np.asarray(connected_components(graph, directed=False)[1])
 
 
 def _net_area(brep: Brep, faces: Sequence[int]) -> float:

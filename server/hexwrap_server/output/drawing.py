@@ -43,4 +43,5 @@ def encode(document: Drawing) -> bytes:
     """The drawing as a DXF file."""
     text = io.StringIO()
     document.write(text)
-    return document.encode(text.getvalue())
+    data: bytes = document.encode(text.getvalue())
+    return data

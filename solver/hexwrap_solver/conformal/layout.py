@@ -52,7 +52,7 @@ def lay_out(
     """
     nothing = np.zeros(0, dtype=np.int64)
     cut = cut_open(surface, nothing if cones is None else cones)
-    place = _develop(cut.twin, lengths, metric)
+    place = develop(FaceTree.of(cut.twin), lengths, metric)
     # The holonomy of what lies beyond a piece, seen from its right, is a rotation by minus its curvature.
     angle = -(cut.beyond @ curvature)
     glued = _glue(surface, place, cut, angle)
@@ -67,36 +67,66 @@ def lay_out(
     return Layout(Unrolled(uv, sheet, deck, circumference), glued.disagreement / circumference)
 
 
-def _develop(twin: Ints, lengths: Floats, metric: Corners) -> Complexes:
-    """(3, m) where the corners of every triangle stand, consistent across all edges of a tree of faces.
+@dataclass(frozen=True)
+class FaceTree:
+    """order: (m,) the faces, breadth first, which puts parents side by side in memory. up: (m,) the place of
+    each one's parent in that order. Per face, parent: (m,); corner: (m,) where the edge towards it starts;
+    there: (m,) where the same edge starts in the parent. The root is its own parent."""
+
+    order: Ints
+    up: Ints
+    parent: Ints
+    corner: Ints
+    there: Ints
+
+    @classmethod
+    def of(cls, twin: Ints) -> FaceTree:
+        """twin: (3m,) half-edges across, −1 where there is none; face 0 is the root."""
+        m = len(twin) // 3
+        neighbour = np.where(twin >= 0, twin, np.arange(3 * m)) // 3  # itself, where there is none
+        starts = np.arange(0, 3 * m + 1, 3)
+        graph = sparse.csr_matrix((np.ones(3 * m, dtype=np.int8), neighbour, starts), shape=(m, m))
+        found, before = breadth_first_order(graph, 0)
+        order, parent = found.astype(np.int64), before.astype(np.int64)
+        parent[0] = 0
+        place = np.empty(m, dtype=np.int64)
+        place[order] = np.arange(m)
+        across = neighbour.reshape(-1, 3).T
+        corner = np.where(across[0] == parent, 0, np.where(across[1] == parent, 1, 2))
+        there = twin[3 * np.arange(m) + corner] - 3 * parent
+        there[order[0]] = 0
+        return cls(order, place[parent[order]], parent, corner, there)
+
+
+def develop(tree: FaceTree, lengths: Floats, metric: Corners) -> Complexes:
+    """(3, m) where the corners of every triangle stand, consistent across all edges of the tree.
 
     First come the directions, one angle per face, then the places: both are sums along the tree.
     """
-    m, angles = len(twin) // 3, metric.angle
-    order, up, parent, corner = _face_tree(twin)
+    m, angles = len(tree.parent), metric.angle
+    parent, corner, there = tree.parent, tree.corner, tree.there
     face = np.arange(m)
     # A face's edges head for 0, π − α₁ and α₀ − π where its first edge heads for 0.
     heading = np.stack([np.zeros(m), np.pi - angles[1], angles[0] - np.pi])
-    there = twin[3 * face + corner] - 3 * parent  # the shared edge, seen from the parent: it runs backwards
-    there[order[0]] = 0
+    # the shared edge, seen from the parent, runs backwards
     turn = heading[there, parent] + np.pi - heading[corner, face]
-    first_edge = np.exp(1j * _summed_along(up, order, turn))
+    first_edge = np.exp(1j * _summed_along(tree, turn))
     place = np.zeros((3, m), dtype=complex)
     place[1] = lengths[2] * first_edge
     place[2] = lengths[1] * first_edge * metric.directions()
     ends = place + place[[1, 2, 0]]  # twice the middles of the edges
-    place += _summed_along(up, order, (ends[there, parent] - ends[corner, face]) / 2)
+    place += _summed_along(tree, (ends[there, parent] - ends[corner, face]) / 2)
     return place
 
 
-def _summed_along(up: Ints, order: Ints, steps: Numbers) -> Numbers:
+def _summed_along(tree: FaceTree, steps: Numbers) -> Numbers:
     """(m,) sums of the steps on the way from the root to each face, by pointer jumping: after k rounds every
     face knows the sum of 2^k steps, so rounds and rounding errors grow with log(depth).
 
-    up, order: see ``_face_tree``. steps: (m,) per face, from its parent to it; the root's is ignored.
+    steps: (m,) per face, from its parent to it; the root's is ignored.
     """
-    up = up.copy()
-    total = steps[order]
+    up = tree.up.copy()
+    total = steps[tree.order]
     total[0] = 0
     first = 1  # the faces before it know their way to the root: parents stand before their children
     while first < len(up):
@@ -106,26 +136,8 @@ def _summed_along(up: Ints, order: Ints, steps: Numbers) -> Numbers:
         up[rest] = up[above]
         first = int(np.searchsorted(up, 1))
     result = np.empty_like(total)
-    result[order] = total
+    result[tree.order] = total
     return result
-
-
-def _face_tree(twin: Ints) -> tuple[Ints, Ints, Ints, Ints]:
-    """order: (m,) the faces, breadth first, which puts parents side by side in memory. up: (m,) the place of
-    each one's parent in that order. Per face, parent: (m,) and corner: (m,) where the edge towards it starts.
-    The root is its own parent."""
-    m = len(twin) // 3
-    neighbour = np.where(twin >= 0, twin, np.arange(3 * m)) // 3  # itself, where there is none
-    starts = np.arange(0, 3 * m + 1, 3)
-    graph = sparse.csr_matrix((np.ones(3 * m, dtype=np.int8), neighbour, starts), shape=(m, m))
-    found, before = breadth_first_order(graph, 0)
-    order, parent = found.astype(np.int64), before.astype(np.int64)
-    parent[0] = 0
-    place = np.empty(m, dtype=np.int64)
-    place[order] = np.arange(m)
-    across = neighbour.reshape(-1, 3).T
-    corner = np.where(across[0] == parent, 0, np.where(across[1] == parent, 1, 2))
-    return order, place[parent[order]], parent, corner
 
 
 @dataclass(frozen=True)

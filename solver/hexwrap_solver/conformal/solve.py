@@ -8,13 +8,14 @@ import numpy as np
 
 from hexwrap_solver.arrays import Floats, Progress, no_progress
 from hexwrap_solver.conformal import boundary
+from hexwrap_solver.conformal.better import corner_notes
 from hexwrap_solver.conformal.corners import boundary_angles
 from hexwrap_solver.conformal.energy import Energy
 from hexwrap_solver.conformal.fixed import Minimum, minimise
 from hexwrap_solver.conformal.layout import lay_out
 from hexwrap_solver.conformal.net import Net
 from hexwrap_solver.conformal.openings import cut_openings
-from hexwrap_solver.conformal.orientation import faithful, positive
+from hexwrap_solver.conformal.orientation import faithful, positively_oriented
 from hexwrap_solver.conformal.robust import FlatMetric, metric_with_flips, solve_with_flips, with_inserted
 from hexwrap_solver.conformal.span import MAX_SPAN, check_reach, check_span, cone_angle_of
 from hexwrap_solver.conformal.types import (
@@ -66,6 +67,8 @@ def conformal_map(
         targets = boundary.targets(surface, [a for a in angles if a is not None], cones)
         found = map_to(surface, targets, cones, None, progress)
         found = scaled(found, -_mean_on_area(found.surface, found.log_scale))
+        if found.surface is surface and not found.flips and not len(cones):
+            found = replace(found, notes=(*found.notes, *corner_notes(surface, targets, found.log_scale)))
     if condition.mode == "angles" and not condition.angles:
         found = replace(found, notes=(NO_ANGLES, *found.notes))
     return found
@@ -145,6 +148,14 @@ def _isometric(
     return replace(second, notes=notes)
 
 
+def map_of_curvatures(surface: Surface, curvature: Floats, progress: Progress = no_progress) -> ConformalMap:
+    """The map with u constant along every loop, whose curvature is prescribed, (b,) radians; that of the
+    first is what Gauss–Bonnet leaves. Raises ConvergenceError."""
+    targets = boundary.targets(surface, [float(K) for K in curvature])
+    found = map_to(surface, targets, Cones.none(), None, progress)
+    return scaled(found, -_mean_on_area(found.surface, found.log_scale))
+
+
 def _rim_notes(found: ConformalMap, loops: list[int]) -> tuple[str, ...]:
     """How far edges of isometric loops are from their length, where flips have taken other edges for them."""
     if not found.flips:
@@ -200,7 +211,7 @@ class _Plain:
     @property
     def holds(self) -> bool:
         """Whether it is a flat metric."""
-        return self.minimum.converged and not self.minimum.broken
+        return self.minimum.converged and not self.minimum.violating
 
     @property
     def metric(self) -> FlatMetric:
@@ -234,7 +245,7 @@ def map_to(
         plain = _plain(surface, targets, start, progress)
         if plain.holds:
             found = _finish(plain, cones)
-            if positive(found.corners()).all() and faithful(found):
+            if positively_oriented(found.corners()).all() and faithful(found):
                 return found
         start = start if plain.start is None else plain.start
     return solve_with_flips(surface, targets, progress, start, cones)

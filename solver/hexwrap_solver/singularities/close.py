@@ -8,20 +8,22 @@ loops (a dipole each), so that the map stays conformal.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from hexwrap_solver.arrays import Complexes, Floats, Ints, Progress, no_progress
-from hexwrap_solver.conformal.energy import Corners, Energy, opposite_lengths
-from hexwrap_solver.conformal.fixed import minimise
-from hexwrap_solver.conformal.layout import _develop
+from hexwrap_solver.conformal.energy import Corners, corner_angles, opposite_lengths, total
+from hexwrap_solver.conformal.layout import FaceTree, develop
 from hexwrap_solver.errors import ConvergenceError
 from hexwrap_solver.linalg.factor import Factorisation
+from hexwrap_solver.linalg.integers import nearest_integers
 from hexwrap_solver.singularities.cut import Branches, branches
 from hexwrap_solver.singularities.drag import Grip, dragged, grips
-from hexwrap_solver.singularities.integers import nearest_integers
 from hexwrap_solver.singularities.linear import targets, vertex_areas
+from hexwrap_solver.singularities.solvable import solvable
 from hexwrap_solver.singularities.types import End
 from hexwrap_solver.surface.topology import next_half_edge
 from hexwrap_solver.surface.types import Surface
@@ -34,8 +36,10 @@ DIPOLE, STRETCH, TURN, SCALE = 0.15, 0.002, 0.1, 0.02
 STRIDE, STEPS, DONE, ACCEPTED = 0.6, 40, 1e-11, 1e-9
 #: A step beyond which there is no map is halved at most so often.
 HALVINGS = 5
-#: Differences for the Jacobian, in units, and the residual of the angle sums that will do for it.
-DIFFERENCE, ROUGH = 0.02, 1e-6
+#: Differences for the Jacobian, in units, to each of which the map is linear.
+DIFFERENCE = 1e-3
+#: Residual of the angle sums that will do on the way, radians per cell that is left to close.
+ROUGH = 1e-7
 #: Chord steps of the inner Newton's method, each of which must leave at most this part of the residual
 #: until it is down to rounding, radians.
 CHORDS, CHORD_GAIN, SMALL = 60, 0.3, 1e-12
@@ -54,20 +58,26 @@ class Line:
 
 
 @dataclass(frozen=True)
-class Seen:
-    """The map at some moves. place: (3, m) the layout. image: (e,) M(c) − c of every leaf's motion M, c
-    being the root's place; turn: (e,) quanta by which M turns. foot: per straight loop a point of it less
-    c, and heading its direction. residual: of the angle sums, radians. lengths, metric: (3, m) of the flat
-    triangles."""
+class Holonomy:
+    """image: (e,) M(c) − c of every leaf's motion M, c being the root's place; turn: (e,) quanta by which M
+    turns. foot: per straight loop a point of it less c, and heading its direction."""
 
-    surface: Surface
-    u: Floats
-    place: Complexes
     image: Complexes
     turn: Ints
     center: complex
     foot: Complexes
     heading: Complexes
+
+
+@dataclass(frozen=True)
+class Seen:
+    """The map at some moves. place: (3, m) the layout. residual: of the angle sums, radians. lengths,
+    metric: (3, m) of the flat triangles."""
+
+    surface: Surface
+    u: Floats
+    place: Complexes
+    holonomy: Holonomy
     residual: float
     lengths: Floats
     metric: Corners
@@ -85,41 +95,39 @@ class Chart:
         ends: tuple[End, ...],
         quantum: float,
         cell: float,
-        slope: Floats | None = None,
+        slope: Callable[[Surface], Floats] | None = None,
         angles: Floats | None = None,
     ) -> None:
         """The first cone is the root of the cut. angles: see ``targets``. slope: (m, 3) squared sine of
         every half-edge's angle to the horizontal, in which direction a stretch is allowed; None: none is.
-        Raises ConvergenceError."""
+        The surface gets more vertices where its triangles cannot follow the map. Raises ConvergenceError."""
+        wanted = partial(targets, ends=ends, loops=loops, quantum=quantum, vertex=cones, index=index)
+        self.energy, surface, found = solvable(
+            surface, lambda one: wanted(one, angles=_extended(angles, one))
+        )
         self.surface, self.cones, self.index, self.cell = surface, cones, index, cell
         self.quantum, self.ends = quantum, ends
-        self.energy = Energy(surface, targets(surface, ends, loops, quantum, cones, index, angles=angles))
         self.factor = Factorisation(self.energy.points, self.energy.rows, self.energy.columns)
         self.cut: Branches = branches(surface, int(cones[0]), cones[1:], tuple(surface.loops))
+        self.tree = FaceTree.of(self.cut.twin)
         self.hold: list[Grip] = grips(surface, cones, cell)
         pairs = list(zip(surface.loops, ends, strict=True))
         self.waves = [_waves(surface, loop) for loop, end in pairs if end == "free"]
         self.straight = [_rim(surface, loop) for loop, end in pairs if end == "straight"]
-        self.slope = None if slope is None else np.ascontiguousarray(slope.T[[1, 2, 0]])
+        self.slope = None if slope is None else np.ascontiguousarray(slope(surface).T[[1, 2, 0]])
         self.area = vertex_areas(surface)
-        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            found = minimise(self.energy)
-        if not found.converged or found.broken:
-            raise ConvergenceError(
-                "With these singularities there is no map on the triangles of the surface as they are: send "
-                "a finer or more regular mesh, or ask for fewer singularities."
-            )
         self.factor.factorise(*self.energy.hessian(found.corners))
         self._x = self.energy.unknowns_of(found.u)
+        self._at = np.zeros(self.unknowns)
+        self._response: Floats | None = None  # (n_dof, unknowns) of the energy's unknowns to those here
         self._root = int(np.flatnonzero(surface.faces.ravel() == cones[0])[0])
 
     @property
     def unknowns(self) -> int:
         return 2 * len(self.cones) + 2 * len(self.waves) + (self.slope is not None)
 
-    def at(self, x: Floats, enough: float = 0.0) -> Seen:
-        """x: (unknowns,) moves of each singularity in cells, dipoles and stretch in their units. enough:
-        residual of the angle sums that will do, 0: rounding."""
+    def _given(self, x: Floats) -> tuple[Surface, Floats, Floats]:
+        """The surface with its mesh dragged, (n,) the dipoles' part of u, (3, m) lengths with both."""
         s, d = 2 * len(self.cones), 2 * len(self.waves)
         surface = dragged(self.surface, self.hold, x[:s].reshape(-1, 2) * self.cell)
         factor = np.zeros(len(surface.vertices))
@@ -129,35 +137,88 @@ class Chart:
         lengths = opposite_lengths(surface.vertices, surface.faces) * half[[1, 2, 0]] * half[[2, 0, 1]]
         if self.slope is not None:
             lengths *= np.sqrt(1 + ((1 + STRETCH * x[-1]) ** 2 - 1) * self.slope)
-        self.energy.lengths = lengths
-        u, corners, residual = self._solve(enough)
-        total = u + factor
-        shift = float(self.area @ total / self.area.sum())
+        return surface, factor, lengths
+
+    def at(self, x: Floats, enough: float = 0.0) -> Seen:
+        """x: (unknowns,) moves of each singularity in cells, dipoles and stretch in their units. enough:
+        residual of the angle sums that will do, 0: rounding."""
+        surface, factor, self.energy.lengths = self._given(x)
+        start = self._x
+        if self._response is not None:
+            start = start + self._response @ (x - self._at)
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # where there is no map
+            u, corners, residual = self._solve(start, enough)
+        self._at = x.copy()
+        shift = self._mean(u + factor)
         flat_lengths = self.energy.scaled_lengths(u - shift)
-        place = _develop(self.cut.twin, flat_lengths, corners)
-        flat = place.T.ravel()
+        place = develop(self.tree, flat_lengths, corners)
+        holonomy = self._holonomy(place.T.ravel())
+        return Seen(surface, u + factor - shift, place, holonomy, residual, flat_lengths, corners)
+
+    def _mean(self, u: Floats) -> float:
+        return float(self.area @ u / self.area.sum())
+
+    def small_steps(self, step: float) -> list[Holonomy]:
+        """What is seen after a step of each unknown from 0, where the map must be the last one that was
+        found: by one step of Newton's method for all of them together."""
+        energy, base, x = self.energy, self.energy.lengths, self._x
+        u = energy.scale_of(x)
+        scale = np.exp((u.mean() - u) / 2)
+        given, right = [], np.empty((energy.n_dof, self.unknowns))
+        for i in range(self.unknowns):
+            one = np.zeros(self.unknowns)
+            one[i] = step
+            _, factor, lengths = self._given(one)
+            given.append((factor, lengths))
+            face = np.flatnonzero((lengths != base).any(axis=0))
+            corner = energy.corner[:, face]
+            angle = [corner_angles(of[:, face] * scale[corner]).angle for of in (lengths, base)]
+            change = total(corner.ravel(), (angle[0] - angle[1]).ravel(), energy.n)
+            right[:, i] = energy.reduce(change)
+        response = self.factor.solve(right)
+        self._response = response / step
+        face, tree = self._surroundings()
+        found = []
+        for i, (factor, lengths) in enumerate(given):
+            u = energy.scale_of(x + response[:, i])
+            u -= self._mean(u + factor)
+            corner = energy.corner[:, face]
+            half = np.exp(u / 2)[corner]
+            flat_lengths = lengths[:, face] * half[[1, 2, 0]] * half[[2, 0, 1]]
+            flat = np.full((len(self.surface.faces), 3), np.nan, dtype=complex)
+            flat[face] = develop(tree, flat_lengths, corner_angles(flat_lengths)).T
+            found.append(self._holonomy(flat.ravel()))
+        return found
+
+    def _surroundings(self) -> tuple[Ints, FaceTree]:
+        """The faces along the cut and the straight loops, and those that lead there from the tree's root;
+        and a tree of them."""
+        ways = np.concatenate([np.zeros(0, dtype=np.int64), *self.cut.ways])
+        edges = np.concatenate([[self._root, 0], ways, self.surface.twin[ways], *self.straight])
+        needed, here = np.zeros(len(self.surface.faces), dtype=bool), np.unique(edges // 3)
+        while len(here):
+            needed[here] = True
+            here = np.unique(self.tree.parent[here])
+            here = here[~needed[here]]
+        face = np.flatnonzero(needed)
+        new = np.full(len(needed), -1)
+        new[face] = np.arange(len(face))
+        twin = self.cut.twin.reshape(-1, 3)[face].ravel()
+        inside = (twin >= 0) & (new[twin // 3] >= 0)
+        return face, FaceTree.of(np.where(inside, 3 * new[twin // 3] + twin % 3, -1))
+
+    def _holonomy(self, flat: Complexes) -> Holonomy:
+        """flat: (3m,) the layout."""
         center = complex(flat[self._root])
         image, turn = self._images(flat, center)
         rims = [(flat[h], flat[next_half_edge(h)]) for h in self.straight]
         foot = np.array([complex((start + end).mean() / 2) - center for start, end in rims])
         heading = np.array([complex((end - start).sum()) for start, end in rims])
-        return Seen(
-            surface,
-            total - shift,
-            place,
-            image,
-            turn,
-            center,
-            foot,
-            heading,
-            residual,
-            flat_lengths,
-            corners,
-        )
+        return Holonomy(image, turn, center, foot, heading)
 
-    def _solve(self, enough: float) -> tuple[Floats, Corners, float]:
-        """Newton's method from the last solution; the Hessian is factorised again where it has aged."""
-        energy, x = self.energy, self._x
+    def _solve(self, x: Floats, enough: float) -> tuple[Floats, Corners, float]:
+        """Newton's method from x; the Hessian is factorised again where it has aged."""
+        energy = self.energy
         corners = energy.corners(energy.scale_of(x))
         gradient = energy.gradient(corners)
         residual, fresh = float(np.abs(gradient).max()), False
@@ -168,7 +229,7 @@ class Chart:
             seen = energy.corners(energy.scale_of(trial))
             new = energy.gradient(seen)
             after = float(np.abs(new).max())
-            good = after < residual and not seen.broken.any()
+            good = after < residual and not seen.violating.any()
             gain = after / max(residual, 1e-300)
             if good:
                 x, corners, gradient, residual = trial, seen, new, after
@@ -206,6 +267,13 @@ class Chart:
             images.append(rho * center + shift - center)
             turns.append(turn)
         return np.array(images, dtype=complex), np.array(turns, dtype=np.int64)
+
+
+def _extended(angles: Floats | None, surface: Surface) -> Floats | None:
+    """Target angles of new vertices, too: on a loop they are straight."""
+    if angles is None:
+        return None
+    return np.concatenate([angles, np.full(len(surface.vertices) - len(angles), np.pi)])
 
 
 def _waves(surface: Surface, loop: Ints) -> tuple[Ints, Floats]:
@@ -290,7 +358,8 @@ class Closing:
         self.lines = np.flatnonzero(np.array(on_line, dtype=bool)[np.array(straight, dtype=bool)])
         self.order = round(2 * np.pi / chart.quantum)
         self.zeta = complex(np.exp(1j * chart.quantum))
-        self.base = chart.at(np.zeros(chart.unknowns))
+        self.base = chart.at(np.zeros(chart.unknowns)).holonomy
+        self.aim = np.zeros((len(chart.cones), 2))  # where singularities go at first, cells
         s = len(chart.cones) - 1
         loops = [-1] * s + [-2 if self.line is None or not on else -3 for on in on_line]
         kind = np.array(loops, dtype=np.int64)
@@ -307,7 +376,7 @@ class Closing:
         cone = np.arange(len(kind)) < s
         self.divisor = np.where(cone, 1 - self.zeta**self.base.turn, 1.0)[self.kept]
 
-    def _depth(self, seen: Seen, factor: complex) -> Floats:
+    def depth(self, seen: Holonomy, factor: complex) -> Floats:
         """Of straight loops that are to be aligned, inwards."""
         if self.line is None:
             return np.zeros(0)
@@ -315,21 +384,12 @@ class Closing:
         inward = 1j * heading / np.abs(heading)
         return np.asarray(abs(factor) * (inward.conj() * foot).real)
 
-    def _values(self, seen: Seen, factor: complex) -> Floats:
+    def _values(self, seen: Holonomy, factor: complex) -> Floats:
         """All equations, real."""
         image = factor * seen.image[self.kept]
-        return np.concatenate([image.real, image.imag, self._depth(seen, factor)])
+        return np.concatenate([image.real, image.imag, self.depth(seen, factor)])
 
-    def _jacobian(self) -> list[Seen]:
-        """What is seen after a small change of each unknown."""
-        found = []
-        for i in range(self.chart.unknowns):
-            x = np.zeros(self.chart.unknowns)
-            x[i] = DIFFERENCE
-            found.append(self.chart.at(x, ROUGH))
-        return found
-
-    def _slopes(self, changed: list[Seen], factor: complex) -> Floats:
+    def _slopes(self, changed: list[Holonomy], factor: complex) -> Floats:
         """(equations, unknowns + 2); the last two: turn and scale of the lattice."""
         here = self._values(self.base, factor)
         columns = [(self._values(seen, factor) - here) / DIFFERENCE for seen in changed]
@@ -337,14 +397,14 @@ class Closing:
             columns.append((self._values(self.base, factor * change) - here) / DIFFERENCE)
         return np.stack(columns, axis=1)
 
-    def start(self, changed: list[Seen]) -> Goal:
+    def start(self, changed: list[Holonomy]) -> Goal:
         """The place of the lattice, and the integers there, that ask for the least moves."""
         factors = self._factors()
         if self.line is None:
             factors = [self._least(changed, np.array(factors))]
         return min((self._goal(changed, factor) for factor in factors), key=lambda goal: goal.cost)
 
-    def _least(self, changed: list[Seen], factors: Complexes) -> complex:
+    def _least(self, changed: list[Holonomy], factors: Complexes) -> complex:
         """Of many places of the lattice the one whose nearest translations ask for the least moves."""
         image = self.base.image[self.kept]
         inverse = np.linalg.pinv(self._slopes(changed, 1.0), rcond=1e-9)
@@ -373,7 +433,7 @@ class Closing:
         turns = np.arange(TURNS) / TURNS * self.chart.quantum
         return [complex(np.exp(1j * turn) / (self.width * scale)) for scale in scales for turn in turns]
 
-    def _goal(self, changed: list[Seen], factor: complex) -> Goal:
+    def _goal(self, changed: list[Holonomy], factor: complex) -> Goal:
         """The integers nearest in moves."""
         here = self._values(self.base, factor)
         slopes = self._slopes(changed, factor)
@@ -411,36 +471,46 @@ class Closing:
             column[2 * e + i] = self.line.period
             columns.append(column)
             rest[2 * e + i] = self.line.first
-        return np.stack(columns, axis=1), rest
+        return np.array(columns, dtype=float).reshape(len(columns), len(rest)).T, rest
 
-    def _stepped(self, x: Floats, step: Floats) -> tuple[Floats, Seen]:
+    def _stepped(self, x: Floats, step: Floats, enough: float) -> tuple[Floats, Seen]:
         """The step, halved until the map of the moved singularities is found, and that map."""
         for _ in range(HALVINGS):
             try:
-                return step, self.chart.at(x + step[:-2])
+                return step, self.chart.at(x + step[:-2], enough)
             except ConvergenceError:
                 step = step / 2
-        return step, self.chart.at(x + step[:-2])
+        return step, self.chart.at(x + step[:-2], enough)
+
+    @property
+    def aims(self) -> Floats:
+        """(s, 3) where the singularities would come to stand, as far as that was known at first."""
+        chart = self.chart
+        return np.asarray(
+            dragged(chart.surface, chart.hold, chart.cell * self.aim).vertices[chart.cones], dtype=np.float64
+        )
 
     def solve(self, progress: Progress = no_progress) -> Closed:
         """Raises ConvergenceError where it does not close."""
         chart = self.chart
-        changed = self._jacobian()
+        changed = chart.small_steps(DIFFERENCE)
         goal = self.start(changed)
         wanted = np.concatenate([goal.image.real, goal.image.imag, goal.depth])
-        factor, x, seen = goal.factor, np.zeros(chart.unknowns), self.base
+        factor, x, seen = goal.factor, np.zeros(chart.unknowns), None
         slopes = self._slopes(changed, factor)
-        off = wanted - self._values(seen, factor)
-        best, steps, s = float(np.abs(off).max()), 0, 2 * len(chart.cones)
+        off = wanted - self._values(self.base, factor)
+        best, steps, s = float(np.abs(off).max(initial=0.0)), 0, 2 * len(chart.cones)
         for _ in range(STEPS):
             if best <= DONE:
                 break
             d: Floats = np.linalg.lstsq(slopes, off, rcond=1e-9)[0].astype(np.float64)
+            if not steps:
+                self.aim = d[:s].reshape(-1, 2)
             stride = float(np.hypot(d[0:s:2], d[1:s:2]).max())
             d *= min(1.0, STRIDE / max(stride, 1e-300))
-            d, new_seen = self._stepped(x, d)
+            d, new_seen = self._stepped(x, d, ROUGH * best)
             new_x, new_factor = x + d[:-2], factor * complex(np.exp(1j * TURN * d[-2] + SCALE * d[-1]))
-            new_off = wanted - self._values(new_seen, new_factor)
+            new_off = wanted - self._values(new_seen.holonomy, new_factor)
             slopes = slopes + np.outer(off - new_off - slopes @ d, d) / (d @ d)  # Broyden 1965
             residual = float(np.abs(new_off).max())
             progress(0.5, f"singularities close to {residual:.1e} cells")
@@ -448,7 +518,9 @@ class Closing:
                 break
             steps += 1
             x, factor, seen, off, best = new_x, new_factor, new_seen, new_off, residual
-        every = factor * seen.image
+        if seen is None or seen.residual > SMALL:
+            seen = chart.at(x)
+        every = factor * seen.holonomy.image
         motion = near_lattice(every, self.order)
         residual = max(best, float(np.abs(every - as_complex(motion, self.order)).max()))
         if residual > ACCEPTED:
@@ -462,5 +534,14 @@ class Closing:
         unstretched = chart.at(np.append(x[:-1], 0.0)) if stretch else seen
         moves = np.hypot(x[0:s:2], x[1:s:2])
         return Closed(
-            seen, unstretched, factor, -factor * seen.center, motion, moves, dipole, stretch, residual, steps
+            seen,
+            unstretched,
+            factor,
+            -factor * seen.holonomy.center,
+            motion,
+            moves,
+            dipole,
+            stretch,
+            residual,
+            steps,
         )

@@ -14,6 +14,7 @@ from hexwrap_solver.geometry import normalize
 from hexwrap_solver.surface.normals import with_tangents
 from hexwrap_solver.surface.nurbs import evaluate, evaluate_points, wrap
 from hexwrap_solver.surface.projection import project
+from hexwrap_solver.surface.topology import half_edges
 from hexwrap_solver.surface.types import Surface
 
 #: The mesh follows within so many cells, this part of the way to a loop, and that to the next singularity.
@@ -63,9 +64,19 @@ class Grip:
     steps: Floats | None
 
 
+def rims(surface: Surface) -> Ints:
+    """(k, 2) edges around the openings that were filled."""
+    if surface.patch is None:
+        return np.zeros((0, 2), dtype=np.int64)
+    inner = np.flatnonzero(surface.twin >= 0)
+    rim = inner[surface.patch[inner // 3] & ~surface.patch[surface.twin[inner] // 3]]
+    tail, head = half_edges(surface.faces)
+    return np.stack([tail[rim], head[rim]], axis=1)
+
+
 def grips(surface: Surface, cones: Ints, cell: float) -> list[Grip]:
     places = surface.vertices[cones]
-    loops = np.concatenate(surface.loops) if surface.loops else np.zeros(0, dtype=np.int64)
+    loops = np.union1d(surface.boundary, rims(surface))
     tree = cKDTree(surface.vertices)
     found = []
     for i, cone in enumerate(cones):

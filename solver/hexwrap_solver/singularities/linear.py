@@ -117,8 +117,8 @@ def targets(
     """Cone angles at vertices, curvatures in quanta on loops; background: further curvature, spread evenly
     over the area. angles: (n,) or more, of loops whose ends are "angles"."""
     n = len(surface.vertices)
-    angle, tie = np.full(n, 2 * np.pi), np.full(n, -1, dtype=np.int64)
-    tie_angle: list[float] = []
+    angle, shared = np.full(n, 2 * np.pi), np.full(n, -1, dtype=np.int64)
+    shared_angle: list[float] = []
     if background:
         share = vertex_areas(surface)
         angle -= background * share / share.sum()
@@ -126,9 +126,9 @@ def targets(
     for loop, end, curvature in zip(surface.loops, ends, loops, strict=True):
         angle[loop] -= np.pi if end != "angles" or angles is None else 2 * np.pi - angles[loop]
         if end == "free":
-            tie[loop] = len(tie_angle)
-            tie_angle.append(len(loop) * np.pi - curvature * quantum)
-    return Targets(angle, tie, np.array(tie_angle))
+            shared[loop] = len(shared_angle)
+            shared_angle.append(len(loop) * np.pi - curvature * quantum)
+    return Targets(angle, shared, np.array(shared_angle))
 
 
 def reference_loops(surface: Surface, rules: Rules) -> tuple[int, ...]:
@@ -178,17 +178,25 @@ class Responses:
         weight = np.bincount(patch, area)
         shape = (len(self.middle), len(patch))
         self.share = csr_array((area / weight[patch], (patch, np.arange(len(patch)))), shape=shape)
+        self._share_of = self.share @ _of_unknowns(energy)
         self.weight, self.reference = weight / weight.sum(), self._mean(u)
         self.steepness = Steepness.between(surface, patch, _means(surface.vertices, patch, area))
         self.shift = np.zeros(len(self.middle))
         if not self.free:  # a singularity takes its curvature from everywhere
             self.shift = self._mean(energy.scale_of(self.factor.solve(energy.reduce(area / area.sum()))))
-        ties = np.arange(energy.n_dof - max(len(self.free) - 1, 0), energy.n_dof)
-        self.loop_response = rules.quantum * self._mean(_scales(energy, self.factor, ties))
+        shared = np.arange(energy.n_dof - max(len(self.free) - 1, 0), energy.n_dof)
+        self.loop_response = rules.quantum * self._responses(shared)
 
     def _mean(self, values: Floats) -> Floats:
         """Over each patch."""
         return np.asarray(self.share @ values)
+
+    def _responses(self, dof: Ints) -> Floats:
+        """(p, k) mean u when a unit of curvature goes to each of the unknowns (−1: the pinned one)."""
+        right = np.zeros((self.energy.n_dof, len(dof)))
+        inside = np.flatnonzero(dof >= 0)
+        right[dof[inside], inside] = 1.0
+        return np.asarray(self._share_of @ self.factor.solve(right))
 
     def seats(self) -> Ints:
         """Vertices on which the rules allow a singularity, one in every patch."""
@@ -216,7 +224,7 @@ class Responses:
         response = np.empty((len(self.middle), len(seats)))
         for begin in range(0, response.shape[1], BLOCK):
             dof = self.energy.dof[seats[begin : begin + BLOCK]]
-            response[:, begin : begin + BLOCK] = self._mean(_scales(self.energy, self.factor, dof))
+            response[:, begin : begin + BLOCK] = self._responses(dof)
         response -= self.shift[:, None]
         around = None if self.turn is None else self.turn[seats]
         places = self.surface.vertices[seats]
@@ -274,7 +282,7 @@ def _reference(energy: Energy, steps: bool) -> tuple[Floats, Factorisation]:
     if steps:
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             found = minimise(energy)
-        if holds := found.converged and not found.broken:
+        if holds := found.converged and not found.violating:
             u, corners = found.u, found.corners
     factor = Factorisation(energy.points, energy.rows, energy.columns)
     diagonal, off = energy.hessian(corners)
@@ -284,13 +292,11 @@ def _reference(energy: Energy, steps: bool) -> tuple[Floats, Factorisation]:
     return energy.scale_of(factor.solve(-energy.gradient(corners))), factor
 
 
-def _scales(energy: Energy, factor: Factorisation, dof: Ints) -> Floats:
-    """(n, k) u when one unit of curvature goes to each of the unknowns (−1: the pinned one, nothing)."""
-    right = np.zeros((energy.n_dof, len(dof)))
-    inside = np.flatnonzero(dof >= 0)
-    right[dof[inside], inside] = 1.0
-    solved = factor.solve(right)
-    return np.asarray(np.concatenate([np.zeros((1, len(dof))), solved])[energy.dof + 1])
+def _of_unknowns(energy: Energy) -> csr_array:
+    """(n, n_dof) u of the vertices by the unknowns, but for what is fixed."""
+    vertex = np.flatnonzero(energy.dof >= 0)
+    ones = np.ones(len(vertex))
+    return csr_array((ones, (vertex, energy.dof[vertex])), shape=(energy.n, energy.n_dof))
 
 
 def _patches(surface: Surface, area: Floats, wanted: int) -> tuple[Ints, Ints]:
@@ -303,7 +309,9 @@ def _patches(surface: Surface, area: Floats, wanted: int) -> tuple[Ints, Ints]:
     low = vertices.min(axis=0)
     for _ in range(4):  # a surface meets more cubes than squares of its size
         box = np.floor((vertices - low) / size).astype(np.int64)
-        _, cube, count = np.unique(box, axis=0, return_inverse=True, return_counts=True)
+        most = box.max(axis=0) + 1
+        key = (box[:, 0] * most[1] + box[:, 1]) * most[2] + box[:, 2]
+        _, cube, count = np.unique(key, return_inverse=True, return_counts=True)
         size *= float(np.sqrt(len(count) / wanted))
     cube = cube.ravel()
     off = np.linalg.norm(vertices - _means(vertices, cube, area)[cube], axis=1)
@@ -334,6 +342,8 @@ def _allowed(surface: Surface, seat: Ints, rules: Rules) -> Bools:
     for loop in surface.loops:
         allowed &= cKDTree(surface.vertices[loop]).query(place)[0] >= rules.from_loops * rules.cell
         allowed &= ~np.isin(seat, loop)
+    if surface.patch is not None:  # what is cut out again
+        allowed &= np.isin(seat, surface.faces[~surface.patch])
     for line, cells in rules.away:
         allowed &= distance_to(place, line) >= cells * rules.cell
     if rules.only is not None:

@@ -25,8 +25,10 @@ Counts = NDArray[np.int8]
 BEAM, STARTS = 5, 16
 #: Random starts where straight ends must stand in lattice directions to each other: the best is hard to find.
 STARTS_ALIGNED = 48
-#: States of each number that are refined.
-REFINED = 8
+#: States of each number that are kept, and how many of these, those that leave least open, are refined.
+REFINED, PROMISING = 8, 3
+#: Values that are held at a time: of so many states as that makes.
+TOGETHER = 4_000_000
 #: Best seats that an addition tries per state.
 TRIED = 4
 #: Seats next to a singularity that the refinement tries, and its rounds.
@@ -84,7 +86,7 @@ class Search:
     _quadratic: Floats = field(init=False)
     _near: cKDTree = field(init=False)
     _by_seat: Floats = field(init=False)
-    _close: list[Counts] = field(init=False)
+    _close: Counts = field(init=False)
 
     def __post_init__(self) -> None:
         model = self.model
@@ -103,9 +105,10 @@ class Search:
         self._near = cKDTree(model.place)
         self._by_seat = np.ascontiguousarray(model.response.T)
         apart = self._apart() / self.rules.cell
-        self._close = [  # too near for opposite signs, and for equal ones
-            (apart < least).astype(np.int8) for least in (self.rules.opposite, self.rules.apart)
-        ]
+        # too near for opposite signs, and for equal ones
+        self._close = np.stack([apart < least for least in (self.rules.opposite, self.rules.apart)]).astype(
+            np.int8
+        )
 
     @property
     def seats(self) -> int:
@@ -175,8 +178,8 @@ class Search:
 
     def additions(self, state: State, k: int, most: int) -> list[tuple[float, State]]:
         """The best ways to add a singularity of index k, loops changed along with it."""
-        draft = _Draft(self, state)
-        values = draft.with_one_more(k, draft.crowd[int(k > 0)])
+        draft = _Drafts(self, [state])
+        values = draft.with_one_more(np.array([float(k)]), draft.crowd[:, int(k > 0)])[0]
         if not values.size:
             return []
         best = np.argpartition(values.ravel(), min(most, values.size) - 1)[:most]
@@ -193,38 +196,49 @@ class Search:
         """The least gain that is none of rounding."""
         return GAIN * max(self.constant, EQUAL)
 
-    def settled(self, state: State) -> tuple[float, State]:
-        """Each singularity relocated with the others held, loops changed by one, until nothing gains."""
-        draft = _Draft(self, state)
-        for _ in range(SWEEPS):
-            before = draft.total
-            for i in range(len(draft.pairs)):
-                draft.relocate(i, self.least)
-            draft.turn_loops(self.least)
-            if draft.total >= before - self.least:
-                break
-        return self.value(draft.state), draft.state
+    def settled(self, states: list[State]) -> list[tuple[float, State]]:
+        """States with equally many singularities: each of these relocated with the others held, loops changed
+        by one, until nothing gains."""
+        found: list[tuple[float, State]] = []
+        together = max(1, TOGETHER // max(len(self.moves) * self.seats, 1))
+        for begin in range(0, len(states), together):
+            drafts = _Drafts(self, states[begin : begin + together])
+            drafts.settle(self.least)
+            found += [(self.value(state), state) for state in drafts.states]
+        return found
 
     def with_loops(self, state: State) -> State:
         """The same singularities with the loops' curvatures that make the value least."""
-        draft = _Draft(self, state)
-        draft.turn_loops(self.least)
-        return draft.state
+        draft = _Drafts(self, [state])
+        draft.turn_loops(np.array([0]), self.least)
+        return draft.states[0]
 
     def refined(self, state: State, near: int = NEAR, rounds: int = ROUNDS) -> tuple[float, State]:
         """Moved from seat to one of the ``near`` next, and loops by one, for the least uncovered area."""
         least = np.inf
         for _ in range(rounds):
             around, u = self._neighbours(state, near)
-            values = self.misfit(u)
-            if self.rules.sizes is not None:
-                values += uncovered_of_many(u, self.model.weight, self.rules.sizes)
-            values += np.array([self._misdirected(one) for one in around]) / max(self.constant, EQUAL)
+            values = self._left_open(around, u)
             best = int(values.argmin())
             least, state = float(values[best]), around[best]
             if values[0] - least < SMALL:
                 break
         return least, state
+
+    def most_promising(self, states: list[tuple[float, State]], most: int) -> list[tuple[float, State]]:
+        """Those that leave least uncovered, in their order."""
+        if len(states) <= most:
+            return states
+        only = [state for _, state in states]
+        values = self._left_open(only, np.stack([self.scale(state) for state in only], axis=1))
+        return [states[i] for i in sorted(np.argsort(values, kind="stable")[:most])]
+
+    def _left_open(self, states: list[State], u: Floats) -> Floats:
+        """(m,) uncovered share, and the cost of wrong directions; u: (p, m) of the states."""
+        values = self.misfit(u)
+        if self.rules.sizes is not None:
+            values += uncovered_of_many(u, self.model.weight, self.rules.sizes)
+        return values + np.array([self._misdirected(one) for one in states]) / max(self.constant, EQUAL)
 
     def misfit(self, u: Floats) -> Floats:
         """Share of the area that panels of their own sizes leave open; u: (p, …)."""
@@ -272,90 +286,132 @@ class Search:
         return self.model.total is None or self.sum_of(state) == self.model.total
 
 
-class _Draft:
-    """A state that is being changed: what its value and derivative are, and which seats are taken, is kept
-    up."""
+class _Drafts:
+    """Several states of equally many singularities that are being changed, all at once: the value of each and
+    its derivative, and which seats are taken, is kept up.
 
-    def __init__(self, search: Search, state: State) -> None:
-        self.search, self.pairs, self.loops = search, state.pairs, state.loops
-        self.value, self.gradient = search._seen(state)
-        self.turn = 0.0
-        if search.model.turn is not None:
-            self.turn = float(search.model.turn[list(state.seat)] @ np.array(state.index, dtype=float))
-        self.crowd = [np.zeros(search.seats, dtype=np.int8) for _ in range(2)]  # for k < 0, for k > 0
-        for seat, k in self.pairs:
-            self._crowd(seat, k, 1)
+    seat: (s, n) and index: (s, n) of the singularities. loops: (s, f). value: (s,), gradient: (s, q + f) half
+    its derivative. turn: (s,) see ``Model``. crowd: (s, 2, q) singularities too near for one of negative and
+    of positive index.
+    """
+
+    def __init__(self, search: Search, states: list[State]) -> None:
+        self.search, q = search, search.seats
+        number = len(states)
+        self.seat = np.array([state.seat for state in states], dtype=np.int64).reshape(number, -1)
+        self.index = np.array([state.index for state in states], dtype=float).reshape(number, -1)
+        self.loops = np.array([state.loops for state in states], dtype=np.int64).reshape(number, -1)
+        seen = [search._seen(state) for state in states]
+        self.value = np.array([value for value, _ in seen])
+        self.gradient = np.stack([gradient for _, gradient in seen])
+        self.turn = (self._turn_of(self.seat) * self.index).sum(axis=1)
+        self.crowd = np.zeros((number, 2, q), dtype=np.int8)
+        every = np.arange(number)
+        for i in range(self.seat.shape[1]):
+            self._crowd(every, self.seat[:, i], self.index[:, i], 1)
+
+    def _turn_of(self, seat: Ints) -> Floats:
+        turn = self.search.model.turn
+        return np.zeros(seat.shape) if turn is None else turn[seat]
 
     @property
-    def total(self) -> float:
-        cost = self.search._cost_of_turn(self.turn) if self.search.model.turn is not None else 0.0
-        return float(self.value + cost)
+    def states(self) -> list[State]:
+        found = []
+        for seat, index, loops in zip(self.seat, self.index, self.loops, strict=True):
+            pairs = [(int(i), round(float(k))) for i, k in zip(seat, index, strict=True)]
+            found.append(State.of(pairs, tuple(loops.tolist())))
+        return found
 
-    @property
-    def state(self) -> State:
-        return State.of(self.pairs, self.loops)
+    def _totals(self, value: Floats, turn: Floats) -> Floats:
+        search = self.search
+        return value if search.model.turn is None else value + search._cost_of_turn(turn)
 
-    def _crowd(self, seat: int, k: int, by: int) -> None:
+    def _crowd(self, which: Ints, seat: Ints, k: Floats, by: int) -> None:
         for positive in (0, 1):
-            self.crowd[positive] += by * self.search._close[int((k > 0) == bool(positive))][seat]
+            same = ((k > 0) == bool(positive)).astype(np.int64)
+            self.crowd[which, positive] += by * self.search._close[same, seat]
 
-    def with_one_more(self, k: int, crowd: Counts) -> Floats:
-        """(moves, q) value with one more of index k on each seat, loops changed by each move; ∞ where
-        crowded."""
+    def with_one_more(self, k: Floats, crowd: Counts, which: Ints | None = None) -> Floats:
+        """(s, moves, q) values of these states with one more of index k (s,) on each seat, loops changed by
+        each move; ∞ where crowded (s, q)."""
         search, q = self.search, self.search.seats
+        which = np.arange(len(self.value)) if which is None else which
         change, more = search._moves
-        base = self.value + 2 * change @ self.gradient[q:] + search._quadratic
-        values = 2 * k * (self.gradient[:q] + more) + base[:, None] + k * k * search.alone[:q]
+        gradient = self.gradient[which]
+        base = self.value[which, None] + 2 * gradient[:, q:] @ change.T + search._quadratic
+        alone = (2 * k)[:, None] * gradient[:, :q] + (k * k)[:, None] * search.alone[:q]
         if search.model.turn is not None:
-            values += search._cost_of_turn(self.turn + k * search.model.turn)
-        values[:, crowd > 0] = np.inf
+            alone += search._cost_of_turn(self.turn[which, None] + k[:, None] * search.model.turn)
+        alone[crowd > 0] = np.inf
+        values = alone[:, None, :] + base[:, :, None]
+        if len(search.moves) > 1:
+            values += (2 * k)[:, None, None] * more
         return np.asarray(values)
 
-    def _change(self, seat: int, k: int, sign: int) -> None:
-        """Adds (1) or takes away (−1) a singularity; for those taken away the gradient is changed first."""
+    def _change(self, which: Ints, seat: Ints, k: Floats, sign: int) -> None:
+        """Adds (1) or takes away (−1) a singularity of each; for those taken away the gradient is changed
+        first."""
         search = self.search
         if sign < 0:
-            self.gradient = self.gradient - k * search.square[seat]
-        self.value += sign * (2 * k * float(self.gradient[seat]) + k * k * float(search.alone[seat]))
+            self.gradient[which] -= k[:, None] * search.square[seat]
+        slope = self.gradient[which, seat]
+        self.value[which] += sign * (2 * k * slope + k * k * search.alone[seat])
         if sign > 0:
-            self.gradient = self.gradient + k * search.square[seat]
-        if search.model.turn is not None:
-            self.turn += sign * k * float(search.model.turn[seat])
-        self._crowd(seat, k, sign)
+            self.gradient[which] += k[:, None] * search.square[seat]
+        self.turn[which] += sign * k * self._turn_of(seat)
+        self._crowd(which, seat, k, sign)
 
-    def _turn(self, move: int, steps: int = 1) -> None:
-        """Makes a move, ``steps`` times."""
+    def _move(self, which: Ints, move: Ints, steps: Ints) -> None:
+        """Makes a move of each, so many times."""
         search, q = self.search, self.search.seats
-        change = steps * search._moves[0][move]
-        self.value += float(2 * change @ self.gradient[q:] + steps**2 * search._quadratic[move])
-        self.gradient = self.gradient + change @ search.square[q:]
-        self.loops = _plus(self.loops, tuple(steps * k for k in search.moves[move]))
+        change = steps[:, None] * search._moves[0][move]
+        slope = np.einsum("sf,sf->s", change, self.gradient[which][:, q:])
+        self.value[which] += 2 * slope + steps.astype(float) ** 2 * search._quadratic[move]
+        self.gradient[which] += change @ search.square[q:]
+        self.loops[which] += np.rint(change).astype(np.int64)
 
-    def relocate(self, i: int, least: float) -> None:
-        """The singularity to the best seat, if that gains at least so much."""
-        seat, k = self.pairs[i]
-        before = self.total
-        self._change(seat, k, -1)
-        values = self.with_one_more(k, self.crowd[int(k > 0)])
-        move, best = divmod(int(values.argmin()), self.search.seats)
-        if values[move, best] < before - least:
-            seat = best
-            if any(self.search.moves[move]):
-                self._turn(move)
-        self._change(seat, k, 1)
-        self.pairs[i] = (seat, k)
+    def settle(self, least: float) -> None:
+        """See ``Search.settled``."""
+        active = np.arange(len(self.value))
+        for _ in range(SWEEPS):
+            before = self._totals(self.value, self.turn)[active]
+            for i in range(self.seat.shape[1]):
+                self.relocate(active, i, least)
+            self.turn_loops(active, least)
+            active = active[self._totals(self.value, self.turn)[active] < before - least]
+            if not len(active):
+                break
 
-    def turn_loops(self, least: float) -> None:
+    def relocate(self, which: Ints, i: int, least: float) -> None:
+        """The i-th singularity of each to the best seat, where that gains at least so much."""
+        search = self.search
+        seat, k = self.seat[which, i], self.index[which, i]
+        before = self._totals(self.value[which], self.turn[which])
+        self._change(which, seat, k, -1)
+        values = self.with_one_more(k, self.crowd[which, (k > 0).astype(np.int64)], which)
+        values = values.reshape(len(which), -1)
+        best = values.argmin(axis=1)
+        gains = values[np.arange(len(which)), best] < before - least
+        move = np.where(gains, best // search.seats, 0)
+        seat = np.where(gains, best % search.seats, seat)
+        turned = np.flatnonzero(move)
+        if len(turned):
+            self._move(which[turned], move[turned], np.ones(len(turned), dtype=np.int64))
+        self._change(which, seat, k, 1)
+        self.seat[which, i] = seat
+
+    def turn_loops(self, which: Ints, least: float) -> None:
         """Loops changed as long as that gains, by each move to its minimum at once: where coordinates are
         wild, it can be 100,000 quanta away."""
         change, q = self.search._moves[0], self.search.seats
         bend = self.search._quadratic
-        while True:
-            slope = 2 * change @ self.gradient[q:]
-            best = int((slope + bend).argmin())
-            if slope[best] + bend[best] >= -least or bend[best] <= 0:
-                return
-            self._turn(best, max(1, round(-float(slope[best]) / (2 * float(bend[best])))))
+        while len(which):
+            slope = 2 * self.gradient[which][:, q:] @ change.T
+            best = (slope + bend).argmin(axis=1)
+            at = slope[np.arange(len(which)), best]
+            gains = (at + bend[best] < -least) & (bend[best] > 0)
+            which, best, at = which[gains], best[gains], at[gains]
+            self._move(which, best, np.maximum(1, np.rint(-at / (2 * bend[best]))).astype(np.int64))
 
 
 def _plus(loops: tuple[int, ...], move: tuple[int, ...]) -> tuple[int, ...]:
@@ -401,7 +457,7 @@ def ranked(search: Search, starts: int = STARTS, refine: bool = True) -> Iterato
     refine: for the uncovered area, beyond the variance; without, they do not depend on the sizes."""
     rng = np.random.default_rng(17)
     kinds = [k for size in range(1, search.rules.largest + 1) for k in (-size, size)]
-    beam = [search.settled(State((), (), (0,) * max(len(search.model.free) - 1, 0)))]
+    beam = search.settled([State((), (), (0,) * max(len(search.model.free) - 1, 0))])
     for number in range(search.rules.most + 1):
         if number:
             added = [
@@ -412,6 +468,7 @@ def ranked(search: Search, starts: int = STARTS, refine: bool = True) -> Iterato
             ]
         whole = [one for one in beam if search.complete(one[1])][:REFINED]
         if refine:
+            whole = search.most_promising(whole, PROMISING)
             whole = sorted(
                 (search.refined(state) for _, state in whole), key=lambda one: (one[0], one[1].seat)
             )
@@ -442,15 +499,14 @@ def _best(
     search: Search, added: list[tuple[float, State]], rng: np.random.Generator, starts: int
 ) -> list[tuple[float, State]]:
     """The best states of a number, from these and from random ones with the same indices."""
-    tried = {}
-    for _, state in sorted(added, key=lambda one: one[0])[: 2 * BEAM * TRIED]:
-        value, settled = search.settled(state)
-        tried[settled] = value
+    likely = [state for _, state in sorted(added, key=lambda one: one[0])[: 2 * BEAM * TRIED]]
+    tried = {state: value for value, state in search.settled(list(dict.fromkeys(likely)))}
     if not tried:
         return []
     if not search.complete(next(iter(tried))):  # on the way to a number only
         starts //= 4
     leading = min(tried, key=lambda state: (tried[state], state.seat))
+    random = []
     for _ in range(starts):
         state = State((), (), leading.loops)
         for k in leading.index:
@@ -458,13 +514,12 @@ def _best(
             if len(clear):
                 state = State.of([*state.pairs, (int(rng.choice(clear)), k)], state.loops)
         if len(state.seat) == len(leading.seat):
-            if search.model.turn is not None:
-                search.direction = DIRECTION / 100
-                _, state = search.settled(state)
-                search.direction = DIRECTION / 10
-                _, state = search.settled(state)
-                search.direction = DIRECTION
-            value, settled = search.settled(state)
-            tried[settled] = value
+            random.append(state)
+    if search.model.turn is not None:
+        for part in (0.01, 0.1):
+            search.direction = part * DIRECTION
+            random = [state for _, state in search.settled(random)]
+        search.direction = DIRECTION
+    tried |= {state: value for value, state in search.settled(random)}
     ranked = sorted(((value, state) for state, value in tried.items()), key=lambda one: (one[0], one[1].seat))
     return ranked[:REFINED]

@@ -13,6 +13,8 @@ from hexwrap_solver.conformal import conformal_map
 from hexwrap_solver.conformal.corners import asked_angles
 from hexwrap_solver.conformal.layout import lay_out
 from hexwrap_solver.conformal.net import Net
+from hexwrap_solver.conformal.openings import cut_openings
+from hexwrap_solver.conformal.solve import map_of_curvatures
 from hexwrap_solver.conformal.types import QUANTA, BoundaryCondition, Cones, ConformalMap, Fitted
 from hexwrap_solver.errors import ConvergenceError, NotAdaptedError, SingularitiesError
 from hexwrap_solver.pattern.lattice import LATTICES, Lattice
@@ -26,10 +28,11 @@ from hexwrap_solver.pattern.place.size import (
 )
 from hexwrap_solver.pattern.types import Kind, PatternSettings
 from hexwrap_solver.singularities.close import Chart, Closed, Closing, Line
-from hexwrap_solver.singularities.drag import refined
+from hexwrap_solver.singularities.drag import refined, rims
 from hexwrap_solver.singularities.linear import vertex_areas
 from hexwrap_solver.singularities.place import Placing, given, place
 from hexwrap_solver.singularities.types import End, Proposal, Rules, SingularitySettings
+from hexwrap_solver.surface.holes import fill_openings
 from hexwrap_solver.surface.types import Surface
 
 #: Size classes for which singularities are placed where every panel may have its own size.
@@ -156,12 +159,13 @@ def _parts_left(lattice: Lattice, k: int) -> int:
 
 def _lines(surface: Surface, settings: SingularitySettings, width: float) -> tuple[tuple[Floats, float], ...]:
     """Polylines to keep away from, with how many cells: creases, unless these are everywhere, as on a faceted
-    surface, and the curves that were asked for."""
+    surface, the rims of filled openings, and the curves that were asked for."""
     creases = [surface.vertices[feature.vertices] for feature in surface.features]
     length = sum(float(np.linalg.norm(np.diff(crease, axis=0), axis=1).sum()) for crease in creases)
     if 2 * length * settings.from_features * width > FACETED * vertex_areas(surface).sum():
         creases = []
     asked = [(np.array(one.line, dtype=float), one.distance) for one in settings.keep_off]
+    creases += [surface.vertices[edge] for edge in rims(surface)]
     return (*((crease, settings.from_features) for crease in creases), *asked)
 
 
@@ -181,7 +185,9 @@ def seated(
     sizes: int | None,
     progress: Progress = no_progress,
 ) -> Seated:
-    """Where singularities are to stand. pattern, sizes: None for the default. Raises RequestError."""
+    """Where singularities are to stand, on the surface with its openings filled. pattern, sizes: None for the
+    default. Raises RequestError."""
+    surface = fill_openings(surface)
     frame = frame_of(surface, boundary, settings, pattern, sizes)
     progress(0.3, "placing singularities")
     return Seated(frame, chosen(surface, frame, settings))
@@ -256,21 +262,26 @@ def closed_map(
     progress: Progress = no_progress,
 ) -> ConformalMap:
     """The map with the singularities that were chosen, moved until the pattern closes up. Without any: the
-    map for the boundary alone. Raises ConvergenceError."""
+    map for the boundary alone; with more loops than two, all free, that of the curvatures that were chosen
+    for these. Raises ConvergenceError."""
     proposal = placing.proposal
+    if surface.openings:
+        return cut_openings(closed_map(fill_openings(surface), frame, placing, boundary, progress), surface)
     if not proposal.count:
+        if len(surface.loops) > 2 and set(frame.rules.ends) == {"free"}:
+            return map_of_curvatures(surface, frame.rules.quantum * np.array(proposal.loops), progress)
         return conformal_map(surface, boundary, progress)
     try:
-        return _first_that_closes(surface, frame, placing, progress)
+        return first_that_closes(surface, frame, placing, progress)
     except ConvergenceError as error:
         if not placing.may_be_none or placing.proposals[0].count:
             raise
         plain = conformal_map(surface, boundary, progress)
-        note = f"{told(frame.lattice.kind, proposal.index).capitalize()} would pay, but are left out: "
+        note = f"{in_words(frame.lattice.kind, proposal.index).capitalize()} would pay, but are left out: "
         return replace(plain, notes=(*plain.notes, note + error.detail))
 
 
-def _first_that_closes(surface: Surface, frame: Frame, placing: Placing, progress: Progress) -> ConformalMap:
+def first_that_closes(surface: Surface, frame: Frame, placing: Placing, progress: Progress) -> ConformalMap:
     """With other singularities, and smaller cells where no size is asked for, if those chosen do not close:
     the smaller the cells, the less they have to move. Raises ConvergenceError, that of the first."""
     failed: ConvergenceError | None = None
@@ -279,11 +290,11 @@ def _first_that_closes(surface: Surface, frame: Frame, placing: Placing, progres
         for chosen in (placing.chosen, *placing.others[:OTHERS]):
             taken = replace(placing, chosen=chosen)
             try:
-                chart, found = _closed(surface, smaller, taken.proposal, progress)
+                chart, found = closed_at(surface, smaller, taken.proposal, progress)
             except ConvergenceError as error:
                 failed = failed or error
                 continue
-            cmap = _as_map(smaller, chart, found, taken, surface)
+            cmap = as_map(smaller, chart, found, taken, surface)
             changes = [*_changes(frame, placing, chosen, part)]
             return replace(cmap, notes=(*cmap.notes, *changes))
     assert failed is not None
@@ -294,8 +305,9 @@ def _changes(frame: Frame, placing: Placing, chosen: int, part: int) -> Iterator
     best, kind = placing.proposal, frame.lattice.kind
     if chosen != placing.chosen:
         yield (
-            f"{told(kind, best.index).capitalize()}, which would leave about {best.uncovered:.1%} uncovered "
-            f"instead of {placing.proposals[chosen].uncovered:.1%}, cannot be moved so that it closes."
+            f"{in_words(kind, best.index).capitalize()}, which would leave about {best.uncovered:.1%} "
+            f"uncovered instead of {placing.proposals[chosen].uncovered:.1%}, cannot be moved so that it "
+            "closes."
         )
     if part > 1:
         yield (
@@ -304,19 +316,13 @@ def _changes(frame: Frame, placing: Placing, chosen: int, part: int) -> Iterator
         )
 
 
-def _closed(surface: Surface, frame: Frame, proposal: Proposal, progress: Progress) -> tuple[Chart, Closed]:
+def closed_at(surface: Surface, frame: Frame, proposal: Proposal, progress: Progress) -> tuple[Chart, Closed]:
     """Seated anew at the nearest vertices where the first moves would be too long."""
     failed: ConvergenceError | None = None
     vertex, index = _ordered(proposal)
     finer = refined(surface, surface.vertices[vertex], frame.width)
-    slope = None
-    if frame.turn is not None:
-        corners = conformal_map(finer, BoundaryCondition("straight")).corners()
-        edge = np.roll(corners, -1, axis=1) - corners
-        slope = (edge.imag / np.abs(edge)) ** 2
-    angles = None
-    if frame.rules.angles is not None:
-        angles = np.concatenate([frame.rules.angles, np.zeros(len(finer.vertices) - len(frame.rules.angles))])
+    slope = _slope if frame.turn is not None else None
+    best: tuple[Chart, Closed] | None = None
     for _ in range(AGAIN + 1):
         chart = Chart(
             finer,
@@ -327,26 +333,44 @@ def _closed(surface: Surface, frame: Frame, proposal: Proposal, progress: Progre
             frame.lattice.quantum,
             frame.width,
             slope,
-            angles,
+            frame.rules.angles,
         )
-        closing = Closing(chart, frame.width, frame.line, frame.free_scale, frame.aligned)
+        closing, finer = (
+            Closing(chart, frame.width, frame.line, frame.free_scale, frame.aligned),
+            chart.surface,
+        )
         try:
             found = closing.solve(progress)
+            best, places = (chart, found), found.seen.surface.vertices[vertex]
             if found.moves.max() <= FAR:
-                return chart, found
+                break
         except ConvergenceError as error:
-            failed = error
-            found = None
-        if found is None:
+            if best is not None:
+                break
+            failed, places = failed or error, closing.aims
+            finer = refined(finer, places, frame.width)
+        seats = _nearest_inside(finer, places)
+        if (
+            (seats == vertex).all()
+            or len(np.unique(seats)) < len(seats)
+            or np.isin(seats, finer.boundary).any()
+        ):
             break
-        best = chart, found
-        seats = _nearest_inside(finer, found.seen.surface.vertices[vertex])
-        if (seats == vertex).all():
-            return best
         vertex = seats
-    if failed is not None:
+    if best is None:
+        assert failed is not None
         raise failed
     return best
+
+
+def _slope(surface: Surface) -> Floats:
+    """(m, 3) squared sine of the half-edges' angles to the horizontal in the cylinder without singularities,
+    which may be that of a refined mesh."""
+    tube = conformal_map(surface, BoundaryCondition("straight"))
+    corners = tube.uv[surface.faces]
+    edge = np.roll(corners, -1, axis=1) - corners
+    edge -= tube.circumference * np.rint(edge.real / tube.circumference)
+    return np.asarray((edge.imag / np.abs(edge)) ** 2)
 
 
 def _ordered(proposal: Proposal) -> tuple[Ints, Ints]:
@@ -362,7 +386,7 @@ def _nearest_inside(surface: Surface, places: Floats) -> Ints:
     return np.asarray(corner)
 
 
-def _as_map(frame: Frame, chart: Chart, found: Closed, placing: Placing, before: Surface) -> ConformalMap:
+def as_map(frame: Frame, chart: Chart, found: Closed, placing: Placing, before: Surface) -> ConformalMap:
     seen, quantum = found.unstretched, frame.lattice.quantum
     surface = seen.surface
     sums = chart.energy.angle_sums(seen.metric)
@@ -408,7 +432,7 @@ NAMES = {
 }
 
 
-def told(kind: Kind, index: Ints) -> str:
+def in_words(kind: Kind, index: Ints) -> str:
     """Such as "2 pentagons and 1 heptagon"."""
     lattice, parts = LATTICES[kind], []
     for k in (1, -1, 2, -2):
@@ -428,8 +452,8 @@ def told(kind: Kind, index: Ints) -> str:
 def _notes(frame: Frame, found: Closed, placing: Placing) -> Iterator[str]:
     proposal, kind = placing.proposal, frame.lattice.kind
     yield (
-        f"{told(kind, proposal.index)}: moved by at most {found.moves.max():.2f} cells, so that the pattern "
-        f"closes around each to {found.residual:.0e} cells."
+        f"{in_words(kind, proposal.index)}: moved by at most {found.moves.max():.2f} cells, so that the "
+        f"pattern closes around each to {found.residual:.0e} cells."
     )
     none = placing.proposals[0]
     if len(placing.proposals) > 1 and none.count == 0:

@@ -17,7 +17,7 @@ from System import Array
 
 PORT = int(os.environ["HEXWRAP_PORT"])
 SMALL = json.dumps({"pattern": {"around": 16}})
-LARGE = json.dumps({"pattern": {"around": 320}})  # keeps the server busy for seconds
+LARGE = json.dumps({"pattern": {"around": 240}})  # keeps the server busy for seconds
 
 
 def array(points):

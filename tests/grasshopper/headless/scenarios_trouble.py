@@ -16,7 +16,7 @@ import types
 import world
 from canvas import Component, pump, settle
 
-LARGE = json.dumps({"pattern": {"around": 320}})
+LARGE = json.dumps({"pattern": {"around": 240}})
 SMALL = json.dumps({"pattern": {"around": 16}})
 FOLDER = tempfile.mkdtemp()
 

@@ -50,6 +50,16 @@ def straight() -> Surface:
     return tube(np.ones(17), 4.0)
 
 
+def slivers() -> Surface:
+    """The waist, its vertices shifted along the rings until many triangles are nearly flat."""
+    regular = waist()
+    x, y, z = regular.vertices.T
+    turn = np.arctan2(y, x) + 0.11 * np.random.default_rng(1).uniform(-1, 1, len(x))
+    height = z + 0.1 * np.random.default_rng(2).uniform(-1, 1, len(x)) * ((z > 0.01) & (z < 6.99))
+    radius = np.hypot(x, y)
+    return surface_of(np.stack([radius * np.cos(turn), radius * np.sin(turn), height], axis=1), regular.faces)
+
+
 def ellipsoid(n: int = 1200) -> Surface:
     i = np.arange(n) + 0.5
     fall, turn = np.arccos(1 - 2 * i / n), np.pi * (1 + 5**0.5) * i

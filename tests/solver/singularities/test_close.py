@@ -1,14 +1,19 @@
 """Closing is exact: whatever stands around singularities and loops is a symmetry of one lattice."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
+from hexwrap_solver.conformal.energy import Energy
+from hexwrap_solver.conformal.fixed import minimise
 from hexwrap_solver.errors import ConvergenceError
 from hexwrap_solver.singularities.close import Chart, Closing, Line, as_complex, near_lattice
 from hexwrap_solver.singularities.cut import branches
 from hexwrap_solver.singularities.drag import dragged, grips, refined
-from hexwrap_solver.singularities.linear import vertex_areas
+from hexwrap_solver.singularities.linear import targets, vertex_areas
 from hexwrap_solver.singularities.place import place
+from hexwrap_solver.singularities.solvable import solvable
 from hexwrap_solver.singularities.types import Rules
 from tests.solver.singularities import shapes
 
@@ -108,7 +113,7 @@ def test_a_straight_loop_becomes_a_lattice_line(line):
     _, newton = closing(shapes.waist(), ("straight", "free"), 300, 2, line=line)
     closed = newton.solve()
     assert closed.residual <= 1e-9
-    depth = newton._depth(closed.seen, closed.factor)
+    depth = newton.depth(closed.seen.holonomy, closed.factor)
     rows = (depth - line.first) / line.period
     assert np.abs(rows - np.rint(rows)).max() < 1e-8
     number = as_complex(closed.motion[-2], 6) / line.step
@@ -152,6 +157,29 @@ def test_finer_near_places_and_the_same_surface():
 
 
 def test_says_when_there_is_no_map():
-    surface = shapes.waist()
+    surface = shapes.straight()
     with pytest.raises(ConvergenceError, match="no map"):
-        Chart(surface, np.array([600]), np.array([-12]), (12, 0), ("free", "free"), SIXTH, 0.5)
+        Chart(surface, np.array([300]), np.array([6]), (-6, 0), ("free", "free"), SIXTH, 0.5)
+
+
+def test_a_mesh_whose_triangles_break_is_split():
+    """Its long thin triangles cannot follow the map; the surface stays the same set of points."""
+    surface = shapes.slivers()
+    wanted = partial(
+        targets,
+        ends=("free", "free"),
+        loops=(2, 0),
+        quantum=SIXTH,
+        vertex=np.array([300]),
+        index=np.array([-2]),
+    )
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        assert minimise(Energy(surface, wanted(surface))).violating
+    energy, finer, found = solvable(surface, wanted)
+    assert found.converged
+    assert not found.violating
+    assert len(finer.vertices) < 3 * len(surface.vertices)
+    assert (finer.vertices[: len(surface.vertices)] == surface.vertices).all()
+    assert vertex_areas(finer).sum() == pytest.approx(vertex_areas(surface).sum())
+    sums = energy.angle_sums(found.corners)
+    assert sums[300] == pytest.approx(2 * np.pi + 2 * SIXTH, abs=1e-8)

@@ -95,7 +95,7 @@ def test_the_linear_model_predicts_the_map(waist, on_waist):
     search = Search(
         linear_model(waist, rules_for(waist, ("free", "free"))), rules_for(waist, ("free", "free"))
     )
-    misfit = float(search.misfit(search.scale(search.settled(State((), (), (0,)))[1])))
+    misfit = float(search.misfit(search.scale(search.settled([State((), (), (0,))])[0][1])))
     assert 0 < misfit < 0.1
     assert uncovered(u, weight, 11) < one.uncovered < uncovered(u, weight, 11) + misfit
 

@@ -1,6 +1,6 @@
 """The whole way with singularities: cells close around them, panels are regular, nothing overlaps."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -15,6 +15,7 @@ from hexwrap_solver.pipeline import SolveSettings, solve
 from hexwrap_solver.singularities import solve as module
 from hexwrap_solver.singularities.place import Placing
 from hexwrap_solver.singularities.types import Proposal, SingularityAt, SingularitySettings
+from hexwrap_solver.surface import with_openings
 from tests.solver.singularities import shapes
 
 SIDES = {"hex": 6, "quad": 4, "triangle": 3}
@@ -251,7 +252,7 @@ def test_where_they_cannot_be_closed_there_are_none(monkeypatch):
     def fails(*args):
         raise ConvergenceError("It did not close.")
 
-    monkeypatch.setattr(module, "_closed", fails)
+    monkeypatch.setattr(module, "closed_at", fails)
     found = solved(shapes.waist(), count="auto", around=16)
     assert len(found.map.cones) == 0
     assert any("left out: It did not close." in note for note in found.quality.notes)
@@ -279,16 +280,16 @@ def first_that_closes(monkeypatch, sized, fewest, failing):
             raise ConvergenceError(f"Reason {len(asked)}.")
         return None, None
 
-    monkeypatch.setattr(module, "_closed", close)
+    monkeypatch.setattr(module, "closed_at", close)
     monkeypatch.setattr(
-        module, "_as_map", lambda frame, chart, found, placing, _: Made(frame.width, placing.proposal.count)
+        module, "as_map", lambda frame, chart, found, placing, _: Made(frame.width, placing.proposal.count)
     )
     proposals = tuple(
         Proposal(np.arange(n), np.ones(n, dtype=np.int64), (), 0.1, 0.1, 1.0) for n in (fewest, 12, 14)
     )
     frame = module.Frame(LATTICES["hex"], None, 1.0, None, (), None, 0.05, sized)
     placing = Placing(proposals, 1, others=(2, 0))
-    return module._first_that_closes(None, frame, placing, no_progress), asked
+    return module.first_that_closes(None, frame, placing, no_progress), asked
 
 
 def test_where_those_chosen_do_not_close_others_do(monkeypatch):
@@ -309,3 +310,37 @@ def test_cells_do_not_shrink_that_need_not(monkeypatch, sized, fewest):
     """Where a size is asked for, or a map without any singularities will do; the first reason is given."""
     with pytest.raises(ConvergenceError, match=r"^Reason 1\.$"):
         first_that_closes(monkeypatch, sized, fewest, 2)
+
+
+def windowed():
+    """The waist with a hole in its side, between two rings."""
+    whole = shapes.waist()
+    hole = np.isin(whole.faces, [900, 901, 902, 941, 942]).any(axis=1)
+    return shapes.surface_of(whole.vertices, whole.faces[~hole])
+
+
+def test_without_singularities_loops_keep_the_curvatures_that_were_chosen():
+    surface = windowed()
+    surface = replace(surface, loops=tuple(sorted(surface.loops, key=len, reverse=True)))
+    frame = module.frame_of(
+        surface, BoundaryCondition("isometric", quantum="hex"), SingularitySettings(1), None, 11
+    )
+    none = np.zeros(0, dtype=np.int64)
+    placing = Placing((Proposal(none, none, (2, -2, -6), 0.1, 0.1, 2.0),), 0)
+    cmap = module.closed_map(surface, frame, placing, BoundaryCondition("isometric", quantum="hex"))
+    for loop, angles, quanta in zip(surface.loops, cmap.boundary_angles, (2, -2, -6), strict=True):
+        assert np.ptp(cmap.log_scale[loop]) < 1e-9
+        assert (np.pi - angles).sum() == pytest.approx(quanta * np.pi / 3, abs=1e-7)
+
+
+def test_openings_that_are_cut_are_wall_for_singularities():
+    """These are closed on the wall with its opening filled, whose rim stays where it is."""
+    surface = with_openings(windowed(), "cut")
+    solution = solved(surface, at=ASIDE, around=16)
+    cmap = solution.map
+    assert len(cmap.surface.loops) == 3
+    assert len(cmap.cones) == 2
+    rim = cmap.surface.vertices[cmap.surface.loops[2]]
+    assert (np.sort(rim, axis=0) == np.sort(surface.vertices[surface.loops[2]], axis=0)).all()
+    assert solution.quality.overlaps == 0
+    assert solution.pattern.distortion < 1e-6

@@ -1,0 +1,116 @@
+"""Better places for listed corners: where the map bends by itself, and a corner costs no scale.
+
+The map's u is nearly linear in the boundary angles (Springborn, Schröder, Pinkall 2008, section 5): with the
+Hessian at the solution, a corner moved from v to w adds κ(Gδ_w − Gδ_v). What that promises is told only once
+the map with the corner moved has been found as well.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from hexwrap_solver.arrays import Floats, Ints
+from hexwrap_solver.conformal.energy import Energy
+from hexwrap_solver.conformal.fixed import minimise
+from hexwrap_solver.conformal.types import Targets
+from hexwrap_solver.linalg.factor import Factorisation
+from hexwrap_solver.surface.types import Surface
+from hexwrap_solver.tolerances import ANGLE
+
+#: Places that are tried for each corner, at most, and corners that are looked at.
+TRIED, CORNERS = 24, 12
+#: Of the area, this part is left out at either end when scales are compared: next to a corner they have none.
+TAIL = 0.01
+#: Told only where cells differ in scale by this factor, and by this factor less with the corner moved.
+NEEDLESS, WORTH = 1.5, 1.3
+
+
+def corner_notes(surface: Surface, targets: Targets, u: Floats) -> tuple[str, ...]:
+    """A sentence about the corner that makes scales differ needlessly most, if there is one.
+
+    surface, targets, u: of a map with prescribed boundary angles, all free.
+    """
+    area = _vertex_areas(surface)
+    ratio = _ratio(u, area)
+    corners = [
+        (int(loop[i]), loop, int(i))
+        for loop in surface.loops
+        for i in np.flatnonzero(np.abs(targets.angle[loop] - np.pi) > 1e3 * ANGLE)
+    ]
+    if ratio < NEEDLESS or not 0 < len(corners) <= CORNERS or (targets.shared >= 0).any():
+        return ()
+    energy = Energy(surface, targets)
+    factor = Factorisation(energy.points, energy.rows, energy.columns)
+    factor.factorise(*energy.hessian(energy.corners(u)))
+    taken = np.array([v for v, _, _ in corners])
+    best: tuple[float, int, int] | None = None
+    for v, loop, i in corners:
+        places = _between(loop, i, taken)
+        response = _response(energy, factor, np.append(places, v))
+        moved = u[:, None] + (np.pi - targets.angle[v]) * (response[:, :-1] - response[:, -1:])
+        ratios = np.array([_ratio(column, area) for column in moved.T])
+        k = int(np.argmin(ratios)) if len(ratios) else 0
+        # at the end of the stretch it would rather meet its neighbour: no place of its own is better
+        if 0 < k < len(ratios) - 1 and (best is None or ratios[k] < best[0]):
+            best = (float(ratios[k]), v, int(places[k]))
+    if best is None or best[0] * WORTH > ratio:
+        return ()
+    _, v, w = best
+    angle = targets.angle.copy()
+    angle[v], angle[w] = angle[w], angle[v]
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        found = minimise(Energy(surface, replace(targets, angle=angle)), u)
+    after = _ratio(found.u, area)
+    if not found.converged or found.violating or after * WORTH > ratio:
+        return ()
+    sent = surface.input_vertex
+    far = float(np.linalg.norm(surface.vertices[v] - surface.vertices[w]))
+    return (
+        f"With its corner of {np.degrees(targets.angle[v]):.4g}° at vertex {sent[v]}, "
+        f"{_at(surface.vertices[v])}, the map stretches some parts {ratio:.2g} times as much as others; "
+        f"{far:.3g} away, at vertex {sent[w]}, {_at(surface.vertices[w])}, it would be {after:.2g} times.",
+    )
+
+
+def _between(loop: Ints, i: int, taken: Ints) -> Ints:
+    """Vertices of the loop around its i-th, up to half-way to the next corner on either side, in order."""
+    count = len(loop)
+    others = np.flatnonzero(np.isin(loop, taken))
+    others = others[others != i]
+    ahead = int(((others - i) % count).min()) if len(others) else count
+    behind = int(((i - others) % count).min()) if len(others) else count
+    steps = np.arange(-((behind - 1) // 2), (ahead - 1) // 2 + 1)
+    if len(steps) > TRIED:  # densest near the corner
+        pace = np.unique(np.round(np.geomspace(1, max(len(steps) // 2, 2), TRIED // 2)).astype(int))
+        steps = np.concatenate([-pace[::-1], pace])
+        steps = steps[(steps >= -((behind - 1) // 2)) & (steps <= (ahead - 1) // 2)]
+    return np.asarray(loop[(i + steps[steps != 0]) % count])
+
+
+def _response(energy: Energy, factor: Factorisation, vertices: Ints) -> Floats:
+    """(n, k) what u becomes more by one unit of curvature at each of the vertices."""
+    right = np.zeros((energy.n_dof, len(vertices)))
+    dof = energy.dof[vertices]
+    inside = np.flatnonzero(dof >= 0)
+    right[dof[inside], inside] = 1.0
+    solved = factor.solve(right)
+    return np.asarray(np.concatenate([np.zeros((1, len(vertices))), solved])[energy.dof + 1])
+
+
+def _vertex_areas(surface: Surface) -> Floats:
+    third = np.repeat(surface.areas / 3, 3)
+    return np.asarray(np.bincount(surface.faces.ravel(), third, len(surface.vertices)))
+
+
+def _ratio(u: Floats, area: Floats) -> float:
+    """e^u at the upper end of the area over e^u at the lower end, without the tails."""
+    order = np.argsort(u)
+    share = np.cumsum(area[order]) / area.sum()
+    low, high = np.searchsorted(share, [TAIL, 1 - TAIL])
+    return float(np.exp(u[order[min(high, len(u) - 1)]] - u[order[low]]))
+
+
+def _at(point: Floats) -> str:
+    return "({})".format(", ".join(f"{x:.4g}" for x in point))
