@@ -219,7 +219,7 @@ def greedy(surface: Surface) -> Iterator[tuple[Ints, Floats, float]]:
         tie[surface.boundary], tie[cones] = 0, 0
         energy = Energy(surface, Targets(angle, tie, np.zeros(1)))
         found = minimise(energy)
-        if not found.converged or found.broken:
+        if not found.converged or found.violating:
             break
         u = found.u
         yield cones, energy.angle_sums(found.corners)[cones], float(np.sqrt(weight @ (u - weight @ u) ** 2))

@@ -119,6 +119,12 @@ def not_found(what: str, detail: str) -> HttpError:
     return HttpError(404, "not-found", f"No such {what}", detail)
 
 
+def bad_parameters(detail: str, listed: Sequence[tuple[str, str]]) -> HttpError:
+    """Faults in the path or the query. listed: parameters, and what is wrong with each."""
+    errors = [{"pointer": "", "parameter": name, "detail": fault} for name, fault in listed]
+    return HttpError(422, FormError.slug, FormError.title, detail, errors=errors)
+
+
 class HopsError(HttpError):
     def __init__(self, detail: str) -> None:
         super().__init__(422, "hops", "The call does not fit the component", detail)

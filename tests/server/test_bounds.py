@@ -6,8 +6,6 @@ import errno
 import gzip
 import json
 import pickle
-import subprocess
-import sys
 import time
 import tracemalloc
 from concurrent.futures import ThreadPoolExecutor
@@ -25,12 +23,14 @@ from hexwrap_server.http import bodies
 from hexwrap_server.input.json_text import loads
 from hexwrap_server.input.readers.drawing import Curve
 from hexwrap_server.input.schemas import parse_request
+from hexwrap_server.input.surface_files import sent_surface
 from hexwrap_server.jobs import codec
 from hexwrap_server.jobs.lift_curves import lift_curves
 from hexwrap_server.jobs.store import Job, Store, Work
 from hexwrap_server.jobs.work import solution_at
 from hexwrap_solver.errors import HexwrapError
 from hexwrap_solver.panels.sizes import partition_by_worst
+from hexwrap_solver.surface.types import SurfaceSettings
 from tests.server.analytic import cylinder
 from tests.server.bodies import request, tube
 from tests.server.live import finished, running
@@ -52,6 +52,19 @@ def test_long_names_are_not_repeated_for_every_list() -> None:
     tracemalloc.stop()
     assert caught.value.faults[0][0].endswith("/4000/0")
     assert peak < 60 * MIB
+
+
+def test_one_long_number_does_not_make_all_others_long() -> None:
+    """420 kB of which one coordinate takes 300 kB."""
+    vertices = b"".join(b"v %d %d 0\n" % (x, x * x) for x in range(8000))
+    data = vertices + b"v 1." + b"0" * 300_000 + b" 0 1\nf 1 2 8001\n"
+    tracemalloc.start()
+    sent = sent_surface(data, "a.obj", SurfaceSettings()).sent
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert sent.mesh is not None
+    assert sent.mesh.vertices[8000].tolist() == [1.0, 0.0, 1.0]
+    assert peak < 40 * MIB
 
 
 def bomb(mib: int) -> bytes:
@@ -125,10 +138,7 @@ def test_lists_are_paged_and_hold_up_nobody(tmp_path: Path) -> None:
         body = json.dumps(request()).encode()
         assert client.post("/v1/solve", content=body).status_code == 200
         with ThreadPoolExecutor(50) as threads:
-            known = [
-                threads.submit(client.post, "/v1/jobs", content=body)
-                for _ in range(200)
-            ]
+            known = [threads.submit(client.post, "/v1/jobs", content=body) for _ in range(200)]
             assert {answer.result().status_code for answer in known} == {202}
     assert longest_step(tmp_path) < LONGEST_STEP
 
@@ -230,73 +240,3 @@ def test_sizes_end_between_neighbouring_numbers(seed: int) -> None:
     floored = np.minimum(length, np.sort(length - r.integers(0, 3, 60) * 2.0**-52))
     made = partition_by_worst(length, floored, 12)
     assert np.all(np.diff(made.loss) <= 0)
-
-
-PLAIN = """
-import sys, tomllib
-from importlib.metadata import PackageNotFoundError, packages_distributions, requires
-from packaging.requirements import Requirement
-from packaging.utils import canonicalize_name
-todo = tomllib.load(open("pyproject.toml", "rb"))["project"]["dependencies"]
-needed = {"hexwrap"}
-while todo:
-    wanted = Requirement(todo.pop())
-    name = canonicalize_name(wanted.name)
-    if name in needed or (wanted.marker and not wanted.marker.evaluate({"extra": ""})):
-        continue
-    needed.add(name)
-    try:
-        todo += requires(name) or []
-    except PackageNotFoundError:
-        pass
-owners = packages_distributions()
-class Blocker:
-    def find_spec(self, name, path=None, target=None):
-        owned = owners.get(name.partition(".")[0])
-        if owned and not {canonicalize_name(owner) for owner in owned} & needed:
-            raise ImportError(f"{name} is not in a plain install")
-sys.meta_path.insert(0, Blocker())
-for name in list(sys.modules):
-    if name.partition(".")[0] == "packaging":
-        del sys.modules[name]
-import pathlib
-from hexwrap_server.input.curves import read_drawing
-from hexwrap_server.input.surface_files import read_surface
-for path in sorted(pathlib.Path(sys.argv[1]).iterdir()):
-    (read_drawing(path) if path.suffix in (".csv", ".dxf") else read_surface(path.read_bytes(), path.name))
-    print(path.suffix)
-import hexwrap_server.http.app, hexwrap_server.cli.main, hexwrap_server.output.writers
-"""
-
-
-def test_a_plain_install_reads_every_kind_of_file(tmp_path: Path) -> None:
-    """Packages of the test extra must not be what a reader stands on."""
-    import ezdxf.filemanagement
-    import trimesh
-
-    from hexwrap_server.samples import __file__ as samples
-
-    surface = tube()
-    mesh = trimesh.Trimesh(surface["vertices"], surface["faces"], process=False)
-    for kind in ("obj", "off", "ply", "stl"):
-        mesh.export(tmp_path / f"tube.{kind}")
-    np.savez(tmp_path / "tube.npz", vertices=surface["vertices"], faces=surface["faces"])
-    (tmp_path / "tube.3dm").write_bytes((Path(samples).parent / "tower.3dm").read_bytes())
-    (tmp_path / "points.csv").write_text("0,0\n1,1\n")
-    drawing = ezdxf.filemanagement.new()
-    drawing.modelspace().add_line((0, 0), (1, 1))
-    drawing.saveas(tmp_path / "line.dxf")
-    root = Path(__file__).parents[2]
-    ran = subprocess.run(
-        [sys.executable, "-c", PLAIN, str(tmp_path)],
-        cwd=root,
-        env={"PYTHONPATH": f"{root / 'server'}:{root / 'solver'}"},
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE,
-    )
-    assert ran.returncode == 0, ran.stderr
-    assert ran.stdout.split() == sorted(
-        [".3dm", ".csv", ".dxf", ".npz", ".obj", ".off", ".ply", ".stl"],
-        key=lambda k: {".csv": "points", ".dxf": "line"}.get(k, "tube") + k,
-    )

@@ -21,7 +21,6 @@ import rhino3dm
 from hexwrap_server.output import step
 from hexwrap_server.output.blocks import Blocks
 from hexwrap_server.output.flat import ZONES, groups, sheet_size
-from hexwrap_server.output.glb import quaternions
 from hexwrap_server.output.meta import Meta
 from hexwrap_server.output.units import UNITS
 from hexwrap_server.output.writers import write
@@ -215,18 +214,6 @@ def test_step_writes_what_part_21_asks_for() -> None:
 
 
 # --- GLB -------------------------------------------------------------------------------------------------
-
-
-def test_quaternions_turn_as_the_axes_say() -> None:
-    rng = np.random.default_rng(5)
-    axes = np.linalg.qr(rng.normal(size=(200, 3, 3)))[0]
-    axes[:, 2] *= np.linalg.det(axes)[:, None]
-    axes[0], axes[1:4] = np.eye(3), [np.diag(d) for d in ((1, -1, -1), (-1, 1, -1), (-1, -1, 1))]
-    x, y, z, w = quaternions(axes).T
-    turned = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w)], axis=1)
-    assert turned == pytest.approx(axes[:, 0], abs=1e-12)
-    up = np.stack([2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)], axis=1)
-    assert up == pytest.approx(axes[:, 2], abs=1e-12)
 
 
 def test_glb_opens_in_the_viewers_own_three(solution: Solution, tmp_path: Path) -> None:

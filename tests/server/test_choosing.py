@@ -262,7 +262,7 @@ def test_meshes_whose_edges_meet_become_one() -> None:
 
 def test_edges_that_nearly_meet_are_told_with_where_and_how_far() -> None:
     model = parts(4e-3)
-    with pytest.raises(SeveralObjectsError):
+    with pytest.raises(SeveralObjectsError, match=r"comes within 0.004 of the surface at .* not joined"):
         model.choose()
     told = model.add(mesh_at(80), "tower").choose("[at]*").told
     assert any("'tower'" in sentence for sentence in told)

@@ -19,6 +19,8 @@ from tests.server.bodies import tube
 from tests.server.patience import PATIENCE
 from tests.server.process import children, free_port, is_gone, served
 
+#: To read the certificates of the machine takes longer than the request.
+PLAIN: dict[str, Any] = {"trust_env": False, "verify": False, "timeout": PATIENCE}
 #: What may become of a job whose worker or server was killed.
 EXCUSES = ("/problems/worker-died", "/problems/too-many-attempts")
 
@@ -58,22 +60,20 @@ class Load:
             size = self._chance.choice([12, 12, 24, 120])
             body = {"surface": tube(size, size // 2, height=10 + i % 7), "pattern": {"around": 8 + i % 5}}
             with contextlib.suppress(httpx.TransportError):
-                answer = httpx.post(f"{self._base}/v1/jobs", json=body, trust_env=False, verify=False, timeout=PATIENCE)
+                answer = httpx.post(f"{self._base}/v1/jobs", json=body, **PLAIN)
                 if answer.status_code == 202:
                     self.accepted.append(answer.json()["id"])
 
     def _look(self) -> None:
         while not self._over.wait(0.1):
             with contextlib.suppress(httpx.TransportError):
-                for job in httpx.get(f"{self._base}/v1/jobs", trust_env=False, verify=False, timeout=PATIENCE).json()[
-                    "jobs"
-                ]:
+                for job in httpx.get(f"{self._base}/v1/jobs", **PLAIN).json()["jobs"]:
                     if job["status"] == "done" and job["id"] not in self.done:
                         self.done[job["id"]] = fingerprint(self._base, job["id"])
 
 
 def fingerprint(base: str, id: str) -> str:
-    answer = httpx.get(f"{base}/v1/jobs/{id}/result", trust_env=False, verify=False, timeout=PATIENCE)
+    answer = httpx.get(f"{base}/v1/jobs/{id}/result", **PLAIN)
     assert answer.status_code == 200
     assert answer.json()["quality"]["scale_ratio"] >= 1
     return hashlib.sha256(answer.content).hexdigest()
@@ -123,7 +123,7 @@ def torment(data: Path, kills: int, seed: int) -> None:
 def settled(base: str, id: str) -> dict[str, Any]:
     deadline = time.monotonic() + PATIENCE
     while time.monotonic() < deadline:
-        answer = httpx.get(f"{base}/v1/jobs/{id}?wait=10", trust_env=False, verify=False, timeout=PATIENCE)
+        answer = httpx.get(f"{base}/v1/jobs/{id}?wait=10", **PLAIN)
         assert answer.status_code == 200, f"accepted job {id} was lost"
         job: dict[str, Any] = answer.json()
         if job["status"] in ("done", "failed", "cancelled"):

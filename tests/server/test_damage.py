@@ -14,6 +14,7 @@ import pytest
 
 from hexwrap_server.errors import DamagedError, FolderInUseError
 from hexwrap_server.input.requests import Wanted
+from hexwrap_server.jobs.disk import keep_file, surface_file
 from hexwrap_server.jobs.store import Job, Store, Work
 from tests.server.bodies import request
 from tests.server.live import Live, finished, running
@@ -88,18 +89,17 @@ def test_surface_whose_file_cannot_be_read_is_a_problem(tmp_path: Path) -> None:
 def test_surface_that_is_pruned_while_it_is_sent_again_is_written_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    store = Store(tmp_path)
-    store.keep_surface("a" * 64, b"surface")
+    path = surface_file(tmp_path, "a" * 64)
+    keep_file(path, b"surface")
 
     def read(path: Path) -> bytes:
         path.unlink()
         return b"surface"
 
     monkeypatch.setattr(Path, "read_bytes", read)
-    store.keep_surface("a" * 64, b"surface")
+    keep_file(path, b"surface")
     monkeypatch.undo()
-    assert store.surface_path("a" * 64).read_bytes() == b"surface"
-    store.close()
+    assert path.read_bytes() == b"surface"
 
 
 def test_lost_solution_is_made_again(tmp_path: Path) -> None:
@@ -150,8 +150,9 @@ def test_lock_that_cannot_be_opened_is_not_taken_for_another_server(tmp_path: Pa
 def test_work_of_another_version_is_told_as_lost(tmp_path: Path) -> None:
     with running(tmp_path, workers=1) as client:
         id, _ = solved(client)
-        client.service.store._db.execute("UPDATE works SET wanted = ?", (b"of another version",))
-        client.service.store._db.execute("UPDATE jobs SET status = 'queued'")
+    with contextlib.closing(sqlite3.connect(tmp_path / "hexwrap.sqlite3", isolation_level=None)) as db:
+        db.execute("UPDATE works SET wanted = ?", (b"of another version",))
+        db.execute("UPDATE jobs SET status = 'queued'")
     with running(tmp_path, workers=1) as client:
         told = client.get(f"/v1/jobs/{id}").json()
         assert (told["status"], told["problem"]["type"]) == ("failed", "/problems/internal")

@@ -9,7 +9,6 @@ import subprocess
 import sys
 import time
 import warnings
-from collections import OrderedDict
 from collections.abc import AsyncIterator, Coroutine, Iterator
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -292,25 +291,18 @@ def test_scheduler_that_does_not_answer_is_not_waited_for(monkeypatch: pytest.Mo
         async def identity(self, n_workers: int) -> None:
             await asyncio.sleep(60)
 
-    async def story() -> None:
-        e = dask_engine.DaskEngine("tcp://127.0.0.1:1")
-        e._client = Silent()
-        e._client.scheduler = e._client
-        with pytest.raises(OSError):  # noqa: PT011 - as the loop that looks catches it
-            await e._look()
+        def subscribe_topic(self, *_: Any) -> None:
+            pass
+
+    async def client(*_: Any, **__: Any) -> Any:
+        silent = Silent()
+        silent.scheduler = silent
+        return silent
 
     monkeypatch.setattr(dask_engine, "LOOK_SECONDS", 0.05)
-    run(story())
-
-
-def test_stopped_calls_are_not_remembered_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
-    from hexwrap_server.jobs import dask_engine
-
-    monkeypatch.setattr(dask_engine, "MOST_STOPPED", 3)
-    monkeypatch.setattr(dask_engine, "_STOPPED", OrderedDict())
-    for i in range(5):
-        dask_engine._stop(str(i))
-    assert list(dask_engine._STOPPED) == ["2", "3", "4"]
+    monkeypatch.setattr(dask_engine, "Client", client)
+    with pytest.raises(OSError, match="does not answer"):
+        asyncio.run(dask_engine.DaskEngine("tcp://127.0.0.1:1").start())
 
 
 NO_SCHEDULER = """

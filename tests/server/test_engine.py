@@ -59,6 +59,12 @@ def run(story: Coroutine[Any, Any, T]) -> T:
     return asyncio.run(story)
 
 
+async def ready(e: ProcessEngine) -> None:
+    """When all workers are."""
+    while e.starting:
+        await asyncio.sleep(0.01)
+
+
 def test_values_go_there_and_back() -> None:
     async def story() -> None:
         async with engine() as e:
@@ -74,7 +80,7 @@ def test_values_go_there_and_back() -> None:
 def test_calls_one_after_the_other_go_to_the_worker_that_remembers_most() -> None:
     async def story() -> None:
         async with engine(2) as e:
-            await asyncio.gather(*e._starting)
+            await ready(e)
             assert len({await call(e, "pid") for _ in range(4)}) == 1
 
     run(story())
@@ -149,7 +155,7 @@ def test_worker_that_dies_while_it_waits_fails_no_call() -> None:
 def test_worker_that_is_killed_while_it_waits_is_replaced_and_no_zombie_stays() -> None:
     async def story() -> None:
         async with engine(2) as e:
-            await asyncio.gather(*e._starting)
+            await ready(e)
             before = e.pids
             for pid in before:
                 psutil.Process(pid).kill()
@@ -178,10 +184,10 @@ def test_calls_that_run_or_wait_are_told_when_the_engine_gives_up(tmp_path: Path
 def test_one_worker_that_starts_keeps_nobody_from_the_others(tmp_path: Path) -> None:
     async def story() -> None:
         async with engine(2) as e:
-            await asyncio.gather(*e._starting)
+            await ready(e)
             with pytest.raises(WorkerDiedError):
                 await call(e, "die")
-            assert len(e._starting) == 1
+            assert e.starting == 1
             assert e.is_ready
             assert await call(e, "echo", 1) == 1
 

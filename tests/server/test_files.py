@@ -58,7 +58,7 @@ def test_server_page_and_command_line_know_the_same_files() -> None:
     listed = re.search(r"export const FILES = \[(.*?)\]", source.read_text(encoding="utf-8"), re.DOTALL)
     assert listed
     assert re.findall(r'"([^"]+)"', listed[1]) == list(WRITERS)
-    assert {cli.file_kind(f"x{kind}") for kind in cli._kinds()} == WRITERS.keys()
+    assert {cli.file_kind(f"x{kind}") for kind in cli.kinds()} == WRITERS.keys()
 
 
 def panels_of(solution: Solution) -> np.ndarray:

@@ -11,10 +11,10 @@ from typing import Any
 
 import pytest
 
-from hexwrap_server.input.requests import Order
+from hexwrap_server.input.requests import Order, Wanted
 from hexwrap_server.jobs import disk, manager
 from hexwrap_server.jobs.engine import ProcessEngine
-from hexwrap_server.jobs.store import Store
+from hexwrap_server.jobs.store import Store, Work
 from tests.server.bodies import request, tube
 from tests.server.live import Live, finished, running, until_at
 from tests.server.patience import until
@@ -48,6 +48,22 @@ class Full:
         return self._real.executemany(statement, *values)
 
 
+def databases(monkeypatch: pytest.MonkeyPatch) -> list[Full]:
+    """The lists of jobs that are opened from now on, each on a disk that can be full."""
+    opened: list[Full] = []
+    connect: Any = sqlite3.connect
+
+    def on_a_disk(path: Path, *arguments: Any, **options: Any) -> Any:
+        found = connect(path, *arguments, **options)
+        if Path(path).name != "hexwrap.sqlite3":
+            return found
+        opened.append(Full(found))
+        return opened[-1]
+
+    monkeypatch.setattr(sqlite3, "connect", on_a_disk)
+    return opened
+
+
 class Held(ProcessEngine):
     """Its jobs stay at their surface until there is a gate, where it has one."""
 
@@ -63,11 +79,9 @@ class Held(ProcessEngine):
 @pytest.fixture
 def server(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Live, Full, Held]]:
     monkeypatch.setattr(manager, "CATCH_UP_INTERVAL", 0.1)
-    engine = Held(1)
+    engine, disks = Held(1), databases(monkeypatch)
     with running(tmp_path, engine) as client:
-        disk = Full(client.service.store._db)
-        client.service.store._db = disk  # type: ignore[assignment]
-        yield client, disk, engine
+        yield client, disks[0], engine
 
 
 def status_on_disk(client: Live, id: str) -> str:
@@ -146,15 +160,16 @@ def test_jobs_end_and_requests_are_refused_when_the_database_breaks(
     assert client.get(f"/v1/jobs/{done}/result").status_code == 200
 
 
-def test_server_that_dies_before_the_end_is_written_runs_the_job_again(tmp_path: Path) -> None:
+def test_server_that_dies_before_the_end_is_written_runs_the_job_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     engine = Held(1)
     engine.gate = tmp_path / "gate"
+    disks = databases(monkeypatch)
     with running(tmp_path, engine) as client:
-        disk = Full(client.service.store._db)
-        client.service.store._db = disk  # type: ignore[assignment]
         id = client.post("/v1/jobs", json=request(surface=tube(200, 100))).json()["id"]
         until_at(client, id)
-        disk.is_full = True
+        disks[0].is_full = True
         engine.gate.touch()
         assert finished(client, id)["status"] == "failed"
     with running(tmp_path, workers=1) as client:
@@ -175,16 +190,20 @@ def test_surfaces_and_outcomes_that_find_no_room(tmp_path: Path) -> None:
         assert client.post("/v1/solve", json=request()).status_code == 200
 
 
-def test_database_that_is_really_full_refuses_and_goes_on(tmp_path: Path) -> None:
+def test_database_that_is_really_full_refuses_and_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    disks = databases(monkeypatch)
     store = Store(tmp_path)
-    pages = store._db.execute("PRAGMA page_count").fetchone()[0]
-    store._db.execute(f"PRAGMA max_page_count = {pages}")
-    insert = "INSERT INTO works (identity, surface, wanted, used) VALUES (?, '', ?, 0)"
+    pages = disks[0].execute("PRAGMA page_count").fetchone()[0]
+    disks[0].execute(f"PRAGMA max_page_count = {pages}")
+    large, small = (Work(name, "x" * size, Wanted()) for name, size in (("large", 10**6), ("small", 1)))
     with pytest.raises(manager.StorageError, match="full"):
-        store._write(insert, "large", bytes(10**6))
-    store._write(insert, "small", b"")
-    store._db.execute("PRAGMA max_page_count = 100000")
-    store._write(insert, "large", bytes(10**6))
+        store.add_work(large)
+    store.add_work(small)
+    disks[0].execute("PRAGMA max_page_count = 100000")
+    store.add_work(large)
+    assert store.work("large") == large
     store.close()
 
 

@@ -216,7 +216,7 @@ def test_a_rhino_file_without_a_surface_is_refused() -> None:
         read_surface(rhino(line), "a.3dm")
 
 
-@pytest.mark.parametrize("name", ["a.step", "a", "obj"])
+@pytest.mark.parametrize("name", ["a.step", "a.dxf", "a", "obj"])
 def test_other_types_are_refused(name: str) -> None:
     with pytest.raises(FileTypeError, match=r"\.3dm, \.npz, \.obj"):
         read_surface(b"", name)

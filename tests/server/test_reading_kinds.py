@@ -432,6 +432,7 @@ from hexwrap_server.input.curves import read_drawing
 assert {"trimesh", "pytest"} <= outside, outside
 for path in map(Path, files):
     read_drawing(path) if path.stem == "drawing" else read_surface(path.read_bytes(), path.name)
+import hexwrap_server.cli.main, hexwrap_server.http.app, hexwrap_server.output.writers
 print("read all")
 """
 

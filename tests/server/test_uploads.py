@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import os
+import sqlite3
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,6 +15,7 @@ import pytest
 
 from hexwrap_server.errors import FormError
 from hexwrap_server.input.requests import Outcome, Wanted
+from hexwrap_server.jobs.disk import keep_file
 from hexwrap_server.jobs.store import Job, Store, Work
 from hexwrap_server.problems import problem
 from hexwrap_solver.errors import RequestError
@@ -104,7 +107,7 @@ def test_old_and_superfluous_results_are_forgotten(tmp_path: Path) -> None:
     outcome = Outcome(b"r" * 1000, b"s" * 1000, 2000, {}, {})
     for i in range(4):
         identity = f"{i}" * 64
-        store.keep_surface("a" * 64, b"surface")
+        keep_file(store.surface_path("a" * 64), b"surface")
         job = Job(f"job{i}", identity, "", created=time.time(), finished=time.time(), status="done")
         store.add(job, Work(identity, "a" * 64, Wanted(pattern=None, panels=None)))
         store.keep_outcome(identity, outcome)
@@ -118,15 +121,21 @@ def test_old_and_superfluous_results_are_forgotten(tmp_path: Path) -> None:
     store.close()
 
 
+def edit(store: Store, statement: str, *values: object) -> None:
+    """As another program would."""
+    with contextlib.closing(sqlite3.connect(store.folder / "hexwrap.sqlite3", isolation_level=None)) as db:
+        db.execute(statement, values)
+
+
 def failed_long_ago(store: Store, number: int) -> str:
     """The surface of a job that failed, 1000 bytes."""
     identity = surface = f"{number:064x}"
-    store.keep_surface(surface, bytes(1000))
+    keep_file(store.surface_path(surface), bytes(1000))
     moment = time.time() - 1000 + number
     os.utime(store.surface_path(surface), (moment, moment))
     job = Job(f"job{number}", identity, "", created=moment, finished=moment, status="failed")
     store.add(job, Work(identity, surface, Wanted(pattern=None, panels=None)))
-    store._write("UPDATE works SET used = ? WHERE identity = ?", moment, identity)
+    edit(store, "UPDATE works SET used = ? WHERE identity = ?", moment, identity)
     return surface
 
 
@@ -139,7 +148,7 @@ def pruned(store: Store, days: float, result_bytes: float) -> set[str]:
 def test_surfaces_of_failed_jobs_count(tmp_path: Path) -> None:
     store = Store(tmp_path)
     surfaces = [failed_long_ago(store, i) for i in range(8)]
-    store._write("UPDATE jobs SET status = 'queued' WHERE id = 'job0'")
+    edit(store, "UPDATE jobs SET status = 'queued' WHERE id = 'job0'")
     assert pruned(store, days=1, result_bytes=3500) == {surfaces[0], *surfaces[-3:]}
     assert {job.id for job in store.jobs(10)} == {"job0", "job5", "job6", "job7"}
     store.close()
@@ -159,7 +168,7 @@ def test_surfaces_that_many_works_share_count_once(tmp_path: Path) -> None:
 def test_what_no_job_uses_has_an_age_too(tmp_path: Path) -> None:
     store = Store(tmp_path)
     for id, days in (("a" * 64, 3), ("b" * 64, 0.5)):
-        store.keep_surface(id, b"surface")
+        keep_file(store.surface_path(id), b"surface")
         stage = store.stages / f"{id}.stage"
         stage.write_bytes(b"stage")
         for path in (store.surface_path(id), stage):

@@ -105,9 +105,15 @@ def drawn_surface(random: np.random.Generator) -> SentMesh:
     )
 
 
-@pytest.mark.parametrize("seed", range(24))
-def test_whatever_is_asked_of_whatever_surface_is_done_or_refused(seed):
-    """No warning (an error here), no other exception, no overlap, no irregular whole panel."""
+@pytest.mark.parametrize("group", range(4))
+def test_whatever_is_asked_of_whatever_surface_is_done_or_refused(group):
+    """No warning (an error here), no other exception, no overlap, no irregular whole panel; and not all are
+    refused."""
+    assert sum(done(seed) for seed in range(6 * group, 6 * group + 6)) >= 1
+
+
+def done(seed):
+    """Whether what was drawn was not refused."""
     random = np.random.default_rng(seed)
 
     def one_of(*options):
@@ -137,9 +143,10 @@ def test_whatever_is_asked_of_whatever_surface_is_done_or_refused(seed):
     try:
         found = solve(lambda: surface_from_mesh(sent), SolveSettings(condition, pattern, panels))
     except HexwrapError:
-        return
+        return False
     if panels.mode == "split":
         whole = found.panels.whole
         assert found.quality.overlaps == 0
         assert found.quality.planarity[whole].max(initial=0.0) < 1e-9
         assert found.quality.edge_deviation[whole].max(initial=0.0) < 1e-9
+    return True

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+import orjson
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
@@ -95,20 +96,16 @@ def make_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"hexwrap {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    quiet = Parser(add_help=False)
+    quiet.add_argument("-q", "--quiet", action="store_true", help="print nothing but errors")
     serve = commands.add_parser("serve", help="start the service on this machine")
     add_arguments(serve)
     serve.set_defaults(command=_serve)
-    solve = commands.add_parser("solve", help="panelize a surface and write files, without the service")
-    solve.add_argument("input", metavar="INPUT", help=INPUT)
-    solve.add_argument(
-        "-o",
-        "--output",
-        dest="outputs",
-        metavar="OUT",
-        action="append",
-        required=True,
-        help=f"file to write, any number of times; the ending picks what: {', '.join(_kinds())}",
+    solve = commands.add_parser(
+        "solve", help="panelize a surface and write files, without the service", parents=[quiet]
     )
+    solve.add_argument("input", metavar="INPUT", help=INPUT)
+    _add_outputs(solve, f"file to write, any number of times; the ending picks what: {', '.join(kinds())}")
     solve.add_argument(
         "--sheet", type=float, nargs=2, metavar=("WIDTH", "HEIGHT"), help="size of the sheets of flat.dxf"
     )
@@ -119,18 +116,14 @@ def make_parser() -> argparse.ArgumentParser:
     solve.add_argument(
         "--storey", type=float, metavar="HEIGHT", help="height of the storeys of panels.ifc (default: none)"
     )
-    solve.add_argument("-q", "--quiet", action="store_true", help="print nothing but errors")
     add_request_options(solve)
     solve.set_defaults(command=_solve)
     explore = commands.add_parser(
-        "explore", help="try many choices for a surface and write the front of the best"
+        "explore", help="try many choices for a surface and write the front of the best", parents=[quiet]
     )
     explore.add_argument("input", metavar="INPUT", help=INPUT)
-    explore.add_argument(
-        "-o", "--output", dest="outputs", metavar="OUT", action="append", required=True,
-        help="file to write, any number of times: a table (.csv), a picture (.png) or everything (.json)",
-    )  # fmt: skip
-    explore.add_argument("-q", "--quiet", action="store_true", help="print nothing but errors")
+    wanted = "file to write, any number of times: a table (.csv), a picture (.png) or everything (.json)"
+    _add_outputs(explore, wanted)
     add_explore_options(explore)
     add_request_options(explore, "surface")
     explore.set_defaults(command=_explore)
@@ -141,7 +134,9 @@ def make_parser() -> argparse.ArgumentParser:
     for name in INSPECTED:
         inspect.add_argument(f"--{name}", metavar=name.upper(), help=f"as for solve --{name}")
     inspect.set_defaults(command=_inspect)
-    lift = commands.add_parser("lift", help="carry own points and curves from the domain onto the surface")
+    lift = commands.add_parser(
+        "lift", help="carry own points and curves from the domain onto the surface", parents=[quiet]
+    )
     lift.add_argument(
         "input",
         metavar="INPUT",
@@ -159,7 +154,6 @@ def make_parser() -> argparse.ArgumentParser:
     lift.add_argument(
         "--step", type=float, metavar="LENGTH", help="how closely lines are followed, in units of the drawing"
     )
-    lift.add_argument("-q", "--quiet", action="store_true", help="print nothing but errors")
     add_request_options(lift)
     lift.set_defaults(command=_lift)
     demo = commands.add_parser(
@@ -178,7 +172,13 @@ def make_parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _kinds() -> list[str]:
+def _add_outputs(parser: argparse.ArgumentParser, help: str) -> None:
+    parser.add_argument(
+        "-o", "--output", dest="outputs", metavar="OUT", action="append", required=True, help=help
+    )
+
+
+def kinds() -> list[str]:
     return [*ENDINGS, "flat.dxf", "domain.dxf", "cutting-list.csv"]
 
 
@@ -218,7 +218,7 @@ def _solve(asked: argparse.Namespace) -> int:
     )
     console = Console(quiet=asked.quiet, soft_wrap=True)
     parts = ("unit", "mesh", "map", "pattern", "panels", "sizes", "quality", "timings")
-    print_summary(console, meta.name, {name: wire.part(solution, name, timings) for name in parts})
+    print_summary(console, meta.name, orjson.loads(wire.result_json(solution, timings, parts)))
     for out, kind in kinds.items():
         save(out, write(kind, solution, meta))
         console.print(f"wrote {out}", highlight=False)
@@ -321,7 +321,7 @@ def file_kind(out: str) -> str:
         if name.endswith(kind):
             return kind
     if path.suffix.lower() not in ENDINGS:
-        raise UsageError(f"-o {out}: the ending must be one of {', '.join(_kinds())}.")
+        raise UsageError(f"-o {out}: the ending must be one of {', '.join(kinds())}.")
     return ENDINGS[path.suffix.lower()]
 
 

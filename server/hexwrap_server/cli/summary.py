@@ -42,7 +42,9 @@ def print_summary(console: Console, name: str, result: dict[str, Any]) -> None:
     if result["panels"] is not None:
         console.print(_sizes(result["sizes"]))
         if result["quality"]["trade_off"]:
-            console.print(_trade_off(result["quality"]["trade_off"], len(result["sizes"])))
+            console.print(
+                _trade_off(result["quality"]["trade_off"], sum(not size["fold"] for size in result["sizes"]))
+            )
     if result["quality"].get("singularity_curve"):
         console.print(_curve(result["quality"]["singularity_curve"]))
     for note in (*result["mesh"]["repairs"], *result["quality"]["notes"]):
@@ -79,7 +81,8 @@ def _panels(result: dict[str, Any]) -> Rows:
     if result["panels"] is None:
         return
     yield "", str(len(result["panels"]["face"]))
-    yield "sizes", str(len(result["sizes"]))
+    along = sum(size["fold"] for size in result["sizes"])
+    yield "sizes", str(len(result["sizes"]) - along) + (f", and {along} types along folds" if along else "")
     yield "distinct", str(result["quality"]["distinct_panels"])
     yield "overlaps", str(result["quality"]["overlaps"])
     yield "coverage", f"{result['quality']['coverage']:.1%}"
@@ -103,42 +106,51 @@ def _quality(result: dict[str, Any]) -> Rows:
     yield "off the surface", f"at most {_length(found['surface_distance']['max'])}"
     if result["panels"]["mode"] == "watertight":
         yield "moved", f"at most {_length(found['movement'])}"
-        yield "convex", f"{found['convex']:.1%}"
+        yield (
+            "convex",
+            f"{found['convex']:.1%}" + (f" ({left} are not)" if (left := found["not_convex"]) else ""),
+        )
         if found["kink"]["max"] is not None:
             yield "kinks", f"at most {angle(found['kink']['max'])}"
 
 
 def _trade_off(curve: dict[str, Any], taken: int) -> Table:
     """What fewer or more sizes would leave open."""
-    table = Table(box=None, pad_edge=False)
-    for heading in ("sizes", "uncovered", "mean joint", "worst joint"):
-        table.add_column(heading, justify="right")
-    table.add_column("")
+    table = _chart("sizes", "uncovered", "mean joint", "worst joint")
     most = max(max(curve["uncovered"]), 1e-12)
     for i, sizes in enumerate(curve["sizes"]):
         if sizes not in SHOWN and sizes != taken:
             continue
         uncovered = curve["uncovered"][i]
-        joints = [length(curve[key][i]) for key in ("joint_mean", "joint_max")]
-        bar = Text("▒" * max(1, round(BAR * uncovered / most)), style="bold" if sizes == taken else "dim")
+        joints = [_length(curve[key][i]) for key in ("joint_mean", "joint_max")]
+        bar = _bar("▒", uncovered / most, "bold" if sizes == taken else "dim")
         table.add_row(str(sizes), f"{uncovered:.2%}", *joints, bar)
     return table
 
 
 def _curve(found: dict[str, Any]) -> Table:
     """What fewer or more singularities would leave open."""
-    table = Table(box=None, pad_edge=False)
-    table.add_column("singularities", justify="right")
-    table.add_column(f"uncovered, {found['sizes']} sizes", justify="right")
-    table.add_column("largest / smallest cell", justify="right")
-    table.add_column("")
+    table = _chart("singularities", f"uncovered, {found['sizes']} sizes", "largest / smallest cell")
     most = max(*found["uncovered"], 1e-12)
     for i, number in enumerate(found["number"]):
         uncovered, taken = found["uncovered"][i], i == found["taken"]
-        bar = Text("▒" * max(1, round(BAR * uncovered / most)), style="bold" if taken else "dim")
+        bar = _bar("▒", uncovered / most, "bold" if taken else "dim")
         about = "" if taken else "about "
         table.add_row(str(number), f"{about}{uncovered:.2%}", f"{found['scale_ratio'][i]:.2f}", bar)
     return table
+
+
+def _chart(*headings: str) -> Table:
+    """Columns of numbers, and one of bars."""
+    table = Table(box=None, pad_edge=False)
+    for heading in headings:
+        table.add_column(heading, justify="right")
+    table.add_column("")
+    return table
+
+
+def _bar(letter: str, share: float, style: str) -> Text:
+    return Text(letter * max(1, round(BAR * share)), style=style)
 
 
 def _small(value: float | None) -> str:
@@ -150,15 +162,11 @@ def _length(value: float | None) -> str:
 
 
 def _sizes(sizes: list[dict[str, Any]]) -> Table:
-    table = Table(box=None, pad_edge=False)
-    table.add_column("size", justify="right")
-    table.add_column("edge", justify="right")
-    table.add_column("panels", justify="right")
-    table.add_column("")
+    table = _chart("size", "edge", "panels")
     most = max((size["count"] for size in sizes), default=1)
     words = lengths([size["edge_length"] for size in sizes[:MOST_SIZES]])
     for size, word in zip(sizes, words, strict=False):
-        bar = Text("█" * max(1, round(BAR * size["count"] / most)), style=size["color"])
+        bar = _bar("█", size["count"] / most, size["color"])
         table.add_row(str(size["size"]), word, str(size["count"]), bar)
     if len(sizes) > MOST_SIZES:
         table.add_row("…", "", f"{sum(size['count'] for size in sizes[MOST_SIZES:])}", "")

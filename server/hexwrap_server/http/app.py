@@ -10,7 +10,6 @@ import sys
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from types import FrameType
-from typing import Any
 
 import uvicorn
 from fastapi import FastAPI, Request
@@ -21,7 +20,7 @@ from starlette.routing import BaseRoute, Match, Mount
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from hexwrap_server import __version__
-from hexwrap_server.errors import HttpError, PortTakenError, StorageError
+from hexwrap_server.errors import HttpError, PortTakenError, StorageError, bad_parameters
 from hexwrap_server.http.answers import problem_response
 from hexwrap_server.http.compressed import Compressed
 from hexwrap_server.http.docs import add_docs
@@ -216,11 +215,5 @@ def _takes(route: BaseRoute, asked: Scope) -> bool:
 async def _on_parameters(request: Request, error: Exception) -> Response:
     """Faults in the path or the query; bodies have their own way (``schemas``)."""
     assert isinstance(error, RequestValidationError)
-    listed: list[dict[str, Any]] = [
-        {"pointer": "", "parameter": ".".join(map(str, e["loc"][1:])), "detail": e["msg"]}
-        for e in error.errors()
-    ]
-    detail = f"Parameter '{listed[0]['parameter']}': {listed[0]['detail']}."
-    return problem_response(
-        HttpError(422, "invalid-request", "The request does not have the right form", detail, errors=listed)
-    )
+    listed = [(".".join(map(str, e["loc"][1:])), e["msg"]) for e in error.errors()]
+    return problem_response(bad_parameters(f"Parameter '{listed[0][0]}': {listed[0][1]}.", listed))

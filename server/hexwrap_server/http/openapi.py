@@ -7,6 +7,7 @@ from typing import Any
 from hexwrap_server.http.openapi_result import RESULT as _RESULT
 from hexwrap_server.http.schema_words import NUMBER, PLANE, POINT, listed, nullable, record
 from hexwrap_server.input.form import Body, ExploreBody, schema
+from hexwrap_server.input.schemas import NurbsForm
 from hexwrap_solver.surface.types import SurfaceSettings
 
 _SETTINGS = schema(SurfaceSettings)["properties"]
@@ -25,10 +26,9 @@ _NURBS = record(
     nurbs=record(
         ("degree", "knots", "control_points"),
         more=False,
-        degree=listed({"type": "integer", "minimum": 1, "maximum": 25}, 2),
+        **schema(NurbsForm)["properties"],
         knots=listed(listed(NUMBER), 2),
         control_points=listed(listed(listed(NUMBER) | {"minItems": 3, "maxItems": 4})),
-        closed=listed({"type": "boolean"}, 2),
     ),
     **_SETTINGS,
 )

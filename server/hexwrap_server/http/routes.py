@@ -10,11 +10,10 @@ from fastapi import APIRouter, Path, Query, Request
 from isal import igzip
 from starlette.responses import Response, StreamingResponse
 
-from hexwrap_server.errors import GoneError, HttpError, JobFailedError, not_found
+from hexwrap_server.errors import GoneError, HttpError, JobFailedError, bad_parameters, not_found
 from hexwrap_server.http import head, openapi
 from hexwrap_server.http.answers import JSON, json_response, problem_response
 from hexwrap_server.http.bodies import sent_body
-from hexwrap_server.http.compressed import takes_gzip
 from hexwrap_server.http.metrics import MEDIA_TYPE as METRICS_TYPE
 from hexwrap_server.http.service import Service
 from hexwrap_server.input.requests import Intake, ParsedRequest
@@ -284,16 +283,16 @@ async def _result(request: Request, job: Job, include: list[str] | None) -> Resp
         return problem_response(job.problem)
     _finished(job)
     picked = "" if include is None else f"?include={','.join(include)}"
-    headers = {"Content-Location": f"/v1/jobs/{job.id}/result{picked}", "Vary": "Accept-Encoding"}
-    headers |= _timing(job)
+    headers = {"Content-Location": f"/v1/jobs/{job.id}/result{picked}"} | _timing(job)
     service = service_of(request)
     if include is None:
         packed = await service.manager.result(job)
     else:
         _is_solved(job)
         packed = await service.manager.parts(job, include, service.errand)
-    if takes_gzip(request.headers):
-        return Response(packed, 200, headers | {"Content-Encoding": "gzip"}, JSON)
+    if request.headers["accept-encoding"] == "gzip":  # as the middleware has found
+        headers |= {"Content-Encoding": "gzip", "Vary": "Accept-Encoding"}
+        return Response(packed, 200, headers, JSON)
     return Response(await asyncio.to_thread(igzip.decompress, packed), 200, headers, JSON)
 
 
@@ -346,13 +345,7 @@ def _sheet(text: str) -> tuple[float, float]:
 
 
 def _bad_parameter(name: str, detail: str) -> HttpError:
-    return HttpError(
-        422,
-        "invalid-request",
-        "The request does not have the right form",
-        detail,
-        errors=[{"pointer": "", "parameter": name, "detail": detail}],
-    )
+    return bad_parameters(detail, [(name, detail)])
 
 
 def _timing(job: Job) -> dict[str, str]:

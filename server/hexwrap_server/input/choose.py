@@ -33,6 +33,8 @@ from hexwrap_solver.surface import SentMesh
 
 #: Of several parts that could be meant, one that counts for this many times the next is meant.
 DOMINANT = 1.3
+#: A part that nearly meets the best one is left out only if that counts for this many times as much.
+TORN = 10.0
 #: The area of what is no tube counts for so much of it, of ground, and of what is flat.
 NO_TUBE, GROUND, PLANE = 1 / 20, 1 / 400, 1e-6
 #: Parts are alike whose sizes and areas differ by no more than this part.
@@ -76,21 +78,24 @@ def choose(
     fitting = sorted(found.parts, key=_weight, reverse=True)
     best = fitting[0]
     alike = [other for other in fitting if _is_alike(other, best, meant)]
+    apart = _nearly(best, [other for other in fitting if other is not best], meant, content)
     rivals = [
         other
         for other in fitting
-        if all(other is not one for one in alike) and _weight(best) < DOMINANT * _weight(other)
+        if all(other is not one for one in alike)
+        and _weight(best) < (TORN if id(other) in apart else DOMINANT) * _weight(other)
     ]
     if rivals:
         near = [other for other in fitting if other is best or any(other is one for one in rivals)]
-        raise several(content, [meant[i] for part in near for i in part.members], len(near), unit)
+        gaps = [apart[id(other)] for other in rivals if id(other) in apart]
+        raise several(content, [meant[i] for part in near for i in part.members], len(near), unit, gaps)
     part = next((other for other in alike if _is_exact(other, meant)), best)
     used = [meant[i] for i in part.members]
     geometry, told = brep_where_needed(part.make(), content.tolerance)
     for seam in found.joints if len(used) > 1 or len(meant) == 1 else ():
         told += joint(seam, content.tolerance or 0.0, len(used))
     told += strays([piece for members, piece in found.strays if members & set(part.members)])
-    told += _nearly(part, [other for other in found.parts if other is not part], meant, content)
+    told += list(apart.values())[:SHOWN]
     told += coarse_numbers(geometry, content.tolerance)
     return Chosen(geometry, tuple(used), (*told, *copies(len(found.copies)), *others(content, used)))
 
@@ -178,31 +183,37 @@ def _is_on(found: Found, layer: str | None) -> bool:
     return any(fnmatchcase(path, word) for path in paths)
 
 
-def _nearly(part: Part, others: Sequence[Part], meant: Sequence[Found], content: FileContent) -> list[str]:
-    """Where edges of another part come near, but not within the tolerance."""
+def _nearly(
+    part: Part, others: Sequence[Part], meant: Sequence[Found], content: FileContent
+) -> dict[int, str]:
+    """Where edges of other parts come near, but not within the tolerance: a sentence by id of the part."""
     tolerance = content.tolerance
     number = {id(item): i for i, item in enumerate(content.objects)}
     if tolerance is None or not len(part.rim):
-        return []
-    told = []
+        return {}
+    told = {}
     tree = cKDTree(part.rim)
     for other in others:
         if not len(other.rim):
             continue
         distance = np.asarray(tree.query(other.rim)[0])
-        k = int(np.argmin(distance))
+        k = int(np.argmin(np.where(distance > tolerance, distance, np.inf)))
         if tolerance < distance[k] < NEARLY * tolerance:
             near = meant[other.members[0]]
-            told.append(
+            told[id(other)] = (
                 f"{label(near, number[id(near)])} comes within {distance[k]:.3g} of the "
                 f"surface at {point(other.rim[k])}, more than the file's tolerance of {tolerance:g}, and was "
                 "not joined: close the gap with Rhino's MatchSrf or JoinEdge."
             )
-    return told[:SHOWN]
+    return told
 
 
 def several(
-    content: FileContent, objects: Sequence[Found], count: int, unit: str | None
+    content: FileContent,
+    objects: Sequence[Found],
+    count: int,
+    unit: str | None,
+    gaps: Sequence[str] = (),
 ) -> SeveralObjectsError:
     distinct = list({id(found): found for found in objects}.values())
     if len(distinct) < 2:
@@ -215,6 +226,6 @@ def several(
         f"The file holds {len(distinct)} objects that could be meant: "
         f"{listed(distinct, unit, content.objects)}. Name one with --object or --layer ('object' or 'layer' "
         "of the surface in a request), or hide the others; edges that meet within the file's tolerance are "
-        "joined.",
+        f"joined. {' '.join(gaps[:SHOWN])}".rstrip(),
         data={"objects": rows(content.objects)},
     )

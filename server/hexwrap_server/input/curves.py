@@ -6,8 +6,6 @@ ezdxf is loaded with the first DXF file (see ``output.drawing``).
 from __future__ import annotations
 
 import base64
-import csv
-import io
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -22,7 +20,8 @@ from hexwrap_server.input.readers.drawing_csv import read_csv
 from hexwrap_server.input.readers.drawing_dxf import read_dxf
 from hexwrap_server.input.readers.drawing_json import read_json
 from hexwrap_server.output.drawing import encode
-from hexwrap_server.output.units import unit_of
+from hexwrap_server.output.text import csv_table
+from hexwrap_server.output.units import heading, unit_of
 from hexwrap_solver.arrays import Floats
 
 
@@ -55,7 +54,7 @@ def write_curves(kind: str, curves: list[Curve], unit: str | None = None) -> byt
 
 def refined(curve: Curve, step: float) -> Curve:
     """The curve with further points, so that no two neighbours are further apart than step."""
-    points = np.vstack([curve.points, curve.points[:1]]) if curve.closed else curve.points
+    points = drawn(curve)
     if len(points) < 2:
         return curve
     along = np.diff(points, axis=0)
@@ -68,15 +67,10 @@ def refined(curve: Curve, step: float) -> Curve:
 
 def _write_csv(curves: list[Curve], unit: str | None) -> bytes:
     """A heading, rows of numbers, an empty row between curves; closed ones return to their first point."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\r\n")
-    behind = f" [{unit}]" if unit else ""
-    writer.writerow([f"{letter}{behind}" for letter in "xyz"[: curves[0].points.shape[1]]])
-    for number, curve in enumerate(curves):
-        if number:
-            text.write("\r\n")
-        writer.writerows(drawn(curve).tolist())
-    return text.getvalue().encode()
+    rows: list[list[object]] = [[heading(letter, unit) for letter in "xyz"[: curves[0].points.shape[1]]]]
+    for curve in curves:
+        rows += [*drawn(curve).tolist(), []]
+    return csv_table(rows[:-1])
 
 
 def _write_json(curves: list[Curve], unit: str | None) -> bytes:

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from hexwrap_server.input.readers.found import STRAY, FileContent, Found, Geometry
 from hexwrap_solver.arrays import Floats, Ints
@@ -207,46 +209,31 @@ def _some(brep: Brep, faces: Iterable[int]) -> Brep:
 
 def _connected(brep: Brep) -> list[list[int]]:
     """Faces that hang together across edges."""
-    label = list(range(len(brep.faces)))
-
-    def root(f: int) -> int:
-        while label[f] != f:
-            label[f] = label[label[f]]
-            f = label[f]
-        return f
-
-    first: dict[int, int] = {}
-    for f, face in enumerate(brep.faces):
-        for loop in face.loops:
-            for trim in loop:
-                if trim.edge >= 0:
-                    label[root(f)] = root(first.setdefault(trim.edge, f))
-    groups: dict[int, list[int]] = {}
-    for f in range(len(brep.faces)):
-        groups.setdefault(root(f), []).append(f)
-    return list(groups.values())
+    uses = _uses(brep, range(len(brep.faces)))
+    n, nodes = len(brep.faces), len(brep.faces) + len(brep.edges)
+    label = _components(uses[:, 0], n + uses[:, 1], nodes)[:n]
+    return [np.flatnonzero(label == k).tolist() for k in dict.fromkeys(label.tolist())]
 
 
 def _naked(brep: Brep, faces: Sequence[int]) -> tuple[Floats, int]:
     """Ends of edges with one face only, and the number of closed curves that these edges make."""
-    uses: dict[int, int] = {}
-    for f in faces:
-        for loop in brep.faces[f].loops:
-            for trim in loop:
-                if trim.edge >= 0:
-                    uses[trim.edge] = uses.get(trim.edge, 0) + 1
-    naked = [e for e, count in uses.items() if count == 1]
-    label: dict[int, int] = {}
+    edge, count = np.unique(_uses(brep, faces)[:, 1], return_counts=True)
+    ends = np.array([(e.start, e.end) for e in (brep.edges[k] for k in edge[count == 1])], dtype=np.int64)
+    start, end = ends.reshape(-1, 2).T
+    used = np.unique(ends)
+    return brep.vertices[used], len(np.unique(_components(start, end, len(brep.vertices))[used]))
 
-    def root(v: int) -> int:
-        while label.setdefault(v, v) != v:
-            v = label[v]
-        return v
 
-    for e in naked:
-        label[root(brep.edges[e].start)] = root(brep.edges[e].end)
-    ends = sorted(label)
-    return brep.vertices[ends], len({root(v) for v in ends})
+def _uses(brep: Brep, faces: Iterable[int]) -> Ints:
+    """(k, 2) face and edge, wherever a face has an edge on its boundary."""
+    trims = ((f, trim.edge) for f in faces for loop in brep.faces[f].loops for trim in loop)
+    return np.array([use for use in trims if use[1] >= 0], dtype=np.int64).reshape(-1, 2)
+
+
+def _components(one: Ints, other: Ints, n: int) -> Ints:
+    """(n,) label of each node of a graph with these edges."""
+    graph = coo_array((np.ones(len(one)), (one, other)), shape=(n, n))
+    return np.asarray(connected_components(graph, directed=False)[1])
 
 
 def _net_area(brep: Brep, faces: Sequence[int]) -> float:

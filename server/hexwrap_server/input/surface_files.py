@@ -25,6 +25,22 @@ from hexwrap_solver.surface.types import MeshSettings, Origin, SurfaceSettings
 
 T = TypeVar("T")
 
+#: What to do with files that hold something else, or that Rhino reads and we do not.
+INSTEAD = {
+    **dict.fromkeys(
+        (".dxf", ".csv", ".txt", ".svg"),
+        "it holds curves or points, which hexwrap lift lays on a surface once that is solved, and which "
+        "--feature-lines makes lines of the pattern",
+    ),
+    **dict.fromkeys(
+        (".step", ".stp", ".igs", ".iges", ".sat", ".dwg", ".skp", ".ifc", ".fbx", ".3ds", ".dae", ".glb"),
+        "open it in Rhino and run ExportSelected on what is meant",
+    ),
+    **dict.fromkeys((".gh", ".ghx"), "bake the definition's surface in Grasshopper and save the Rhino file"),
+    ".3dmbak": "rename it so that it ends in .3dm",
+}
+
+
 #: Suffix → reader.
 READERS: dict[str, Callable[[bytes], FileContent]] = {
     ".3dm": read_3dm,
@@ -86,8 +102,10 @@ def sent_surface(
 def _guarded(data: bytes, filename: str, read: Callable[[str], T]) -> T:
     suffix = PurePath(filename).suffix.lower()
     if suffix not in READERS:
+        what = f"Files of type {suffix}" if suffix else "Files without a suffix"
+        instead = f": {INSTEAD[suffix]}" if suffix in INSTEAD else ""
         raise FileTypeError(
-            f"Files of type {suffix or 'without a suffix'} cannot be read: send one of {', '.join(READERS)}."
+            f"{what} cannot be read as a surface{instead}. Send the surface as one of {', '.join(READERS)}."
         )
     try:
         return read(suffix)

@@ -90,6 +90,11 @@ class ProcessEngine:
         return not self._stopping and len(self._starting) < len(self._workers)
 
     @property
+    def starting(self) -> int:
+        """Workers that are not ready yet."""
+        return len(self._starting)
+
+    @property
     def pids(self) -> list[int]:
         """Process ids of the living workers."""
         return [w.pid for w in self._workers if w.is_alive]

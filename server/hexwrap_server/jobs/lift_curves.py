@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexwrap_server.errors import DrawingError, UsageError
+from hexwrap_server.input.curves import drawn as traced
 from hexwrap_server.input.curves import refined
 from hexwrap_server.input.readers.drawing import Curve
 from hexwrap_server.output.unrolled import drawn, plane
@@ -56,8 +57,7 @@ def lift_curves(cmap: ConformalMap, curves: list[Curve], step: float | None) -> 
 def _followed(curves: list[Curve], step: float) -> list[Curve]:
     """The curves in steps. Raises DrawingError where that would be too many."""
     with np.errstate(over="ignore"):
-        drawn = [np.vstack([c.points, c.points[:1]]) if c.closed else c.points for c in curves]
-        length = float(sum(np.linalg.norm(np.diff(points, axis=0), axis=1).sum() for points in drawn))
+        length = float(sum(np.linalg.norm(np.diff(traced(c), axis=0), axis=1).sum() for c in curves))
     if not length / step <= MOST_POINTS:
         raise DrawingError(
             f"The lines of the drawing are {length:.3g} long; in steps of {step:.3g} that is more than "

@@ -26,4 +26,4 @@ def flatten(report: Report, body: Body, settings: Settings, path: str) -> bytes:
     """JSON answer of the flatten route. As ``lift``."""
     at = parse_points(loads(body.plain(settings.max_body_mib)), 3, settings.max_points)
     flat = domain.flatten(solution_at(path).map, at)
-    return wire.dump({"uv": wire.plane(flat.uv), "distance": flat.distance})
+    return wire.dump({"uv": flat.uv, "distance": flat.distance})

@@ -25,7 +25,7 @@ from typing import Any, Literal
 from hexwrap_server.errors import CodecError, DamagedError, FolderInUseError, StorageError
 from hexwrap_server.input.requests import Exploration, Outcome, Wanted
 from hexwrap_server.jobs import codec
-from hexwrap_server.jobs.disk import keep_file, make_private, prune, read_whole, surface_file, write_whole
+from hexwrap_server.jobs.disk import make_private, prune, read_whole, surface_file, write_whole
 
 Status = Literal["queued", "running", "done", "failed", "cancelled"]
 Kind = Literal["solve", "explore"]
@@ -170,10 +170,6 @@ class Store:
             raise StorageError.of(error) from error
 
     # surfaces (files)
-
-    def keep_surface(self, id: str, data: bytes) -> None:
-        """Writes a file. Raises StorageError."""
-        keep_file(self.surface_path(id), data)
 
     def has_surface(self, id: str) -> bool:
         return HEX_ID.fullmatch(id) is not None and self.surface_path(id).exists()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hexwrap_solver.arrays import Floats, Ints
+from hexwrap_solver.panels.polygons import convex, interior_angles
 from hexwrap_solver.panels.types import Panels
 
 #: From the shortest edge to the longest: cold and dark to warm, lightest in the middle.
@@ -70,12 +71,36 @@ def size_colours(n: int) -> list[str]:
 
 
 def class_colours(panels: Panels) -> list[str]:
-    """One colour per size class, and one for all special panels after them."""
+    """One colour per size class; pieces along folds have that of the size nearest to theirs, single ones of
+    them none, and all special panels one."""
     n = panels.n_sizes
-    return size_colours(n) + [SPECIAL] * (len(panels.class_length) - n)
+    regular = size_colours(n)
+    colours = regular + [SPECIAL] * (len(panels.class_length) - n)
+    for k in np.flatnonzero(panels.divided).tolist():
+        near = int(np.argmin(np.abs(panels.class_length[:n] - panels.class_length[k]))) if n else -1
+        colours[k] = UNSIZED if near < 0 or panels.class_count[k] == 1 else regular[near]
+    return colours
+
+
+def shapes(panels: Panels) -> tuple[Ints, list[tuple[int, bool]], list[str]]:
+    """Watertight panels by shape instead of size: (q,) shape of each (−1: cut at the boundary), per shape the
+    number of its corners and whether it is convex, most corners first, and its colour. Convex ones are cold,
+    others warm."""
+    is_convex = convex(panels.polygons, interior_angles(panels.polygons, panels.normal))
+    key = 2 * panels.polygons.lengths + is_convex
+    found = sorted(set(key[panels.whole].tolist()), key=lambda k: (-(k % 2), -k))
+    index = np.full(len(key), -1)
+    for i, one in enumerate(found):
+        index[panels.whole & (key == one)] = i
+    ends = {True: (0.2, 0.48), False: (0.9, 0.62)}
+    places = []
+    for side in (True, False):
+        n = sum(bool(k % 2) == side for k in found)
+        places += np.linspace(*ends[side], max(n, 1))[:n].tolist()
+    return index, [(k // 2, bool(k % 2)) for k in found], to_hex(gradient(np.array(places)))
 
 
 def panel_colours(size: Ints, classes: list[str]) -> Floats:
     """(q, 3) sRGB of panels by their class (−1: none), whose colours are given."""
-    table = np.vstack([from_hex(classes), from_hex([UNSIZED])])
+    table = from_hex([*classes, UNSIZED])
     return table[size]

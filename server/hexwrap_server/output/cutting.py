@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import csv
-import io
-
 import numpy as np
 
-from hexwrap_server.output.flat import lay_flat
+from hexwrap_server.output.flat import lay_flat, measures
 from hexwrap_server.output.layers import size_name
 from hexwrap_server.output.meta import Meta, panels_of
+from hexwrap_server.output.text import csv_table
 from hexwrap_server.output.units import heading
-from hexwrap_solver.arrays import Floats, Ints
 from hexwrap_solver.pipeline import Solution
 
 
@@ -23,7 +20,7 @@ def cutting_list(solution: Solution, meta: Meta) -> bytes:
     """
     pattern, panels = panels_of(solution, "cutting-list.csv")
     outlines = lay_flat(panels)
-    area, around = measures(np.asarray(outlines.corners.values), outlines.corners.offsets)
+    area, around = measures(outlines.corners)
     labels = pattern.labels()
     groups = [np.flatnonzero(panels.size == size) for size in np.unique(panels.size[panels.size >= 0])]
     groups += [np.array([panel]) for panel in np.flatnonzero(panels.size < 0)]
@@ -36,23 +33,7 @@ def cutting_list(solution: Solution, meta: Meta) -> bytes:
         rows.append(
             [size_name(size), len(panels.polygons[int(one)]), len(of), *(float(v) for v in figures), label]
         )
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\r\n")  # RFC 4180
     lengths = [heading(name, meta.unit) for name in ("edge_length", "perimeter", "width", "height")]
     areas = [heading(name, meta.unit, 2) for name in ("area", "total_area")]
-    writer.writerow(["size", "sides", "count", *lengths, *areas, "label"])
-    writer.writerows(rows)
-    writer.writerow(["total", "", panels.n_panels, "", "", "", "", "", float(area.sum()), ""])
-    return text.getvalue().encode()
-
-
-def measures(points: Floats, offsets: Ints) -> tuple[Floats, Floats]:
-    """Area and perimeter of flat polygons, rows of points (·, 2)."""
-    count = np.diff(offsets)
-    following = np.arange(len(points)) + 1
-    following[offsets[1:] - 1] = offsets[:-1]
-    row = np.repeat(np.arange(len(count)), count)
-    after = points[following]
-    twice = points[:, 0] * after[:, 1] - points[:, 1] * after[:, 0]
-    around: Floats = np.bincount(row, np.linalg.norm(after - points, axis=1), len(count)).astype(np.float64)
-    return np.abs(np.bincount(row, twice, len(count))) / 2, around
+    head = ["size", "sides", "count", *lengths, *areas, "label"]
+    return csv_table([head, *rows, ["total", "", panels.n_panels, *[""] * 5, float(area.sum()), ""]])

@@ -9,6 +9,7 @@ from xml.sax.saxutils import escape
 import numpy as np
 
 from hexwrap_server.output.colours import class_colours
+from hexwrap_server.output.flat import measures
 from hexwrap_server.output.layers import size_name
 from hexwrap_server.output.meta import Meta
 from hexwrap_server.output.text import angle, length, one_line
@@ -153,7 +154,7 @@ def _cells(solution: Solution, pattern: Pattern, rows: Ragged) -> list[str]:
     members: dict[int, list[str]] = {}
     for outline, group in zip(outlines, size.tolist(), strict=True):
         members.setdefault(group, []).append(outline)
-    thin = float(np.clip(0.02 * np.sqrt(np.median(_areas(rows))), 0.25, 1.6))
+    thin = float(np.clip(0.02 * np.sqrt(np.median(measures(rows)[0])), 0.25, 1.6))
     return [
         f'<path class="cells {size_name(group)}" stroke-width="{thin:.2f}"'
         + f' fill="{colours[group] if group >= 0 else "none"}" fill-opacity="0.85"'
@@ -168,12 +169,6 @@ def _outlines(rows: Ragged) -> list[str]:
     words = [f"L{x:.2f} {y:.2f}" for x, y in numbers]
     bounds = rows.offsets.tolist()
     return ["M" + "".join(words[a:b])[1:] + "Z" for a, b in pairwise(bounds)]
-
-
-def _areas(rows: Ragged) -> Floats:
-    points = np.asarray(rows.values)
-    z = points[:, 0] + 1j * points[:, 1]
-    return np.abs(np.bincount(rows.row, (np.conj(z) * z[rows.next()]).imag, rows.n_rows)) / 2
 
 
 def _path(words: list[str], kind: str) -> str:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from typing import Any
 
 import numpy as np
 import orjson
 
 from hexwrap_server.jobs import codec
+from hexwrap_server.output.text import csv_table
 from hexwrap_solver.explore.front import best_of, front_of, within
 from hexwrap_solver.explore.types import Figures, Limits
 
@@ -78,13 +77,11 @@ def result_json(document: Json) -> bytes:
 
 def explore_csv(document: Json) -> bytes:
     """A row per variant: its choices, what was foreseen, what was measured (empty where nothing was)."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\r\n")  # RFC 4180
     heads = [f"predicted_{name}" for name in FORESEEN] + [f"measured_{name}" for name in MEASURED]
-    writer.writerow(["variant", *CHOICES, *heads, "front", "best", "problem"])
+    rows: list[list[Any]] = [["variant", *CHOICES, *heads, "front", "best", "problem"]]
     for i, one in enumerate(document["variants"]):
         predicted, measured = one["predicted"] or {}, one["measured"] or {}
-        writer.writerow(
+        rows.append(
             [
                 i,
                 *choices(one["request"]),
@@ -95,7 +92,7 @@ def explore_csv(document: Json) -> bytes:
                 one["problem"] or "",
             ]
         )
-    return text.getvalue().encode()
+    return csv_table(rows)
 
 
 def choices(request: Json) -> list[Any]:

@@ -6,11 +6,12 @@ What is cut lies on layers ``cut-…``, one per size; what is engraved, all of i
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hexwrap_server.output.blocks import frames
 from hexwrap_server.output.drawing import drawing, encode
 from hexwrap_server.output.layers import size_layers
 from hexwrap_server.output.meta import Group, Meta, SheetError, panels_of
@@ -18,6 +19,7 @@ from hexwrap_server.output.table import neighbour_labels
 from hexwrap_server.output.text import length, lengths, one_line
 from hexwrap_server.output.units import unit_of
 from hexwrap_solver.arrays import Floats, Ints, Ragged
+from hexwrap_solver.panels.folds import blanks
 from hexwrap_solver.panels.types import Panels
 from hexwrap_solver.pattern.types import Pattern
 from hexwrap_solver.pipeline import Solution
@@ -69,7 +71,8 @@ def flat_dxf(solution: Solution, meta: Meta) -> bytes:
     """Outlines at full size, seen from outside, first edges horizontal, sheets side by side.
 
     Inside each outline stand label, size and an arrow that points up; along each edge the label of the
-    panel across it. Raises SheetError where a panel is larger than the sheet.
+    panel across it. Bent panels are unfolded, with their bend line on a layer of its own. Raises
+    SheetError where a panel is larger than the sheet.
     """
     pattern, panels = panels_of(solution, "flat.dxf")
     outlines = lay_flat(panels)
@@ -77,8 +80,9 @@ def flat_dxf(solution: Solution, meta: Meta) -> bytes:
     names = [labels[face] for face in panels.face.tolist()]
     group = groups(panels, pattern, meta.group)
     places = pack(outlines.extent, panels.size, sheet_size(outlines.extent, meta), names, group)
+    bent = ("bend",) if panels.bends is not None else ()
     document = drawing(
-        panels, meta, "sheets", "engrave-label", "engrave-up", "engrave-neighbours", prefix="cut-"
+        panels, meta, "sheets", "engrave-label", "engrave-up", "engrave-neighbours", *bent, prefix="cut-"
     )
     space = document.modelspace()
     step = 1.1 * places.size[0]
@@ -89,6 +93,9 @@ def flat_dxf(solution: Solution, meta: Meta) -> bytes:
     laid = Ragged(corners, outlines.corners.offsets)
     for points, size in zip(laid.to_lists(), panels.size.tolist(), strict=True):
         space.add_lwpolyline(points, close=True, dxfattribs={"layer": layers[size]})
+    if panels.bends is not None:
+        for start, hinge in zip(laid.offsets[panels.bends.panel], panels.bends.hinge, strict=True):
+            space.add_lwpolyline(corners[[start, start + hinge]].tolist(), dxfattribs={"layer": "bend"})
     _write_inside(space, laid, panels, names, outlines.up)
     _write_along(space, laid, neighbour_labels(pattern, panels))
     return encode(document)
@@ -138,19 +145,16 @@ def _draw_sheets(space: Modelspace, places: Places, group: Ints, step: float, me
 
 
 def lay_flat(panels: Panels) -> Outlines:
-    """The outlines in their planes, seen from outside, with the first edge along x."""
-    polygons = panels.polygons
-    points: Floats = np.asarray(polygons.values, dtype=np.float64)
+    """The outlines in their planes, unfolded where they are bent, seen from outside, with the first edge
+    along x."""
+    polygons, normal = blanks(panels)
     rows, first = polygons.row, polygons.offsets[:-1]
-    x_axis = points[first + 1] - points[first]
-    x_axis -= np.sum(x_axis * panels.normal, axis=1, keepdims=True) * panels.normal
-    x_axis /= np.linalg.norm(x_axis, axis=1, keepdims=True)
-    y_axis = np.cross(panels.normal, x_axis)
-    arms = points - panels.center[rows]
-    flat = np.stack([np.sum(arms * x_axis[rows], axis=1), np.sum(arms * y_axis[rows], axis=1)], axis=1)
+    axes = frames(replace(panels, polygons=polygons, normal=normal))[:, :2]
+    arms = np.asarray(polygons.values, dtype=np.float64) - panels.center[rows]
+    flat = np.einsum("kij,kj->ki", axes[rows], arms)
     low = np.minimum.reduceat(flat, first)
-    upward = np.where(np.abs(panels.normal[:, 2]) > LEVEL, 1, 2)[:, None]
-    up = np.stack([np.take_along_axis(axis, upward, 1)[:, 0] for axis in (x_axis, y_axis)], axis=1)
+    upward = np.where(np.abs(normal[:, 2]) > LEVEL, 1, 2)
+    up = axes[np.arange(len(axes)), :, upward]
     up /= np.linalg.norm(up, axis=1, keepdims=True)
     return Outlines(Ragged(flat - low[rows], polygons.offsets), np.maximum.reduceat(flat, first) - low, up)
 
@@ -243,10 +247,16 @@ def _write(
     space.add_text(words, height=height, dxfattribs={**attributes, "halign": 1, "valign": 2})
 
 
+def measures(flat: Ragged) -> tuple[Floats, Floats]:
+    """(n,) area and (n,) perimeter of plane polygons, rows of points (·, 2)."""
+    points, rows, n = np.asarray(flat.values), flat.row, flat.n_rows
+    after = points[flat.next()]
+    twice = points[:, 0] * after[:, 1] - points[:, 1] * after[:, 0]
+    around: Floats = np.bincount(rows, np.linalg.norm(after - points, axis=1), n).astype(np.float64)
+    return np.abs(np.bincount(rows, twice, n)) / 2, around
+
+
 def _inradius(laid: Ragged) -> Floats:
     """(q,) twice the area over the perimeter: the incircle's radius of a regular polygon."""
-    points, rows, n = np.asarray(laid.values), laid.row, laid.n_rows
-    following = points[laid.next()]
-    cross = points[:, 0] * following[:, 1] - points[:, 1] * following[:, 0]
-    around = np.bincount(rows, np.linalg.norm(following - points, axis=1), n)
-    return np.asarray(np.abs(np.bincount(rows, cross, n)) / around)
+    area, around = measures(laid)
+    return 2 * area / around

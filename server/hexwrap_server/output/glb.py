@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 import orjson
+from scipy.spatial.transform import Rotation
 
 from hexwrap_server.output.blocks import Blocks, Shape, colours_of
-from hexwrap_server.output.colours import from_hex
+from hexwrap_server.output.colours import from_hex, linear
 from hexwrap_server.output.layers import size_name
 from hexwrap_server.output.meta import Meta, panels_of
 from hexwrap_server.output.text import one_line
@@ -40,7 +41,7 @@ def panels_glb(solution: Solution, meta: Meta) -> bytes:
     for panel in blocks.alone.tolist():
         size = int(panels.size[panel])
         mesh[panel] = scene.mesh(labels[panels.face[panel]], blocks.shape(panel), material[size])
-    turned = quaternions(blocks.axes).tolist()
+    turned = Rotation.from_matrix(np.swapaxes(blocks.axes, 1, 2)).as_quat().tolist()
     nodes: list[dict[str, Any]] = [
         {
             "name": labels[face], "mesh": shown, "translation": place, "rotation": turn,
@@ -109,35 +110,10 @@ class _Scene:
         return len(self.accessors) - 1
 
 
-def quaternions(axes: Floats) -> Floats:
-    """(n, 4) x, y, z, w of rotations whose columns are the given rows x, y, z (n, 3, 3).
-
-    Shepperd (1978): the largest of the four components is found first, the others by division through it.
-    """
-    r = np.swapaxes(axes, 1, 2)
-    diagonal = np.einsum("nii->ni", r)
-    trace = diagonal.sum(axis=1, keepdims=True)
-    squares = np.concatenate([1 + 2 * diagonal - trace, 1 + trace], axis=1)  # 4 q²
-    a, b, c = r[:, 2, 1], r[:, 0, 2], r[:, 1, 0]
-    d, e, f = r[:, 1, 2], r[:, 2, 0], r[:, 0, 1]
-    table = np.stack(  # row i: 4 q_i q_j
-        [
-            np.stack([squares[:, 0], c + f, b + e, a - d], axis=1),
-            np.stack([c + f, squares[:, 1], a + d, b - e], axis=1),
-            np.stack([b + e, a + d, squares[:, 2], c - f], axis=1),
-            np.stack([a - d, b - e, c - f, squares[:, 3]], axis=1),
-        ],
-        axis=1,
-    )
-    found = table[np.arange(len(r)), np.argmax(squares, axis=1)]
-    return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))
-
-
 def _material(name: str, colour: str) -> dict[str, Any]:
     """glTF's colours are linear."""
     rgb = from_hex([colour])[0]
-    linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
-    look = {"baseColorFactor": [*linear.tolist(), 1.0], "metallicFactor": 0.0, "roughnessFactor": 0.6}
+    look = {"baseColorFactor": [*linear(rgb).tolist(), 1.0], "metallicFactor": 0.0, "roughnessFactor": 0.6}
     return {"name": name, "pbrMetallicRoughness": look, "doubleSided": True}
 
 

@@ -27,6 +27,15 @@ WIDTH, ROW, DPI = 420, 54, 100
 ROWS = 24
 #: Letters of the title in a line, and lines before it becomes smaller.
 LETTERS, LINES = 18, 4
+NAMES = {
+    3: "triangles",
+    4: "quads",
+    5: "pentagons",
+    6: "hexagons",
+    7: "heptagons",
+    8: "octagons",
+    12: "dodecagons",
+}
 INK, GREY = "#23262b", "#70757d"
 
 
@@ -42,7 +51,7 @@ def compose(image: Floats, panels: Panels, meta: Meta, unit: str | None = None) 
     axes = figure.add_axes((0, 0, 1, 1))
     axes.set(xlim=(0, WIDTH), ylim=(height, 0))
     axes.set_axis_off()
-    _legend(axes, height, panels, meta, behind(unit))
+    (_shapes if panels.mode == "watertight" else _legend)(axes, height, panels, meta, behind(unit))
     with warnings.catch_warnings():  # a name in a script that the bundled font lacks shows boxes, no warning
         warnings.simplefilter("ignore", UserWarning)
         canvas.draw()
@@ -73,28 +82,54 @@ def _title(axes: Axes, top: float, name: str) -> None:
 
 def _legend(axes: Axes, height: int, panels: Panels, meta: Meta, unit: str) -> None:
     n_sizes = len(panels.class_length)
-    rows = n_sizes if n_sizes <= ROWS else 10
-    cut = int(np.sum(panels.size < 0))
-    top = (height - ROW * (rows + (cut > 0))) / 2
+    shown = n_sizes if n_sizes <= ROWS else panels.n_sizes
+    rows = shown if shown <= ROWS else 10
+    others = [
+        (f"{n_sizes - shown:,} other types", int(np.sum(panels.size >= shown))),
+        ("of no size class", int(np.sum(panels.size < 0))),
+    ]
+    others = [(words, count) for words, count in others if count]
+    top = (height - ROW * (rows + len(others))) / 2
     _title(axes, top - 96, text.one_line(meta.name))
     named = panels.n_sizes
     sizes = {0: "", 1: ", 1 size"}.get(named, f", {named:,} sizes")
     axes.text(0, top - 48, f"{panels.n_panels:,} panels{sizes}", size=17, color=GREY, va="center")
-    if n_sizes <= ROWS:
-        _swatches(axes, top, panels, unit)
+    if shown <= ROWS:
+        _swatches(axes, top, panels, unit, shown)
     else:
         _bar(axes, top, rows * ROW - 20, panels, unit)
-    if cut:
-        y = top + ROW * (rows + 0.5)
+    for k, (words, count) in enumerate(others):
+        y = top + ROW * (rows + k + 0.5)
         _swatch(axes, y, panels, colours.UNSIZED)
-        axes.text(64, y, "of no size class", size=17, color=GREY, va="center")
-        axes.text(WIDTH - 60, y, f"{cut:,}", size=17, color=GREY, va="center", ha="right")
+        axes.text(64, y, words, size=17, color=GREY, va="center")
+        axes.text(WIDTH - 60, y, f"{count:,}", size=17, color=GREY, va="center", ha="right")
 
 
-def _swatches(axes: Axes, top: float, panels: Panels, unit: str) -> None:
-    """One row per size: colour, edge length, how many."""
+def _shapes(axes: Axes, height: int, panels: Panels, meta: Meta, unit: str) -> None:
+    """Of watertight panels, which have no sizes: one row per shape, its mean edges below its name."""
+    index, kinds, tints = colours.shapes(panels)
+    rows = [
+        (i, tint, sides, f"{NAMES.get(sides, f'{sides}-gons')}{'' if plain else ', not convex'}")
+        for i, ((sides, plain), tint) in enumerate(zip(kinds, tints, strict=True))
+    ]
+    if (index < 0).any():
+        rows.append((-1, colours.UNSIZED, 0, "cut at the boundary"))
+    top = (height - ROW * len(rows)) / 2
+    _title(axes, top - 96, text.one_line(meta.name))
+    axes.text(0, top - 48, f"{panels.n_panels:,} flat panels", size=17, color=GREY, va="center")
+    for k, (i, tint, sides, name) in enumerate(rows):
+        y, edge = top + ROW * (k + 0.5), panels.edge_length[index == i]
+        _swatch(axes, y, panels, tint, sides)
+        words = sorted({text.length(float(end)) for end in (edge.min(), edge.max())}, key=float)
+        axes.text(64, y - 9, name, size=15, color=INK, va="center")
+        axes.text(64, y + 14, f"edges {' to '.join(words)}{unit}", size=11, color=GREY, va="center")
+        axes.text(WIDTH - 30, y, f"{len(edge):,}", size=15, color=GREY, va="center", ha="right")
+
+
+def _swatches(axes: Axes, top: float, panels: Panels, unit: str, shown: int) -> None:
+    """One row per size, of so many: colour, edge length, how many."""
     counts, words = panels.class_count.tolist(), text.lengths(panels.class_length.tolist())
-    for i, colour in enumerate(colours.class_colours(panels)):
+    for i, colour in enumerate(colours.class_colours(panels)[:shown]):
         y = top + ROW * (i + 0.5)
         _swatch(axes, y, panels, colour, int(panels.class_sides[i]))
         axes.text(64, y, words[i] + unit, size=17, color=INK, va="center")

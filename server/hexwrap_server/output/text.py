@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import csv
+import io
+from collections.abc import Iterable
 from fractions import Fraction
 from itertools import pairwise
 
@@ -14,6 +17,13 @@ MOST_DIGITS = 17
 def one_line(text: str) -> str:
     """The text without line breaks and control characters (a comment, a title)."""
     return " ".join("".join(c if c.isprintable() else " " for c in text).split())
+
+
+def csv_table(rows: Iterable[Iterable[object]]) -> bytes:
+    """Rows as RFC 4180 says it, in UTF-8."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\r\n").writerows(rows)
+    return text.getvalue().encode()
 
 
 def length(value: float) -> str:

@@ -17,9 +17,9 @@ from hexwrap_server.output.ifc import panels_ifc
 from hexwrap_server.output.meta import Meta, NotMadeError, SheetError, check_stages
 from hexwrap_server.output.obj import panels_obj
 from hexwrap_server.output.picture import panels_png
-from hexwrap_server.output.result import result_json
 from hexwrap_server.output.rhino import panels_3dm
 from hexwrap_server.output.table import panels_csv
+from hexwrap_server.output.wire import result_json
 from hexwrap_solver.pipeline import Solution
 
 #: File name → writer; the names of the contract's ``/files/{name}``.
@@ -35,7 +35,7 @@ WRITERS: dict[str, Callable[[Solution, Meta], bytes]] = {
     "domain.svg": domain_svg,
     "domain.dxf": domain_dxf,
     "panels.png": panels_png,
-    "result.json": result_json,
+    "result.json": lambda solution, meta: result_json(solution, dict(meta.timings)),
     "result.npz": result_npz,
 }
 

@@ -163,15 +163,20 @@ class Facets:
         return [row[:3] if row[2] == row[3] else row for row in self.faces.tolist()]
 
 
+def _quads(around: int, rows: int) -> Ints:
+    """(rows, around, 4) faces between closed rings of vertices, row after row."""
+    row, column = np.indices((rows, around))
+    a, b = column + around * row, (column + 1) % around + around * row
+    return np.stack([a, b, b + around, a + around], axis=-1)
+
+
 def shell() -> Facets:
     """The roof of a market hall, 42 m × 28 m: vaulted between four straight eaves, higher at one end."""
     n, m = 60, 40
     u, v = (t.ravel() for t in np.meshgrid(np.linspace(0, 1, n + 1), np.linspace(0, 1, m + 1)))
     rise = (4 * u * (1 - u)) ** 0.8 * (4 * v * (1 - v)) ** 0.8
     points = np.stack([42 * u, 28 * v, 6 + (4.6 + 2.2 * u) * rise], axis=1)
-    i, j = (t.ravel() for t in np.meshgrid(np.arange(n), np.arange(m)))
-    a = i + (n + 1) * j
-    return Facets(points.round(DIGITS), np.stack([a, a + 1, a + n + 2, a + n + 1], axis=1))
+    return Facets(points.round(DIGITS), _quads(n + 1, m)[:, :n].reshape(-1, 4))
 
 
 def cupola() -> Facets:
@@ -204,18 +209,15 @@ def house() -> Facets:
     points = np.stack([radius * np.cos(turn), radius * np.sin(turn), 27 * t + 0 * turn], axis=2).reshape(
         -1, 3
     )
-    i, j = (k.ravel() for k in np.meshgrid(np.arange(n), np.arange(m)))
     openings = [(77, 83, 2, 10)]  # the door: columns, then rows
     for floor, row in enumerate((18, 33, 48)):
         openings += [(24 * k + 5 + 8 * floor, 24 * k + 10 + 8 * floor, row, row + 7) for k in range(4)]
-    wall = np.ones(len(i), dtype=bool)
+    j, i = np.indices((m, n))
+    wall = np.ones((m, n), dtype=bool)
     for left, right, low, high in openings:
         column = (i - left) % n
         wall &= ~((column < right - left) & (j >= low) & (j < high))
-    i, j = i[wall], j[wall]
-    a, b = i + n * j, (i + 1) % n + n * j
-    faces = np.stack([a, b, b + n, a + n], axis=1)
-    used, faces = np.unique(faces, return_inverse=True)
+    used, faces = np.unique(_quads(n, m)[wall], return_inverse=True)
     return Facets(points[used].round(DIGITS), faces.reshape(-1, 4))
 
 
@@ -237,10 +239,7 @@ def _flat(corners: Floats) -> NurbsSurface:
 def _between(rings: Floats) -> Facets:
     """Quads between closed rings (rows, around, 3)."""
     rows, around, _ = rings.shape
-    i, j = (k.ravel() for k in np.meshgrid(np.arange(around), np.arange(rows - 1)))
-    a, b = i + around * j, (i + 1) % around + around * j
-    faces = np.stack([a, b, b + around, a + around], axis=1)
-    return Facets(rings.reshape(-1, 3).round(DIGITS), faces)
+    return Facets(rings.reshape(-1, 3).round(DIGITS), _quads(around, rows - 1).reshape(-1, 4))
 
 
 def box() -> Patches:

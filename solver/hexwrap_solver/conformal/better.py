@@ -39,7 +39,7 @@ def corner_notes(surface: Surface, targets: Targets, u: Floats) -> tuple[str, ..
         for loop in surface.loops
         for i in np.flatnonzero(np.abs(targets.angle[loop] - np.pi) > 1e3 * ANGLE)
     ]
-    if ratio < NEEDLESS or not 0 < len(corners) <= CORNERS or (targets.tie >= 0).any():
+    if ratio < NEEDLESS or not 0 < len(corners) <= CORNERS or (targets.shared >= 0).any():
         return ()
     energy = Energy(surface, targets)
     factor = Factorisation(energy.points, energy.rows, energy.columns)
@@ -63,7 +63,7 @@ def corner_notes(surface: Surface, targets: Targets, u: Floats) -> tuple[str, ..
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         found = minimise(Energy(surface, replace(targets, angle=angle)), u)
     after = _ratio(found.u, area)
-    if not found.converged or found.broken or after * WORTH > ratio:
+    if not found.converged or found.violating or after * WORTH > ratio:
         return ()
     sent = surface.input_vertex
     far = float(np.linalg.norm(surface.vertices[v] - surface.vertices[w]))

@@ -32,23 +32,23 @@ def targets(surface: Surface, loops: Sequence[LoopTarget], cones: Cones | None =
     """
     n = len(surface.vertices)
     angle = np.full(n, 2 * np.pi)
-    tie = np.full(n, -1, dtype=np.int64)
+    shared = np.full(n, -1, dtype=np.int64)
     pinned = any(isinstance(wanted, str) for wanted in loops)
     sums = [0.0]
     for loop, wanted in zip(surface.loops, loops, strict=True):
         angle[loop] = np.pi
         if isinstance(wanted, str):
-            tie[loop] = 0
+            shared[loop] = 0
         elif isinstance(wanted, np.ndarray):
             angle[loop] = wanted
         elif pinned:
-            tie[loop] = len(sums)
+            shared[loop] = len(sums)
             sums.append(len(loop) * np.pi - wanted)
         else:
-            tie[loop], pinned = 0, True
+            shared[loop], pinned = 0, True
     if cones is not None:
         angle[cones.vertex] -= cones.curvature
-    return Targets(angle, tie, np.array(sums if pinned else []))
+    return Targets(angle, shared, np.array(sums if pinned else []))
 
 
 def straight(surface: Surface) -> Targets:
@@ -86,12 +86,12 @@ def curvatures(targets: Targets, sums: Floats, surface: Surface, cones: Cones | 
     found = np.zeros(len(surface.loops))
     open_ = np.zeros(len(surface.loops), dtype=bool)
     for i, loop in enumerate(surface.loops):
-        tie = int(targets.tie[loop[0]])
-        if tie > 0:
-            found[i] = len(loop) * np.pi - float(targets.tie_angle[tie])
+        shared = int(targets.shared[loop[0]])
+        if shared > 0:
+            found[i] = len(loop) * np.pi - float(targets.shared_angle[shared])
         else:
-            open_[i] = tie == 0
-            found[i] = cone_angle((sums if tie == 0 else targets.angle)[loop])
+            open_[i] = shared == 0
+            found[i] = cone_angle((sums if shared == 0 else targets.angle)[loop])
         found[i] = snapped(found[i])
     rest = gauss_bonnet(surface) - float(cones.curvature.sum())
     last = np.flatnonzero(open_)[-1:] if open_.any() else np.arange(len(found))[-1:]

@@ -126,7 +126,7 @@ def _loop_meant(surface: Surface, one: LoopCondition, i: int) -> int:
     return one.loop
 
 
-def _told(angle: float, unit: AngleUnit, digits: int = 6) -> str:
+def _angle_text(angle: float, unit: AngleUnit, digits: int = 6) -> str:
     """As the request would have it."""
     return f"{angle / ANGLE_UNITS[unit]:.{digits}g}" + {"rad": " rad", "deg": "°", "pi": " π"}[unit]
 
@@ -136,9 +136,9 @@ def _check_angles(angles: Floats, unit: AngleUnit, field: list[Field]) -> None:
     if len(bad):
         i = bad[0]
         raise BoundaryError(
-            f"Boundary angle {i} is {_told(angles[i], unit)}, but the angle sum at a vertex is a sum of "
-            f"triangle angles and must be a positive number; {len(bad)} of the {len(angles)} listed angles "
-            "are not.",
+            f"Boundary angle {i} is {_angle_text(angles[i], unit)}, but the angle sum at a vertex is a sum "
+            f"of triangle angles and must be a positive number; {len(bad)} of the {len(angles)} listed "
+            "angles are not.",
             field=(*field[i], "angle"),
         )
 
@@ -294,30 +294,31 @@ def _gauss_bonnet_error(
         i = int(angles.argmax())
         return BoundaryError(
             f"The listed boundary angles are too large for any surface: their curvatures π − θ add up to "
-            f"{_told((np.pi - angles).sum(), unit)}, and even with angles of 0 at all the other {unlisted} "
-            f"boundary vertices the sum over all loops, equation (1), would be {_told(least, unit)} too "
-            f"small; the largest is {_told(angles[i], unit)} at vertex {surface.input_vertex[vertices[i]]}.",
+            f"{_angle_text((np.pi - angles).sum(), unit)}, and even with angles of 0 at all the other "
+            f"{unlisted} boundary vertices the sum over all loops, equation (1), would be "
+            f"{_angle_text(least, unit)} too small; the largest is {_angle_text(angles[i], unit)} at vertex "
+            f"{surface.input_vertex[vertices[i]]}.",
             vertices=[surface.input_vertex[vertices[i]]],
             field=(*listed.field[i], "angle"),
         )
     example, sentence = _repair(surface, vertices, angles, missing, unlisted, unit)
     degrees = "" if unit == "deg" else f" ({np.degrees(missing):.6g}°)"
-    each = [f"{_told(one, unit)} on loop {i}" for i, one in enumerate(sums)]
+    each = [f"{_angle_text(one, unit)} on loop {i}" for i, one in enumerate(sums)]
     added = each[0] if len(each) == 1 else ", ".join(each[:-1]) + f" and {each[-1]}"
     if len(sums) == 2 and not cones:
         wanted = (
             "equation (1) wants the two sums to cancel, but together they make "
-            f"{_told(missing, unit)}{degrees}"
+            f"{_angle_text(missing, unit)}{degrees}"
         )
     else:
         wanted = (
-            f"by Gauss–Bonnet they must make {_told(total, unit)} "
+            f"by Gauss–Bonnet they must make {_angle_text(total, unit)} "
             f"{'with these singularities' if cones else 'in all'}, which they exceed by "
-            f"{_told(missing, unit)}{degrees}"
+            f"{_angle_text(missing, unit)}{degrees}"
         )
     return GaussBonnetError(
         f"The boundary curvatures π − θ add up to {added}; {wanted}, so the angles must add up to "
-        f"{_told(abs(missing), unit)} {'more' if missing > 0 else 'less'}: {sentence}.",
+        f"{_angle_text(abs(missing), unit)} {'more' if missing > 0 else 'less'}: {sentence}.",
         vertices=surface.input_vertex[vertices],
         field=("angles",),
         data={"loop_sums": sums, "missing": missing, "example": example, "example_unit": unit},
@@ -366,8 +367,8 @@ def _repair(
         i = int(possible[np.abs(angles[possible] + missing - np.pi).argmin()])
         repaired[i] += missing
         sentence = (
-            f"for example {_told(repaired[i], unit, 8)} instead of {_told(angles[i], unit)} at vertex "
-            f"{changed[i]} would close it"
+            f"for example {_angle_text(repaired[i], unit, 8)} instead of {_angle_text(angles[i], unit)} at "
+            f"vertex {changed[i]} would close it"
         )
     else:
         repaired, changed, sentence = _repair_by_others(surface, vertices, angles, missing, unlisted, unit)
@@ -390,7 +391,7 @@ def _repair_by_others(
     angle = np.pi + missing / count
     named = ", ".join(str(v) for v in surface.input_vertex[chosen][:6])
     sentence = (
-        f"for example angles of {_told(angle, unit, 8)} at {count} more boundary "
+        f"for example angles of {_angle_text(angle, unit, 8)} at {count} more boundary "
         f"{'vertex' if count == 1 else 'vertices'} ({named}{', …' if count > 6 else ''}) would close it"
     )
     return (

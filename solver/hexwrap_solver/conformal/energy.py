@@ -33,14 +33,14 @@ def opposite_lengths(vertices: Floats, faces: Ints) -> Floats:
 class Corners:
     """Angles of every triangle of a metric, and what the Hessian needs.
 
-    angle: (3, m). excess: (3, m) s = b + c − a, and radius: (m,) r, of which tan(α/2) = r/s. broken: (m,)
+    angle: (3, m). excess: (3, m) s = b + c − a, and radius: (m,) r, of which tan(α/2) = r/s. violating: (m,)
     where the triangle inequality fails.
     """
 
     angle: Floats
     excess: Floats
     radius: Floats
-    broken: Bools
+    violating: Bools
 
     def directions(self) -> Complexes:
         """(m,) e^{iα} at corner 0, from tan(α/2) = r/s."""
@@ -50,11 +50,11 @@ class Corners:
 
     def cotangent(self) -> Floats:
         """(3, m) cot α = (s² − r²) / (2 r s), from tan(α/2) = r/s; no cancellation beyond that in s itself. 0
-        where broken."""
+        where they violate it."""
         with np.errstate(divide="ignore", invalid="ignore"):
             cot = (self.excess - self.radius) * (self.excess + self.radius) / (2 * self.radius * self.excess)
-        if self.broken.any():
-            cot[:, self.broken] = 0.0
+        if self.violating.any():
+            cot[:, self.violating] = 0.0
         return np.asarray(cot)
 
 
@@ -67,15 +67,15 @@ def corner_angles(lengths: Floats) -> Corners:
     a, b, c = lengths
     # b + c − a in an order in which close lengths are subtracted first
     excess = np.stack([c + (b - a), a + (c - b), b + (a - c)])
-    broken = np.asarray((excess <= 0).any(axis=0))
+    violating = np.asarray((excess <= 0).any(axis=0))
     square = excess[0] * excess[1] * excess[2] / (a + b + c)
-    radius = np.sqrt(np.maximum(square, 0.0, where=~broken, out=np.zeros_like(square)))
+    radius = np.sqrt(np.maximum(square, 0.0, where=~violating, out=np.zeros_like(square)))
     angle = np.zeros_like(lengths)
     angle[:2] = 2 * np.arctan2(radius, excess[:2])
-    if broken.any():
-        angle[:2, broken] = np.where(excess[:2, broken] <= 0, np.pi, 0.0)
+    if violating.any():
+        angle[:2, violating] = np.where(excess[:2, violating] <= 0, np.pi, 0.0)
     angle[2] = np.pi - angle[0] - angle[1]
-    return Corners(angle, excess, radius, broken)
+    return Corners(angle, excess, radius, violating)
 
 
 class Energy:
@@ -94,9 +94,9 @@ class Energy:
         self.corner = np.ascontiguousarray(surface.faces.T)
         self.lengths = np.ascontiguousarray(surface.lengths.T[[1, 2, 0]])
         self.dof, self.n_dof = _unknowns(targets)
-        self.target = self.reduce(np.where(targets.tie < 0, targets.angle, 0.0))
-        for tie in range(1, len(targets.tie_angle)):
-            self.target[self.dof[np.argmax(targets.tie == tie)]] = targets.tie_angle[tie]
+        self.target = self.reduce(np.where(targets.shared < 0, targets.angle, 0.0))
+        for shared in range(1, len(targets.shared_angle)):
+            self.target[self.dof[np.argmax(targets.shared == shared)]] = targets.shared_angle[shared]
         self._pair: Ints | None = None
         self._find_pattern(surface)
 
@@ -104,7 +104,7 @@ class Energy:
     def points(self) -> Floats:
         """(n_dof, 3) where each unknown stands, NaN for unknowns that many vertices share."""
         points = np.full((self.n_dof, 3), np.nan)
-        alone = np.flatnonzero((self.dof >= 0) & (self.targets.tie < 0))
+        alone = np.flatnonzero((self.dof >= 0) & (self.targets.shared < 0))
         points[self.dof[alone]] = self._vertices[alone]
         return points
 
@@ -118,11 +118,13 @@ class Energy:
         unknown = self.dof + 1  # 0: pinned
         start, end = (unknown[side] for side in surface.edge_ends)
         low, high = np.minimum(start, end), np.maximum(start, end)
-        self._apart = np.flatnonzero(low != high)  # an edge inside one tie does not change
+        self._apart = np.flatnonzero(
+            low != high
+        )  # an edge between vertices of one shared unknown does not change
         self._low, self._high = low[self._apart], high[self._apart]
         self._inner = np.flatnonzero(self._low > 0)
         rows, columns = self._high[self._inner] - 1, self._low[self._inner] - 1
-        if len(self.targets.tie_angle) > 1:  # several edges join one vertex and one tie
+        if len(self.targets.shared_angle) > 1:  # several edges join one vertex and one shared
             pairs, self._pair = np.unique(rows * self.n_dof + columns, return_inverse=True)
             rows, columns = pairs // self.n_dof, pairs % self.n_dof
         self.rows, self.columns = rows, columns
@@ -175,14 +177,14 @@ class Energy:
 
 
 def _unknowns(targets: Targets) -> tuple[Ints, int]:
-    """(n,) unknown of each vertex (−1: pinned) and their number; ties come last."""
-    free = targets.tie < 0
-    if not (targets.tie == 0).any():
+    """(n,) unknown of each vertex (−1: pinned) and their number; shared unknowns come last."""
+    free = targets.shared < 0
+    if not (targets.shared == 0).any():
         free = free.copy()
         free[np.flatnonzero(free)[int(free.sum()) // 2]] = False
     n_free = int(free.sum())
     dof = np.full(len(free), -1, dtype=np.int64)
     dof[free] = np.arange(n_free)
-    tied = targets.tie > 0
-    dof[tied] = n_free + targets.tie[tied] - 1
-    return dof, n_free + max(len(targets.tie_angle) - 1, 0)
+    tied = targets.shared > 0
+    dof[tied] = n_free + targets.shared[tied] - 1
+    return dof, n_free + max(len(targets.shared_angle) - 1, 0)

@@ -21,14 +21,15 @@ RULES = Rules(
 )
 #: Multiples of its largest diagonal entry that make a singular Hessian definite.
 SHIFTS = (0.0, 1e-12, 1e-9, 1e-6)
-#: Where more than BROKEN_AT_FIRST triangles violate the triangle inequality after the first step, more than
-#: BROKEN after others, or any near the minimum, some do so at the minimum as well: the search ends there.
-BROKEN_AT_FIRST, BROKEN = 16, 8
+#: Where more than VIOLATING_AT_FIRST triangles violate the triangle inequality after the first step, more
+#: than VIOLATING after others, or any near the minimum, some do so at the minimum as well: the search ends
+#: there.
+VIOLATING_AT_FIRST, VIOLATING = 16, 8
 
 
 @dataclass(frozen=True)
 class Minimum:
-    """u: (n,) log scale factors. residual: max |angle sum − target| over the unknowns. broken: number of
+    """u: (n,) log scale factors. residual: max |angle sum − target| over the unknowns. violating: number of
     triangles that violate the triangle inequality (then the original triangulation has no solution here).
     iterations: steps taken, of which ``factorisations`` had a Hessian of their own."""
 
@@ -43,8 +44,8 @@ class Minimum:
         return self.residual <= ACCEPTED
 
     @property
-    def broken(self) -> int:
-        return int(self.corners.broken.sum())
+    def violating(self) -> int:
+        return int(self.corners.violating.sum())
 
 
 def minimise(energy: Energy, start: Floats | None = None, progress: Progress = no_progress) -> Minimum:
@@ -112,8 +113,8 @@ class _Fixed:
         return -self.factorisation.solve(point.gradient)
 
     def is_hopeless(self, point: _Point, iterations: int, settled: bool) -> bool:
-        count = int(point.corners.broken.sum())
-        return count > (0 if settled else BROKEN if iterations > 1 else BROKEN_AT_FIRST)
+        count = int(point.corners.violating.sum())
+        return count > (0 if settled else VIOLATING if iterations > 1 else VIOLATING_AT_FIRST)
 
 
 def _solved(
@@ -125,7 +126,7 @@ def _solved(
     singular, so a small multiple of the diagonal is added, more where that does not suffice (Levenberg 1944).
     """
     scale = max(largest(diagonal), 1.0)
-    for shift in SHIFTS[int(corners.broken.any()) :]:
+    for shift in SHIFTS[int(corners.violating.any()) :]:
         try:
             factorisation.factorise(diagonal + shift * scale, off_diagonal)
         except np.linalg.LinAlgError:

@@ -18,7 +18,7 @@ CORNER = 16 * np.finfo(np.float64).eps
 ANGLE, TURN = 5e-10, 1e-9
 
 
-def positive(corners: Complexes) -> Bools:
+def positively_oriented(corners: Complexes) -> Bools:
     """(m,) whether the area of each triangle, corners (m, 3), is certainly above zero."""
     a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     area = (np.conj(a) * b).imag
@@ -28,11 +28,11 @@ def positive(corners: Complexes) -> Bools:
     return np.asarray(area > ROUNDINGS * farthest * longest)
 
 
-def misdrawn(found: ConformalMap) -> Bools:
+def inverted(found: ConformalMap) -> Bools:
     """(m,) triangles that are turned over; if there are none, those around vertices that they go around too
     often or too seldom: one whose corner opens by more than 2π looks positive in the plane."""
     faces, corners = found.surface.faces, found.corners()
-    turned = ~positive(corners)
+    turned = ~positively_oriented(corners)
     if turned.any():
         return np.asarray(turned)
     expected = np.full(len(found.surface.vertices), 2 * np.pi)
@@ -50,11 +50,11 @@ def faithful(found: ConformalMap) -> bool:
     """Whether the angles drawn at the boundary add up to ``boundary_angles``, those at cones to their
     angle, and these to the curvatures of loops."""
     sums, _ = _drawn(found)
-    return bool(_off_told(found, sums).max(initial=0.0) <= ANGLE and _off_turn(found, sums) <= TURN)
+    return bool(_angle_errors(found, sums).max(initial=0.0) <= ANGLE and _closing_error(found, sums) <= TURN)
 
 
 @dataclass(frozen=True)
-class DrawnErrors:
+class LayoutErrors:
     """angle: how far the angles drawn at the boundary are off ``boundary_angles``, beyond the rounding of
     corners, which short edges far from the origin cannot do without. turn: how far the first loop of an
     annulus is from turning by the cone angle, per √n of its n vertices, as single roundings add up; of other
@@ -64,19 +64,19 @@ class DrawnErrors:
     turn: float
 
 
-def drawn_errors(found: ConformalMap) -> DrawnErrors:
+def layout_errors(found: ConformalMap) -> LayoutErrors:
     """Of a map as drawn, radians."""
     sums, rounding = _drawn(found)
-    angle = float((_off_told(found, sums) - rounding).max(initial=0.0))
-    return DrawnErrors(angle, _off_turn(found, sums))
+    angle = float((_angle_errors(found, sums) - rounding).max(initial=0.0))
+    return LayoutErrors(angle, _closing_error(found, sums))
 
 
-def _off_told(found: ConformalMap, sums: Floats) -> Floats:
+def _angle_errors(found: ConformalMap, sums: Floats) -> Floats:
     expected = np.concatenate([*found.boundary_angles, 2 * np.pi - found.cones.curvature])
     return np.asarray(np.abs(sums - expected))
 
 
-def _off_turn(found: ConformalMap, sums: Floats) -> float:
+def _closing_error(found: ConformalMap, sums: Floats) -> float:
     """Of annuli, how far loop 0 is from turning by the cone angle; of other nets, how far the edges across
     the cut are from closing."""
     if isinstance(found.domain, Net):

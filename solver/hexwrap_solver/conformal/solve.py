@@ -15,7 +15,7 @@ from hexwrap_solver.conformal.fixed import Minimum, minimise
 from hexwrap_solver.conformal.layout import lay_out
 from hexwrap_solver.conformal.net import Net
 from hexwrap_solver.conformal.openings import cut_openings
-from hexwrap_solver.conformal.orientation import faithful, positive
+from hexwrap_solver.conformal.orientation import faithful, positively_oriented
 from hexwrap_solver.conformal.robust import FlatMetric, metric_with_flips, solve_with_flips, with_inserted
 from hexwrap_solver.conformal.span import MAX_SPAN, check_reach, check_span, cone_angle_of
 from hexwrap_solver.conformal.types import (
@@ -211,7 +211,7 @@ class _Plain:
     @property
     def holds(self) -> bool:
         """Whether it is a flat metric."""
-        return self.minimum.converged and not self.minimum.broken
+        return self.minimum.converged and not self.minimum.violating
 
     @property
     def metric(self) -> FlatMetric:
@@ -245,7 +245,7 @@ def map_to(
         plain = _plain(surface, targets, start, progress)
         if plain.holds:
             found = _finish(plain, cones)
-            if positive(found.corners()).all() and faithful(found):
+            if positively_oriented(found.corners()).all() and faithful(found):
                 return found
         start = start if plain.start is None else plain.start
     return solve_with_flips(surface, targets, progress, start, cones)

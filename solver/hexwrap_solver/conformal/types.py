@@ -160,19 +160,20 @@ class Targets:
     """What the variational problem prescribes at each vertex; both routes (plain, flips) take it.
 
     angle: (n,) target angle sums Θ: 2π inside but at cones, as wanted on the boundary (ignored where
-    tie ≥ 0).
-    tie: (n,) −1 where u is free; vertices with equal tie ≥ 0 share one unknown c, and u = c + offset. Tie
-    0 is pinned at c = 0.
-    tie_angle: (t,) prescribed *sum* of the angle sums over the vertices of each tie (entry 0 is ignored).
-    offset: (n,) fixed part of u, 0 by default; it matters on ties only.
+    shared ≥ 0).
+    shared: (n,) −1 where u is free; vertices with an equal number ≥ 0 share one unknown c, and u = c +
+    offset; that of number 0 is pinned at c = 0.
+    shared_angle: (t,) prescribed *sum* of the angle sums over the vertices of each shared unknown (entry 0 is
+    ignored).
+    offset: (n,) fixed part of u, 0 by default; it matters for shared unknowns only.
 
-    Prescribed angles everywhere: all ties −1 (u is then determined up to a constant). Isometric boundary:
-    all loops have tie 0. Least stretch at given curvatures: loop b has tie b.
+    Prescribed angles everywhere: nothing is shared (u is then determined up to a constant). Isometric
+    boundary: all loops share unknown 0. Least stretch at given curvatures: loop b shares unknown b.
     """
 
     angle: Floats
-    tie: Ints
-    tie_angle: Floats
+    shared: Ints
+    shared_angle: Floats
     offset: Floats | None = None
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import csr_array, eye_array, vstack
 
 from hexwrap_solver.arrays import Floats, Ints, Progress, no_progress
-from hexwrap_solver.panels.limits import inscribed, reach
+from hexwrap_solver.panels.limits import inscribed, support_function
 from hexwrap_solver.panels.linear_programme import maximise
 from hexwrap_solver.panels.regular import Poses
 
@@ -44,7 +44,7 @@ def jointly_largest(
     groups: r panels altogether. partner: (h,) of the edges of all groups in a row: position of the same edge
     in the neighbour, or −1 where the plane stays fixed (boundary, trimmed neighbours).
     Planes between two regular panels may slide: the one gains what the other gives up. With s the plane's
-    direction, c + ℓh the reach of a panel along it, and primes for the neighbour,
+    direction, c + ℓh the support function of a panel along it, and primes for the neighbour,
         s·c + ℓ h − s·c' + ℓ' h' ≤ −joint.
     Sizes are weighted by those of the inscribed panels, and kinds by their area, since dA ∝ A₁ ℓ dℓ. The
     programme is solved to a tolerance; the lengths are taken anew from the planes that its centres leave,
@@ -60,7 +60,7 @@ def jointly_largest(
     unit = float(np.median(start))
     sides = np.concatenate([np.full(len(group.offset), group.offset.shape[1]) for group in groups])
     panel, first = np.repeat(np.arange(r), sides), np.cumsum(sides) - sides
-    h = np.concatenate([reach(group.poses, group.direction).ravel() for group in groups])
+    h = np.concatenate([support_function(group.poses, group.direction).ravel() for group in groups])
     direction = np.concatenate([group.direction.reshape(-1, 3) for group in groups])
     offset = np.concatenate([group.offset.ravel() for group in groups])
     axes = np.concatenate([np.stack([g.poses.x_axis, g.poses.y_axis], axis=1) for g in groups])

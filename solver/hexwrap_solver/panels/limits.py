@@ -1,8 +1,8 @@
 """How large a regular panel may become in its cell.
 
 A panel with centre c and edge ℓ reaches s_k·c + ℓ h_k in the direction s_k of its k-th separating plane,
-h_k being the reach of the polygon with edge 1. It stays on its side when that is at most the plane's offset
-o_k.
+h_k being the support function of the polygon with edge 1. It stays on its side when that is at most the
+plane's offset o_k.
 """
 
 from __future__ import annotations
@@ -25,9 +25,8 @@ SHORTFALL = 1e-9
 LOOSE = 1e-6
 
 
-def reach(poses: Poses, direction: Floats) -> Floats:
-    """(q, k) farthest extent, along each direction (q, k, 3), of the polygons of edge 1 around 0; k =
-    corners."""
+def support_function(poses: Poses, direction: Floats) -> Floats:
+    """(q, k) farthest extent of the polygons of edge 1 around 0 in each direction (q, k, 3), one a corner."""
     spokes = poses.spokes(direction.shape[1])
     return np.asarray(np.einsum("qkd,qjd->qkj", direction, spokes).max(axis=2))
 
@@ -43,7 +42,7 @@ def inscribed(poses: Poses, direction: Floats, offset: Floats) -> tuple[Floats, 
     axes = np.stack([poses.x_axis, poses.y_axis], axis=1)
     flat = np.einsum("qkd,qed->qke", direction, axes)
     room = offset - np.einsum("qkd,qd->qk", direction, poses.center)
-    h = reach(poses, direction)
+    h = support_function(poses, direction)
     best = np.full(len(room), np.inf)
     chosen = np.zeros((len(room), 3), dtype=np.int64)
     for triple in combinations(range(direction.shape[1]), 3):
@@ -126,7 +125,7 @@ def shortest_edge(poses: Poses, points: Floats, direction: Floats, offset: Float
     edge = np.linalg.norm(np.roll(points, -1, axis=1) - points, axis=2).min(axis=1)
     largest, goal = inscribed(poses, direction, offset)
     length = np.minimum(edge, largest)
-    h = reach(poses, direction)
+    h = support_function(poses, direction)
     now = offset - np.einsum("qkd,qd->qk", direction, poses.center) - length[:, None] * h
     gained = -np.einsum("qkd,qd->qk", direction, goal - poses.center)
     needed = np.divide(-now, gained, out=np.zeros_like(now), where=(now < 0) & (gained > 0))

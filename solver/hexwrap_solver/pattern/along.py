@@ -77,7 +77,7 @@ def _cut_along(chain: Ints, corner: Ints, shape: Ragged, whole: Bools) -> int:
     return int((~whole[rows]).sum())
 
 
-def told(features: tuple[PatternFeature, ...]) -> list[str]:
+def feature_notes(features: tuple[PatternFeature, ...]) -> list[str]:
     """One sentence on all that lie on lines of the pattern."""
     straight = [feature for feature in features if feature.straight]
     if not straight:

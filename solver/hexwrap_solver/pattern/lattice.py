@@ -93,7 +93,7 @@ class Lattice:
         return np.stack(powers)
 
     @cached_property
-    def turns(self) -> Complexes:
+    def roots_of_unity(self) -> Complexes:
         """(order,) ζ^j."""
         return np.asarray(np.exp(1j * self.step_angle * np.arange(self.order)))
 
@@ -194,7 +194,7 @@ class Lattice:
         offsets = np.zeros(self._norm**2, dtype=complex)
         off = place - complex(self.position(node))
         for j in range(0, self.order, self.order // self.fold):
-            offsets[self.residue(self.rotate(node, j))] = off * self.turns[j]
+            offsets[self.residue(self.rotate(node, j))] = off * self.roots_of_unity[j]
         return offsets
 
     @cached_property
@@ -328,7 +328,7 @@ class Lattice:
         result = np.broadcast_to(places, shape).astype(complex)
         moved = (isometry[..., 0] | isometry[..., 1] | isometry[..., 2]) != 0  # few: the others stay
         k, a, b, _ = isometry[moved].T
-        turn = self.turns[k]
+        turn = self.roots_of_unity[k]
         result[moved] = turn * result[moved] + (a + b * self.unit)
         return result
 
@@ -508,21 +508,21 @@ LATTICES: dict[Kind, Lattice] = {
 
 @dataclass(frozen=True)
 class Isometry:
-    """The deck transformation of an annulus on integers: G(p) = ζ^turns · p + shift, shift of coset 0.
+    """The deck transformation of an annulus on integers: G(p) = ζ^cone_index · p + shift, shift of coset 0.
 
-    turns counts the quanta of the cone angle and is not reduced; shift: (a, b)."""
+    cone_index counts the quanta of the cone angle and is not reduced; shift: (a, b)."""
 
     lattice: Lattice
-    turns: int
+    cone_index: int
     shift: tuple[int, int]
 
     @cached_property
     def _first(self) -> Ints:
         """(period, 4) the powers G^0, G^1, … until the rotation repeats; w counts them."""
         lattice, order = self.lattice, self.lattice.order
-        once = np.array([self.turns % order, *self.shift, 1])
+        once = np.array([self.cone_index % order, *self.shift, 1])
         rows = [np.zeros(4, dtype=np.int64)]
-        for _ in range(order // int(np.gcd(self.turns, order)) - 1):
+        for _ in range(order // int(np.gcd(self.cone_index, order)) - 1):
             rows.append(lattice.compose(rows[-1], once))
         return np.stack(rows)
 
@@ -541,7 +541,7 @@ class Isometry:
 
     def rotation(self, s: Ints) -> Ints:
         """By how many units ζ the power G^s turns, modulo the order."""
-        return np.asarray(self.turns * np.asarray(s)) % self.lattice.order
+        return np.asarray(self.cone_index * np.asarray(s)) % self.lattice.order
 
     def carry(self, places: Complexes, s: Ints) -> Complexes:
         """G^s for places of the plane."""

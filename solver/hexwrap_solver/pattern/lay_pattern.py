@@ -17,7 +17,7 @@ from hexwrap_solver.domain.lift import points_at
 from hexwrap_solver.domain.locate import barycentric
 from hexwrap_solver.errors import PatternError
 from hexwrap_solver.geometry import dot
-from hexwrap_solver.pattern.along import on_features, told
+from hexwrap_solver.pattern.along import feature_notes, on_features
 from hexwrap_solver.pattern.lattice import LATTICES, Lattice
 from hexwrap_solver.pattern.lay.cells import (
     Cells,
@@ -33,6 +33,7 @@ from hexwrap_solver.pattern.lay.edges import PatternEdges, find_edges
 from hexwrap_solver.pattern.lay.labels import azimuth, first_on_net, places, rows_from, turns_around, winding
 from hexwrap_solver.pattern.lay.layout import Layout
 from hexwrap_solver.pattern.lay.nodes import Nodes, find_nodes
+from hexwrap_solver.pattern.pieces import fold_pieces
 from hexwrap_solver.pattern.place.choose import Placing
 from hexwrap_solver.pattern.place.placement import Placement, anchor_vertex, edge_angle
 from hexwrap_solver.pattern.place.rotation import with_rotation
@@ -255,6 +256,7 @@ def _finish(
     ring = rows_from(neighbours, first)
     ring = ring // layout.lattice.counted  # a row of triangles: those that stand and those that hang
     features = on_features(cmap, placing, placement, cut.seams, cells, corner, whole)
+    beside = layout.lattice.carry(cells.isometry, place[corner])
     return Pattern(
         kind=settings.kind,
         vertices=vertices,
@@ -277,10 +279,11 @@ def _finish(
         distortion=placement.distortion,
         notes=(
             *placement.notes,
-            *told(features),
-            *_told(cut, narrow, folded, int(np.count_nonzero(~keep)) - narrow - folded),
+            *feature_notes(features),
+            *_trim_notes(cut, narrow, folded, int(np.count_nonzero(~keep)) - narrow - folded),
         ),
         features=features,
+        pieces=fold_pieces(layout.lattice, features, cells, corner, beside, whole) if features else None,
     )
 
 
@@ -347,7 +350,7 @@ def _usable(cells: Cells, outward: Bools, narrows: bool) -> tuple[Bools, int]:
     return keep, narrow
 
 
-def _told(cut: Trimmed, narrow: int, folded: int, apart: int) -> list[str]:
+def _trim_notes(cut: Trimmed, narrow: int, folded: int, apart: int) -> list[str]:
     notes = []
     if cut.joined:
         notes.append(f"{cut.joined} slivers at the boundary were joined to the cut cell beside them.")

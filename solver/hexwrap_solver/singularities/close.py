@@ -19,9 +19,9 @@ from hexwrap_solver.conformal.energy import Corners, corner_angles, opposite_len
 from hexwrap_solver.conformal.layout import FaceTree, develop
 from hexwrap_solver.errors import ConvergenceError
 from hexwrap_solver.linalg.factor import Factorisation
+from hexwrap_solver.linalg.integers import nearest_integers
 from hexwrap_solver.singularities.cut import Branches, branches
 from hexwrap_solver.singularities.drag import Grip, dragged, grips
-from hexwrap_solver.singularities.integers import nearest_integers
 from hexwrap_solver.singularities.linear import targets, vertex_areas
 from hexwrap_solver.singularities.solvable import solvable
 from hexwrap_solver.singularities.types import End
@@ -229,7 +229,7 @@ class Chart:
             seen = energy.corners(energy.scale_of(trial))
             new = energy.gradient(seen)
             after = float(np.abs(new).max())
-            good = after < residual and not seen.broken.any()
+            good = after < residual and not seen.violating.any()
             gain = after / max(residual, 1e-300)
             if good:
                 x, corners, gradient, residual = trial, seen, new, after
@@ -375,7 +375,7 @@ class Closing:
         cone = np.arange(len(kind)) < s
         self.divisor = np.where(cone, 1 - self.zeta**self.base.turn, 1.0)[self.kept]
 
-    def _depth(self, seen: Holonomy, factor: complex) -> Floats:
+    def depth(self, seen: Holonomy, factor: complex) -> Floats:
         """Of straight loops that are to be aligned, inwards."""
         if self.line is None:
             return np.zeros(0)
@@ -386,7 +386,7 @@ class Closing:
     def _values(self, seen: Holonomy, factor: complex) -> Floats:
         """All equations, real."""
         image = factor * seen.image[self.kept]
-        return np.concatenate([image.real, image.imag, self._depth(seen, factor)])
+        return np.concatenate([image.real, image.imag, self.depth(seen, factor)])
 
     def _slopes(self, changed: list[Holonomy], factor: complex) -> Floats:
         """(equations, unknowns + 2); the last two: turn and scale of the lattice."""

@@ -127,8 +127,8 @@ def targets(
     """Cone angles at vertices, curvatures in quanta on loops; background: further curvature, spread evenly
     over the area. angles: (n,) or more, of loops whose ends are "angles"."""
     n = len(surface.vertices)
-    angle, tie = np.full(n, 2 * np.pi), np.full(n, -1, dtype=np.int64)
-    tie_angle: list[float] = []
+    angle, shared = np.full(n, 2 * np.pi), np.full(n, -1, dtype=np.int64)
+    shared_angle: list[float] = []
     if background:
         share = vertex_areas(surface)
         angle -= background * share / share.sum()
@@ -136,9 +136,9 @@ def targets(
     for loop, end, curvature in zip(surface.loops, ends, loops, strict=True):
         angle[loop] -= np.pi if end != "angles" or angles is None else 2 * np.pi - angles[loop]
         if end == "free":
-            tie[loop] = len(tie_angle)
-            tie_angle.append(len(loop) * np.pi - curvature * quantum)
-    return Targets(angle, tie, np.array(tie_angle))
+            shared[loop] = len(shared_angle)
+            shared_angle.append(len(loop) * np.pi - curvature * quantum)
+    return Targets(angle, shared, np.array(shared_angle))
 
 
 def reference_loops(surface: Surface, rules: Rules) -> tuple[int, ...]:
@@ -194,8 +194,8 @@ class Responses:
         self.shift = np.zeros(len(self.middle))
         if not self.free:  # a singularity takes its curvature from everywhere
             self.shift = self._mean(energy.scale_of(self.factor.solve(energy.reduce(area / area.sum()))))
-        ties = np.arange(energy.n_dof - max(len(self.free) - 1, 0), energy.n_dof)
-        self.loop_response = rules.quantum * self._responses(ties)
+        shared = np.arange(energy.n_dof - max(len(self.free) - 1, 0), energy.n_dof)
+        self.loop_response = rules.quantum * self._responses(shared)
 
     def _mean(self, values: Floats) -> Floats:
         """Over each patch."""
@@ -292,7 +292,7 @@ def _reference(energy: Energy, steps: bool) -> tuple[Floats, Factorisation]:
     if steps:
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             found = minimise(energy)
-        if holds := found.converged and not found.broken:
+        if holds := found.converged and not found.violating:
             u, corners = found.u, found.corners
     factor = Factorisation(energy.points, energy.rows, energy.columns)
     diagonal, off = energy.hessian(corners)

@@ -14,7 +14,7 @@ from hexwrap_solver.singularities.linear import linear_model, vertex_areas
 from hexwrap_solver.singularities.place import number_of
 from hexwrap_solver.singularities.search import Search, ranked
 from hexwrap_solver.singularities.sizes import uncovered, uncovered_by
-from hexwrap_solver.singularities.solve import told
+from hexwrap_solver.singularities.solve import in_words
 from hexwrap_solver.singularities.types import Choices, End, Proposal, Rules
 from hexwrap_solver.surface.types import Surface
 
@@ -105,8 +105,9 @@ def outlook_note(laid: Pattern, found: Choices) -> tuple[str, ...]:
     if not best or left - then < max(SAVED, SHARE * left) or then <= 0:
         return ()
     return (
-        f"{told(laid.kind, found.index[best]).capitalize()} would leave about {then:.1%} uncovered instead "
-        f"of {left:.1%}, the ends being free: ask for singularities auto with boundary.mode isometric.",
+        f"{in_words(laid.kind, found.index[best]).capitalize()} would leave about {then:.1%} uncovered "
+        f"instead of {left:.1%}, the ends being free: ask for singularities auto with boundary.mode "
+        "isometric.",
     )
 
 

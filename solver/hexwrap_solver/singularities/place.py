@@ -61,7 +61,7 @@ def place(
     if not proposals:
         raise SingularitiesError(
             f"No {rules.most} singularities or fewer can make the angles of this surface add up, "
-            f"{_told(rules)}, and keep the distances asked for: allow more."
+            f"{_index_rule(rules)}, and keep the distances asked for: allow more."
         )
     chosen = _choice(proposals, count)
     if proposals[chosen].count and not rules.symmetric:
@@ -161,7 +161,7 @@ def given(surface: Surface, rules: Rules, listed: tuple[SingularityAt, ...]) -> 
     state = State.of([(i, int(k)) for i, k in enumerate(index)], (0,) * max(len(search.model.free) - 1, 0))
     if not search.complete(state):
         raise SingularitiesError(
-            f"The indices add up to {int(index.sum())}, but {_told(rules)}, they must add up to "
+            f"The indices add up to {int(index.sum())}, but {_index_rule(rules)}, they must add up to "
             f"{search.model.total} (Gauss–Bonnet): add singularities of the other sign, or give an end the "
             "freedom to turn (boundary.mode isometric).",
             vertices=surface.input_vertex[vertex],
@@ -171,7 +171,7 @@ def given(surface: Surface, rules: Rules, listed: tuple[SingularityAt, ...]) -> 
     return search.proposal(search.refined(search.with_loops(state), near=0)[1])
 
 
-def _told(rules: Rules) -> str:
+def _index_rule(rules: Rules) -> str:
     return (
         f"the ends of the surface being {' and '.join(rules.ends)}"
         if rules.ends

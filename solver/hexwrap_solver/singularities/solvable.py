@@ -33,14 +33,14 @@ def solvable(surface: Surface, wanted: Callable[[Surface], Targets]) -> tuple[En
         energy = Energy(surface, wanted(surface))
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             found = minimise(energy, start)
-        if found.converged and not found.broken:
+        if found.converged and not found.violating:
             return energy, surface, found
         runs_away = not np.ptp(found.u) < MAX_SPAN
         if runs_away and attempt:
             break
         u = np.zeros(energy.n) if runs_away else found.u
         problem = Problem(surface, energy.targets, u, np.arange(len(surface.faces)))
-        wrong = np.flatnonzero(found.corners.broken)
+        wrong = np.flatnonzero(found.corners.violating)
         if attempt == 0:
             problem = spread(problem, 0)
         elif len(wrong):

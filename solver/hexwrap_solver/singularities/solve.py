@@ -275,20 +275,20 @@ def closed_map(
             return map_of_curvatures(surface, frame.rules.quantum * np.array(proposal.loops), progress)
         return conformal_map(surface, boundary, progress)
     try:
-        return _first_that_closes(surface, frame, placing, progress)
+        return first_that_closes(surface, frame, placing, progress)
     except ConvergenceError as error:
         if not placing.may_be_none or placing.proposals[0].count:
             raise
         plain = conformal_map(surface, boundary, progress)
-        note = f"{told(frame.lattice.kind, proposal.index).capitalize()} would pay, but are left out: "
+        note = f"{in_words(frame.lattice.kind, proposal.index).capitalize()} would pay, but are left out: "
         return replace(plain, notes=(*plain.notes, note + error.detail))
 
 
-def _first_that_closes(surface: Surface, frame: Frame, placing: Placing, progress: Progress) -> ConformalMap:
+def first_that_closes(surface: Surface, frame: Frame, placing: Placing, progress: Progress) -> ConformalMap:
     """With other singularities, and smaller cells where no size is asked for, if those chosen do not close:
     the smaller the cells, the less they have to move. Raises ConvergenceError, that of the first."""
     failed: ConvergenceError | None = None
-    work = _Work(WORK)
+    work = Work(WORK)
     for part in FINER[:1] if frame.sized or not placing.proposals[0].count else FINER:
         smaller = replace(frame, width=frame.width / part)
         for chosen in (placing.chosen, *(placing.others[:OTHERS] if part == 1 else ())):
@@ -296,11 +296,11 @@ def _first_that_closes(surface: Surface, frame: Frame, placing: Placing, progres
             if failed is not None and work.left <= 0:
                 raise failed
             try:
-                chart, found = _closed(surface, smaller, taken.proposal, progress, work)
+                chart, found = closed_at(surface, smaller, taken.proposal, progress, work)
             except ConvergenceError as error:
                 failed = failed or error
                 continue
-            cmap = _as_map(smaller, chart, found, taken, surface)
+            cmap = as_map(smaller, chart, found, taken, surface)
             changes = [*_changes(frame, placing, chosen, part)]
             return replace(cmap, notes=(*cmap.notes, *changes))
     assert failed is not None
@@ -311,8 +311,9 @@ def _changes(frame: Frame, placing: Placing, chosen: int, part: int) -> Iterator
     best, kind = placing.proposal, frame.lattice.kind
     if chosen != placing.chosen:
         yield (
-            f"{told(kind, best.index).capitalize()}, which would leave about {best.uncovered:.1%} uncovered "
-            f"instead of {placing.proposals[chosen].uncovered:.1%}, cannot be moved so that it closes."
+            f"{in_words(kind, best.index).capitalize()}, which would leave about {best.uncovered:.1%} "
+            f"uncovered instead of {placing.proposals[chosen].uncovered:.1%}, cannot be moved so that it "
+            "closes."
         )
     if part > 1:
         yield (
@@ -322,14 +323,14 @@ def _changes(frame: Frame, placing: Placing, chosen: int, part: int) -> Iterator
 
 
 @dataclass
-class _Work:
+class Work:
     """left: vertices of the meshes on which closing may still be tried."""
 
     left: int
 
 
-def _closed(
-    surface: Surface, frame: Frame, proposal: Proposal, progress: Progress, work: _Work
+def closed_at(
+    surface: Surface, frame: Frame, proposal: Proposal, progress: Progress, work: Work
 ) -> tuple[Chart, Closed]:
     """Seated anew at the nearest vertices where the first moves would be too long, or the mesh does not allow
     them."""
@@ -390,7 +391,7 @@ def _nearest_inside(surface: Surface, places: Floats) -> Ints:
     return np.asarray(corner)
 
 
-def _as_map(frame: Frame, chart: Chart, found: Closed, placing: Placing, before: Surface) -> ConformalMap:
+def as_map(frame: Frame, chart: Chart, found: Closed, placing: Placing, before: Surface) -> ConformalMap:
     seen, quantum = found.unstretched, frame.lattice.quantum
     surface = seen.surface
     sums = chart.energy.angle_sums(seen.metric)
@@ -436,7 +437,7 @@ NAMES = {
 }
 
 
-def told(kind: Kind, index: Ints) -> str:
+def in_words(kind: Kind, index: Ints) -> str:
     """Such as "2 pentagons and 1 heptagon"."""
     lattice, parts = LATTICES[kind], []
     for k in (1, -1, 2, -2):
@@ -456,8 +457,8 @@ def told(kind: Kind, index: Ints) -> str:
 def _notes(frame: Frame, found: Closed, placing: Placing) -> Iterator[str]:
     proposal, kind = placing.proposal, frame.lattice.kind
     yield (
-        f"{told(kind, proposal.index)}: moved by at most {found.moves.max():.2f} cells, so that the pattern "
-        f"closes around each to {found.residual:.0e} cells."
+        f"{in_words(kind, proposal.index)}: moved by at most {found.moves.max():.2f} cells, so that the "
+        f"pattern closes around each to {found.residual:.0e} cells."
     )
     none = placing.proposals[0]
     if len(placing.proposals) > 1 and none.count == 0:

@@ -3,7 +3,7 @@
 A cap is a flat or nearly flat region of faces, bounded by sharp folds all around, above whose rim nothing
 else of the surface rises. A closed prism has many such regions: its walls are some, too. Ends of a tube do
 not touch each other, and look in opposite directions; of several such pairs the upright one is taken, unless
-another is much longer.
+the mass lies: is much longer in another direction than in all others, as a bar is and a slab is not.
 """
 
 from __future__ import annotations
@@ -31,10 +31,12 @@ ROUNDING = 1e-4
 OPPOSITE = 0.5
 #: A cap is upright whose normal is within 45° of the vertical.
 UPRIGHT = np.sqrt(0.5)
-#: Another pair is taken only if it is this many times longer than the upright one.
+#: Another pair is taken only if it is this many times longer than all others, the upright one included.
 LONGER = 2.5
 #: More flat regions than this make a faceted surface, not a mass with caps.
 MOST = 60
+#: Walls that fall apart into more tubes than this are no building with courtyards.
+MOST_TUBES = 20
 #: The open end opposite to a cap lies within this part of the height from the lower end.
 END = 0.35
 
@@ -73,16 +75,30 @@ def caps_of(mesh: Triangles) -> tuple[list[Cap], str]:
         else:
             chosen = _opposite(mesh, found, loops[0])
     elif pairs:
-        best = max(pairs, key=_length)
-        if upright and _length(best) <= LONGER * _length(max(upright, key=_length)):
+        best, *others = sorted(pairs, key=_length, reverse=True)
+        if upright and any(_length(best) <= LONGER * _length(pair) for pair in others):
             best = max(upright, key=_length)
         chosen = list(best)
     else:
         low = [cap for cap in found if cap.normal[2] < -UPRIGHT]
         chosen = low[:1] if len(low) == 1 else found if len(found) == 1 else []
-    if not chosen or not _leaves_one_piece(mesh, chosen):
+    keep = kept(mesh, chosen)
+    if not chosen or not keep.any():
         return [], ""
-    return chosen, _sentence(chosen, len(pairs))
+    label = _pieces(mesh, keep)
+    if label.max() == 0:
+        return chosen, _sentence(chosen, len(pairs))
+    # Around a courtyard the walls fall apart into an outer and an inner tube, and nothing else.
+    area = np.bincount(label, mesh.areas[keep])
+    if len(area) > MOST_TUBES or not all(_is_tube(mesh.faces[keep][label == k]) for k in range(len(area))):
+        return [], ""
+    outer = int(area.argmax())
+    inner = np.flatnonzero(keep)[label != outer]
+    points = mesh.vertices[mesh.faces[inner].ravel()]
+    court = Cap(inner, np.zeros(3), (points.min(axis=0) + points.max(axis=0)) / 2, 0.0, inner[:0])
+    walls = "walls of a courtyard" if len(area) == 2 else f"walls of {len(area) - 1} courtyards"
+    sentence = f" The {walls} around {_at(court.centre)} were left out: panelize them by themselves."
+    return [*chosen, court], _sentence(chosen, len(pairs)) + sentence
 
 
 def _regions(mesh: Triangles) -> list[Cap]:
@@ -152,12 +168,21 @@ def _opposite(mesh: Triangles, found: list[Cap], loop: Ints) -> list[Cap]:
     return out if len(out) == 1 else []
 
 
-def _leaves_one_piece(mesh: Triangles, chosen: list[Cap]) -> bool:
-    keep = kept(mesh, chosen)
-    if not keep.any():
-        return False
+def _pieces(mesh: Triangles, keep: Bools) -> Ints:
+    """(k,) the piece that each kept face belongs to."""
     graph = face_graph(mesh.twin)[keep][:, keep]
-    return int(connected_components(graph, directed=False)[0]) == 1
+    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+
+
+def _is_tube(faces: Ints) -> bool:
+    """Whether these faces have two boundary loops and no handle."""
+    edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+    edges, uses = np.unique(edges, axis=0, return_counts=True)
+    ends, at = np.unique(edges[uses == 1], return_inverse=True)
+    at = at.reshape(-1, 2)
+    graph = coo_array((np.ones(len(at), dtype=np.int8), (at[:, 0], at[:, 1])), shape=(len(ends), len(ends)))
+    loops = connected_components(graph, directed=False)[0] if len(ends) else 0
+    return bool(loops == 2 and len(np.unique(faces)) - len(edges) + len(faces) == 0)
 
 
 def kept(mesh: Triangles, chosen: list[Cap]) -> Bools:
@@ -174,8 +199,13 @@ def _sentence(chosen: list[Cap], pairs: int) -> str:
         f"the {_side(cap.normal)} (around {_at(cap.centre)}, area {cap.area:.4g})" for cap in chosen
     )
     what = f"A flat cap at {places} was" if len(chosen) == 1 else f"Flat caps at {places} were"
-    others = f", one of {pairs} pairs of opposite flat sides" if pairs > 1 and len(chosen) == 2 else ""
-    return f'{what} taken off{others}; surface.caps "keep" leaves them on.'
+    if pairs > 1 and len(chosen) == 2:
+        return (
+            f"{what} taken off, one of {pairs} pairs of opposite flat sides. If another is meant, delete its "
+            'two faces (in Rhino: ExtractSrf); surface.caps "keep" leaves all of them on.'
+        )
+    them = "it" if len(chosen) == 1 else "them"
+    return f'{what} taken off; surface.caps "keep" leaves {them} on.'
 
 
 def _side(normal: Floats) -> str:

@@ -62,15 +62,15 @@ def test_cone_angles_lose_their_rounding_and_nothing_else() -> None:
 
 
 def test_every_target_satisfies_gauss_bonnet() -> None:
-    """Σ (2π − Θ) inside + Σ (π − Θ) on the boundary = 0, ties counted by their totals."""
+    """Σ (2π − Θ) inside + Σ (π − Θ) on the boundary = 0, shared unknowns counted by their totals."""
     loops = TOWER.loops
     inside = len(TOWER.vertices) - len(loops[0]) - len(loops[1])
     straight = boundary.straight(TOWER)
     assert straight.angle.sum() == pytest.approx(2 * np.pi * inside + np.pi * (len(loops[0]) + len(loops[1])))
     tied = boundary.constant_on_loops(TOWER, (np.pi / 3, -np.pi / 3))
-    free = tied.angle[tied.tie < 0].sum()
+    free = tied.angle[tied.shared < 0].sum()
     loop_0 = len(loops[0]) * np.pi - np.pi / 3  # Σκ = K
-    assert free + tied.tie_angle[1] + loop_0 == pytest.approx(np.pi * len(TOWER.faces))
+    assert free + tied.shared_angle[1] + loop_0 == pytest.approx(np.pi * len(TOWER.faces))
 
 
 def test_optimal_spreading_keeps_u_constant_on_each_loop() -> None:

@@ -236,13 +236,13 @@ def test_two_triangulations_of_one_surface_agree_to_discretisation_error() -> No
 @settings(max_examples=20, deadline=None)
 @given(seeds, st.floats(0.0, 3.0))
 def test_the_gradient_is_monotone_and_its_derivative_is_the_hessian(seed: int, size: float) -> None:
-    """Also where triangles are broken: the energy is convex throughout."""
+    """Also where triangles violate the inequality: the energy is convex throughout."""
     random = np.random.default_rng(seed)
     energy = Energy(TOWER, boundary.straight(TOWER))
     x, y = size * random.standard_normal((2, energy.n_dof))
     at_x, at_y = (energy.corners(energy.scale_of(z)) for z in (x, y))
     assert (energy.gradient(at_x) - energy.gradient(at_y)) @ (x - y) >= -1e-10
-    if not at_x.broken.any():
+    if not at_x.violating.any():
         diagonal, off_diagonal = energy.hessian(at_x)
         direction, h = random.standard_normal(energy.n_dof), 1e-6
         ahead, behind = (energy.corners(energy.scale_of(x + s * h * direction)) for s in (1, -1))
@@ -256,7 +256,8 @@ def test_the_gradient_is_monotone_and_its_derivative_is_the_hessian(seed: int, s
 @settings(max_examples=20, deadline=None)
 @given(seeds, st.floats(0.0, 5.0))
 def test_gauss_bonnet_holds_for_every_metric(seed: int, size: float) -> None:
-    """Angles of a triangle add up to π, broken or not, so Σ(2π − Θ) inside + Σκ on the boundary = 0."""
+    """Angles of a triangle add up to π, whether or not it violates the inequality, so Σ(2π − Θ) inside + Σκ
+    on the boundary = 0."""
     u = size * np.random.default_rng(seed).standard_normal(len(TOWER.vertices))
     energy = Energy(TOWER, boundary.straight(TOWER))
     sums = energy.angle_sums(energy.corners(u))

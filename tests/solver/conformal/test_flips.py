@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
 from typing import Literal
 
 import numpy as np
@@ -15,6 +16,7 @@ from hexwrap_solver.conformal.robust import solve as robust
 from hexwrap_solver.conformal.robust import solve_with_flips
 from hexwrap_solver.conformal.robust.delaunay import cosine_sums, flip, make_delaunay
 from hexwrap_solver.conformal.robust.descent import RULES, FlipEnergy, FlipPoint, descend
+from hexwrap_solver.conformal.robust.flip_sequence import FlipSequence
 from hexwrap_solver.conformal.robust.metric import angle_sums, measure, measure_delaunay
 from hexwrap_solver.conformal.robust.mirror import MirrorMesh, mirror_mesh
 from hexwrap_solver.conformal.types import BoundaryCondition
@@ -27,7 +29,7 @@ from tests.solver.conformal.torture import TORTURE, crooked_prism, random_flips
 
 
 def _mirrored(surface: Surface) -> MirrorMesh:
-    sheet = robust._sheets(surface)
+    sheet = robust.annulus_sheets(surface)
     turn = (np.roll(sheet, -1, axis=1) - sheet).ravel()
     lengths = opposite_lengths(surface.vertices, surface.faces)
     return mirror_mesh(surface, np.log(lengths)[[2, 0, 1]].T.ravel(), turn)
@@ -35,6 +37,24 @@ def _mirrored(surface: Surface) -> MirrorMesh:
 
 def _random_u(n: int, size: float, seed: int = 3) -> Floats:
     return np.random.default_rng(seed).normal(scale=size, size=n)
+
+
+def test_flips_undone_leave_the_first_triangulation() -> None:
+    """Links, windings and crossings are those of before, and every triangle's sides add up to zero."""
+    mesh = _mirrored(bump(24, 10))
+    make_delaunay(mesh, np.zeros(mesh.n), euclidean=True)
+    before = deepcopy(mesh)
+    flips, u = FlipSequence(), _random_u(mesh.n, 1.5)
+    assert make_delaunay(mesh, u, do=flips.flip) > 100
+    assert (mesh.crossing != before.crossing).any()
+    vector = flips.undo(mesh, measure(mesh, u))
+    linked = ~np.repeat(before.crossing, 2)
+    for name in ("origin", "outer", "crossing", "winding"):
+        assert (getattr(mesh, name) == getattr(before, name)).all()
+    for name, of in (("next", linked), ("prev", linked), ("cross", before.outer)):
+        assert (getattr(mesh, name)[of] == getattr(before, name)[of]).all()
+    sides = vector[mesh.triangles()]
+    assert np.abs(sides.sum(axis=0)).max() < 1e-12 * np.abs(sides).max()
 
 
 def test_where_no_edge_needs_a_flip_both_routes_agree() -> None:

@@ -8,12 +8,13 @@ import pytest
 from hexwrap_solver.arrays import Floats, Ints, no_progress
 from hexwrap_solver.conformal import boundary, conformal_map
 from hexwrap_solver.conformal.energy import opposite_lengths
-from hexwrap_solver.conformal.orientation import misdrawn
+from hexwrap_solver.conformal.orientation import inverted
 from hexwrap_solver.conformal.robust import solve as robust
 from hexwrap_solver.conformal.robust.delaunay import make_delaunay
+from hexwrap_solver.conformal.robust.flip_sequence import FlipSequence
 from hexwrap_solver.conformal.robust.mirror import MirrorMesh, mirror_mesh
 from hexwrap_solver.conformal.robust.overlay import Overlay, insert
-from hexwrap_solver.conformal.robust.trail import Places, Trail
+from hexwrap_solver.conformal.robust.transport import Places
 from hexwrap_solver.conformal.types import BoundaryCondition, Cones, ConformalMap, Targets
 from hexwrap_solver.surface.types import Surface
 from tests.solver.conformal.annuli import bump
@@ -23,7 +24,7 @@ from tests.solver.conformal.torture import TORTURE, crooked_prism, random_flips,
 
 def _mirrored(surface: Surface) -> MirrorMesh:
     log_length = np.log(opposite_lengths(surface.vertices, surface.faces))[[2, 0, 1]].T.ravel()
-    return mirror_mesh(surface, log_length, robust._turns(robust._sheets(surface)).ravel())
+    return mirror_mesh(surface, log_length, robust.winding_of(robust.annulus_sheets(surface)).ravel())
 
 
 def _everywhere(mesh: MirrorMesh, random: np.random.Generator) -> Places:
@@ -64,9 +65,9 @@ def test_flips_of_the_hyperbolic_structure_keep_the_norm_of_every_point() -> Non
     scaled = start.weight * np.where(corners >= 0, np.exp(-u[corners]), 1.0)
     start = Places(start.half_edge, scaled, start.power)
     before, _ = _norm(mesh, start, u)
-    trail = Trail()
-    assert make_delaunay(mesh, u, do=trail.flip) > 100
-    end = trail.follow(start, len(mesh.origin))
+    flips = FlipSequence(with_points=True)
+    assert make_delaunay(mesh, u, do=flips.flip) > 100
+    end = flips.transport(start, len(mesh.origin))
     after, above = _norm(mesh, end, u)
     assert mesh.outer[end.half_edge].sum() > 50
     assert (end.weight >= 0).all()
@@ -78,18 +79,18 @@ def test_flips_there_and_back_bring_every_point_back() -> None:
     mesh, random = _mirrored(bump(24, 10)), np.random.default_rng(3)
     make_delaunay(mesh, np.zeros(mesh.n), euclidean=True)
     start = _everywhere(mesh, random)
-    trail = Trail()
+    flips = FlipSequence(with_points=True)
     u = random.normal(scale=1.0, size=mesh.n)
     before = _by_vertex(mesh, start)
     corners = _corners(mesh, start.half_edge)
-    make_delaunay(mesh, u, do=trail.flip)
+    make_delaunay(mesh, u, do=flips.flip)
     scaled = start.weight * np.where(corners >= 0, np.exp(-u[corners]), 1.0)
-    there = trail.follow(Places(start.half_edge, scaled, start.power), len(mesh.origin))
+    there = flips.transport(Places(start.half_edge, scaled, start.power), len(mesh.origin))
     corners = _corners(mesh, there.half_edge)
-    back = Trail()
+    back = FlipSequence(with_points=True)
     make_delaunay(mesh, np.zeros(mesh.n), do=back.flip)
     scaled = there.weight * np.where(corners >= 0, np.exp(u[corners]), 1.0)
-    again = back.follow(Places(there.half_edge, scaled, there.power), len(mesh.origin))
+    again = back.transport(Places(there.half_edge, scaled, there.power), len(mesh.origin))
     assert np.abs(_by_vertex(mesh, again) - before).max() < 1e-9
 
 
@@ -101,10 +102,10 @@ def _by_vertex(mesh: MirrorMesh, at: Places) -> Floats:
 
 
 def _overlay(surface: Surface) -> tuple[Overlay, ConformalMap, Targets]:
-    problem, cut = robust._uncollapse(robust._problem(surface, boundary.straight(surface), None), True)
-    flat = robust._flatten(problem, cut, Cones.none(), no_progress)
-    found, lift, _ = robust._draw(problem, flat)
-    return Overlay(found, flat.log_length, flat.turn, flat.descent.u, lift), found, problem.targets
+    problem, cut = robust.uncollapsed(robust.problem_of(surface, boundary.straight(surface), None), True)
+    flat = robust.flatten(problem, cut, Cones.none(), no_progress)
+    found, lift, _ = robust.draw(problem, flat)
+    return Overlay(found, flat.log_length, flat.winding, flat.descent.u, lift), found, problem.targets
 
 
 def _points(surface: Surface, random: np.random.Generator) -> tuple[Ints, Floats, Ints]:
@@ -132,7 +133,7 @@ def test_a_flat_cylinder_maps_to_itself_between_vertices_too() -> None:
 def test_inserted_vertices_change_nothing_for_the_others() -> None:
     surface = TORTURE["retriangulated"](np.random.default_rng(0))
     overlay, found, targets = _overlay(surface)
-    assert misdrawn(found).sum() > 20
+    assert inverted(found).sum() > 20
     inserted = insert(overlay, targets)
     assert inserted is not None
     refined = inserted.map
@@ -164,7 +165,7 @@ def test_corners_that_open_beyond_a_straight_angle_end_in_few_rounds() -> None:
     tower = bump(8, 6)
     surface = taken_in(tower.vertices, random_flips(tower.faces, len(tower.vertices), random, 1500))
     overlay, found, targets = _overlay(surface)
-    assert misdrawn(found).any()
+    assert inverted(found).any()
     refined = insert(overlay, targets)
     assert refined is not None
     assert faults(refined.map) == []

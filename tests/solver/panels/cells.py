@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -107,6 +108,16 @@ def quad_pattern(chart: Chart, around: int, rings: int, low: float = 0.0) -> Pat
     return assemble(chart, grid, faces, "quad", around, rings)
 
 
+def brick_pattern(chart: Chart, around: int, rings: int, low: float = 0.0) -> Pattern:
+    """Running bond of bricks twice as long as wide: the hexagons of ``hex_pattern`` with straight rows."""
+    honeycomb = hex_pattern(cylinder, around, rings, low)
+    side = 2 * np.pi / around / np.sqrt(3)
+    # Both nodes of a zigzag go to the height between them; rows lie half a brick apart.
+    row = np.round((honeycomb.uv.imag - low - side / 4) / (1.5 * side))
+    grid = np.stack([honeycomb.uv.real, low + np.pi / around * row], axis=-1)
+    return assemble(chart, grid, honeycomb.faces, "brick", around, rings)
+
+
 def triangle_pattern(chart: Chart, around: int, rings: int, low: float = 0.0) -> Pattern:
     side = 2 * np.pi / around
     level, place = np.meshgrid(np.arange(rings + 1), np.arange(around), indexing="ij")
@@ -137,11 +148,20 @@ def trihexagonal_pattern(chart: Chart, around: int, rings: int, low: float = 0.0
     for cell, corner in zip(hexagons.tolist(), faces.tolist(), strict=True):
         for k in range(6):
             left.setdefault(corner[k], {})[cell[k]] = cell[k - 1]
-    triangles = [[a, turn[a], turn[turn[a]]] for turn in left.values() if len(turn) == 3 for a in [min(turn)]]
+    loops = [[a, turn[a], turn[turn[a]]] for turn in left.values() if len(turn) == 3 for a in turn]
+    triangles = [loop for loop in loops if _leftmost(grid, loop)]  # alike all around
     values = np.concatenate([hexagons.ravel(), np.array(triangles).ravel()])
     count = np.repeat([6, 3], [len(hexagons), len(triangles)])
     cells = Ragged(values, np.concatenate([[0], np.cumsum(count)]))
-    return assemble(chart, grid, cells, "hex", around, rings)
+    pattern = assemble(chart, grid, cells, "hex", around, rings)
+    height = np.add.reduceat(grid[values, 1], cells.offsets[:-1]) / count
+    return replace(pattern, ring=np.unique(height.round(6), return_inverse=True)[1])
+
+
+def _leftmost(grid: Floats, loop: list[int]) -> bool:
+    """Whether a triangle on the cylinder begins at its left corner."""
+    ahead = (grid[loop, 0] - grid[loop[0], 0] + np.pi) % (2 * np.pi) - np.pi
+    return bool((ahead > -1e-9).all())
 
 
 def assemble(

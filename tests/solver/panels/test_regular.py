@@ -10,7 +10,7 @@ from hypothesis.extra.numpy import arrays
 from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
-from hexwrap_solver.panels.limits import inscribed, reach
+from hexwrap_solver.panels.limits import inscribed, support_function
 from hexwrap_solver.panels.regular import corners, nearest_regular, nearest_regular_in_plane
 
 noise = arrays(np.float64, (6, 3), elements=st.floats(-0.3, 0.3))
@@ -76,4 +76,4 @@ def test_planes_that_bound_no_panel_leave_a_finite_one():
     length, center = inscribed(poses, direction, offset)
     assert np.isfinite(length).all()
     assert np.isfinite(center).all()
-    assert (center[:, 0] + length * reach(poses, direction)[:, 0] <= 0.5 + 1e-12).all()
+    assert (center[:, 0] + length * support_function(poses, direction)[:, 0] <= 0.5 + 1e-12).all()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 from dataclasses import replace
 
@@ -233,12 +234,12 @@ def test_rows_are_not_stretched_beyond_what_is_bearable(kind):
     pattern = lay_pattern(short_ring(1.5), PatternSettings(kind=kind, around=20, boundary="trim"))
     assert pattern.distortion == 0
     assert "only one is aligned" in pattern.notes[0]
+    laid = []
     for around in (50, 100, 200, 400):
-        try:
-            pattern = lay_pattern(short_ring(1.5), PatternSettings(kind=kind, around=around))
-        except PatternError:
-            continue
-        assert pattern.distortion <= BEARABLE
+        with contextlib.suppress(PatternError):
+            laid.append(lay_pattern(short_ring(1.5), PatternSettings(kind=kind, around=around)).distortion)
+    assert laid
+    assert max(laid) <= BEARABLE
 
 
 def test_a_cone_angle_that_does_not_suit_names_the_quantum_as_it_is_asked_for():

@@ -25,12 +25,12 @@ def prepared(case):
     cmap = MAPS[case]
     turns = round(CASES[case][4] / LATTICE.quantum)
     motion = Isometry(LATTICE, turns, (0, 0))
-    frame, _ = align._frame(cmap, LATTICE, PatternSettings(around=60), motion, [0, 1], [])
+    frame, _ = align.frame_of(cmap, LATTICE, PatternSettings(around=60), motion, [0, 1], [])
     lines = lines_of(len(cmap.uv), frame.sides, frame.normal, motion)
     system = System(cmap, Glued.by_sheets(cmap, motion), lines.normal)
     strain = Strain.of(system, frame.sides, lines, frame.turned)
     scale = 60 * 1.5 / cmap.circumference * frame.unit
-    return frame, lines, system, strain, align._trials_at(frame, strain, scale, 0.0)
+    return frame, lines, system, strain, align.trials_at(frame, strain, scale, 0.0)
 
 
 @pytest.mark.parametrize("case", HEX_CASES)
@@ -101,13 +101,13 @@ def test_corners_count_whichever_side_the_boundary_begins_with():
     sides = frame.sides
     n = int((sides.loop == 0).sum())
     for trial in trials:
-        motion, turn = trial.motion, complex(np.exp(1j * LATTICE.quantum * trial.motion.turns))
+        motion, turn = trial.motion, complex(np.exp(1j * LATTICE.quantum * trial.motion.cone_index))
         sheet = int(frame.following[1][n - 1])
         shift = complex(LATTICE.position(motion.apply(np.zeros(2, dtype=np.int64), np.array(sheet))))
         normal, depth = frame.normal.copy(), trial.depth.copy()
         normal[:n] = np.append(normal[1:n], normal[0] * turn**sheet)
         depth[:n] = np.append(depth[1:n], depth[0] + (np.conj(normal[n - 1]) * shift).real)
         begun_later = replace(frame, normal=normal)
-        assert align._misplaced_corners(begun_later, motion, depth) == pytest.approx(
-            align._misplaced_corners(frame, motion, trial.depth)
+        assert align.misplaced_corners(begun_later, motion, depth) == pytest.approx(
+            align.misplaced_corners(frame, motion, trial.depth)
         )

@@ -113,7 +113,7 @@ def test_a_straight_loop_becomes_a_lattice_line(line):
     _, newton = closing(shapes.waist(), ("straight", "free"), 300, 2, line=line)
     closed = newton.solve()
     assert closed.residual <= 1e-9
-    depth = newton._depth(closed.seen.holonomy, closed.factor)
+    depth = newton.depth(closed.seen.holonomy, closed.factor)
     rows = (depth - line.first) / line.period
     assert np.abs(rows - np.rint(rows)).max() < 1e-8
     number = as_complex(closed.motion[-2], 6) / line.step
@@ -174,10 +174,10 @@ def test_a_mesh_whose_triangles_break_is_split():
         index=np.array([-2]),
     )
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        assert minimise(Energy(surface, wanted(surface))).broken
+        assert minimise(Energy(surface, wanted(surface))).violating
     energy, finer, found = solvable(surface, wanted)
     assert found.converged
-    assert not found.broken
+    assert not found.violating
     assert len(finer.vertices) < 3 * len(surface.vertices)
     assert (finer.vertices[: len(surface.vertices)] == surface.vertices).all()
     assert vertex_areas(finer).sum() == pytest.approx(vertex_areas(surface).sum())

@@ -252,7 +252,7 @@ def test_where_they_cannot_be_closed_there_are_none(monkeypatch):
     def fails(*args):
         raise ConvergenceError("It did not close.")
 
-    monkeypatch.setattr(module, "_closed", fails)
+    monkeypatch.setattr(module, "closed_at", fails)
     found = solved(shapes.waist(), count="auto", around=16)
     assert len(found.map.cones) == 0
     assert any("left out: It did not close." in note for note in found.quality.notes)
@@ -280,16 +280,16 @@ def first_that_closes(monkeypatch, sized, fewest, failing):
             raise ConvergenceError(f"Reason {len(asked)}.")
         return None, None
 
-    monkeypatch.setattr(module, "_closed", close)
+    monkeypatch.setattr(module, "closed_at", close)
     monkeypatch.setattr(
-        module, "_as_map", lambda frame, chart, found, placing, _: Made(frame.width, placing.proposal.count)
+        module, "as_map", lambda frame, chart, found, placing, _: Made(frame.width, placing.proposal.count)
     )
     proposals = tuple(
         Proposal(np.arange(n), np.ones(n, dtype=np.int64), (), 0.1, 0.1, 1.0) for n in (fewest, 12, 14)
     )
     frame = module.Frame(LATTICES["hex"], None, 1.0, None, (), None, 0.05, sized)
     placing = Placing(proposals, 1, others=(2, 0))
-    return module._first_that_closes(None, frame, placing, no_progress), asked
+    return module.first_that_closes(None, frame, placing, no_progress), asked
 
 
 def test_where_those_chosen_do_not_close_others_do(monkeypatch):

@@ -101,7 +101,14 @@ def test_a_closed_dome_loses_its_floor_and_stays_a_dome() -> None:
 
 @pytest.mark.parametrize(
     ("size", "axis"),
-    [((12.0, 9.0, 30.0), 2), ((12.0, 9.0, 8.0), 2), ((60.0, 9.0, 8.0), 0), ((9.0, 9.0, 9.0), 2)],
+    [
+        ((12.0, 9.0, 30.0), 2),
+        ((12.0, 9.0, 8.0), 2),
+        ((60.0, 9.0, 8.0), 0),
+        ((9.0, 9.0, 9.0), 2),
+        ((60.0, 40.0, 4.0), 2),  # a podium has walls, whatever its height
+        ((60.0, 4.0, 40.0), 2),
+    ],
 )
 def test_the_ends_of_a_box_are_below_and_above_unless_it_lies(
     size: tuple[float, float, float], axis: int
@@ -110,6 +117,27 @@ def test_the_ends_of_a_box_are_below_and_above_unless_it_lies(
     ends = sorted(float(np.ptp(surface.vertices[loop][:, axis])) for loop in surface.loops)
     assert ends == pytest.approx([0.0, 0.0], abs=1e-9)
     assert "one of 3 pairs" in surface.repairs[-1]
+
+
+def courtyard(height: float = 12.0) -> SentMesh:
+    """A closed block of 40 × 40 around a court of 20 × 20."""
+    square = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * 20.0
+    flat = np.concatenate([square, square / 2])
+    vertices = np.concatenate([np.column_stack([flat, np.full(8, z)]) for z in (0.0, height)])
+    k = np.arange(4)
+    j = (k + 1) % 4
+    outer, inner = np.stack([k, j, j + 8, k + 8], axis=1), np.stack([j + 4, k + 4, k + 12, j + 12], axis=1)
+    under, above = np.stack([j, k, k + 4, j + 4], axis=1), np.stack([k, j, j + 4, k + 4], axis=1) + 8
+    return SentMesh(vertices, Ragged.from_table(np.concatenate([outer, inner, under, above])))
+
+
+@pytest.mark.parametrize("height", [4.0, 12.0, 90.0])
+def test_a_block_around_a_courtyard_is_clad_outside(height: float) -> None:
+    """Closed, it has a handle; without its flat ends it is two tubes, and the outer one is the facade."""
+    surface = surface_from_mesh(courtyard(height))
+    assert len(surface.loops) == 2
+    assert surface.areas.sum() == pytest.approx(160 * height)
+    assert "walls of a courtyard around (0, 0," in surface.repairs[-1]
 
 
 def test_normals_at_the_ends_are_those_of_the_walls() -> None:

@@ -26,6 +26,7 @@ from hexwrap_server.jobs.reading import kept
 from hexwrap_server.jobs.work import solution_at
 from hexwrap_server.jobs.worker import Report
 from hexwrap_server.output import wire
+from hexwrap_server.output.blocks import frames
 from hexwrap_server.settings import Settings
 from hexwrap_solver.pipeline import Solution
 from hexwrap_solver.surface.brep import Brep
@@ -109,7 +110,7 @@ def panels_answer(report: Report, path: str, branch: tuple[int, ...], job: str) 
         "Panels": [_closed(polygons[k]) for k in order],
         "Labels": [labels[made.face[k]] for k in order],
         "Size": [int(made.size[k]) for k in order],
-        "Planes": [_frame(np.array(polygons[k]), made.center[k], made.normal[k]) for k in order],
+        "Planes": np.concatenate([made.center[:, None], frames(made)], axis=1)[order].tolist(),
         "Flat": [flat[made.face[k]] for k in order],
     }
     whole = {"Report": [_report(solution)], "Job": [job]}
@@ -157,14 +158,6 @@ def _flat_cells(solution: Solution) -> list[list[list[float]]]:
 
 def _closed(points: list[Any]) -> list[Any]:
     return [*points, points[0]]
-
-
-def _frame(points: Any, center: Any, normal: Any) -> list[list[float]]:
-    """Origin and axes: x along the first edge, z outward."""
-    x = points[1] - points[0]
-    x = x - (x @ normal) * normal
-    x = x / np.linalg.norm(x)
-    return [axis.tolist() for axis in (center, x, np.cross(normal, x), normal)]
 
 
 def _report(solution: Solution) -> str:

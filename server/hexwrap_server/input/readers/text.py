@@ -48,7 +48,7 @@ def _recoded(data: bytes, encoding: str) -> bytes:
 def floats(words: Sequence[bytes], what: str) -> Floats:
     """The words as numbers. what: of what they are, for the message. Raises UnreadableFileError."""
     try:
-        return np.array(words, dtype=bytes).astype(np.float64)
+        return np.fromiter(map(float, words), np.float64, len(words))
     except ValueError:
         raise _no_number(words, what, float) from None
 
@@ -56,7 +56,7 @@ def floats(words: Sequence[bytes], what: str) -> Floats:
 def integers(words: Sequence[bytes], what: str) -> Ints:
     """The words as integers. Raises UnreadableFileError."""
     try:
-        return np.array(words, dtype=bytes).astype(np.int64)
+        return np.fromiter(map(int, words), np.int64, len(words))
     except (ValueError, OverflowError):
         raise _no_number(words, what, int) from None
 

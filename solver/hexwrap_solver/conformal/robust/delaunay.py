@@ -14,7 +14,7 @@ Mirror symmetry leaves three kinds of flips, each one or several symmetric flips
 ``across``: two front triangles (i, j, k) and (j, i, l) get the diagonal kl. Ptolemy: l_kl l_ij = l_jk l_il +
 l_ki l_jl.
 
-``down``: a triangle (i, j, x) is flipped away over its edge ij, below which the mirror lies. The cell
+``down``: a triangle (i, j, x) is flipped away over its edge ij, below which the mirror lies. The trapezoid
 there is the isosceles trapezoid (j, i, i', j') with sides e = ij = i'j', crossing edges m_i = ii' and m_j
 = jj', and diagonals d = ij' = ji', so d² = e² + m_i m_j (Ptolemy in the trapezoid, which has a
 circumcircle). Three flips in the double bring the edge xx': ij becomes xj' or xi' in the hexagon (x, i,
@@ -25,9 +25,9 @@ i', x', j', j), the mirror image likewise, and last the middle one. Written out,
 In Euclidean lengths the height of x is that of i, plus what the
 edge from i to x rises: the triangle's apex in the frame of ij, turned by the slope of ij against the mirror.
 
-``up``: the reverse. The crossing edge xx' goes; the cells below jx and xi become the triangle (i, j, x)
-and the cell below ij. Of the same hexagon, with d_b² = b² + m m_j and d_a² = a² + m m_i the diagonals of
-the two cells,
+``up``: the reverse. The crossing edge xx' goes; the trapezoids below jx and xi become the triangle (i, j, x)
+and the trapezoid below ij. Of the same hexagon, with d_b² = b² + m m_j and d_a² = a² + m m_i the diagonals of
+the two trapezoids,
 
     l_ij = (a d_b + b d_a) / m,
 
@@ -42,7 +42,7 @@ from collections.abc import Callable
 import numpy as np
 
 from hexwrap_solver.arrays import Complexes, Floats, Ints
-from hexwrap_solver.conformal.robust.mirror import MirrorMesh, link, set_cross
+from hexwrap_solver.conformal.robust.mirror import MirrorMesh, link, lower, raise_
 from hexwrap_solver.errors import ConvergenceError
 
 #: An edge passes whose cosines add up to more than −TOLERANCE times the terms that they are made of: rounding
@@ -72,14 +72,14 @@ def cosine_sums(mesh: MirrorMesh, edges: Ints, length: Floats) -> tuple[Floats, 
     right = mesh.next[2 * edges[crossing]]
     left = mesh.prev[right]
     middle = length[edges[crossing]]
-    one = _cell_cosine(length[left >> 1], middle, mesh.cross_length(left, length))
-    other = _cell_cosine(length[right >> 1], middle, mesh.cross_length(mesh.next[right], length))
+    one = _trapezoid_cosine(length[left >> 1], middle, mesh.cross_length(left, length))
+    other = _trapezoid_cosine(length[right >> 1], middle, mesh.cross_length(mesh.next[right], length))
     plus[crossing], minus[crossing] = one[0] + other[0], one[1] + other[1]
     return plus - minus, plus + minus
 
 
 def _opposite_cosine(mesh: MirrorMesh, h: Ints, length: Floats) -> tuple[Floats, Floats]:
-    """Cosine of the angle that half-edges are seen under in their triangle or cell, as minuend and
+    """Cosine of the angle that half-edges are seen under in their triangle or trapezoid, as minuend and
     subtrahend."""
     plus, minus = np.zeros(len(h)), np.zeros(len(h))
     outer = mesh.outer[h]
@@ -88,17 +88,18 @@ def _opposite_cosine(mesh: MirrorMesh, h: Ints, length: Floats) -> tuple[Floats,
     plus[~outer], minus[~outer] = np.cosh(a - b), 0.5 * np.exp(2 * e - a - b)
     if len(inner) == len(h):
         return plus, minus
-    cells = h[outer]
-    m, n = mesh.cross_length(cells, length), mesh.cross_length(mesh.next[cells], length)
-    diagonal = 0.5 * np.logaddexp(2 * length[cells >> 1], m + n)
+    trapezoids = h[outer]
+    m, n = mesh.cross_length(trapezoids, length), mesh.cross_length(mesh.next[trapezoids], length)
+    diagonal = 0.5 * np.logaddexp(2 * length[trapezoids >> 1], m + n)
     plus[outer] = 0.5 * (np.exp(m - diagonal) + np.exp(n - diagonal))
     return plus, minus
 
 
-def _cell_cosine(side: Floats, middle: Floats, far: Floats) -> tuple[Floats, Floats]:
-    """Cosine of the angle that a crossing edge is seen under from across a cell, as minuend and subtrahend.
+def _trapezoid_cosine(side: Floats, middle: Floats, far: Floats) -> tuple[Floats, Floats]:
+    """Cosine of the angle that a crossing edge is seen under from across a trapezoid, as minuend and
+    subtrahend.
 
-    side: the cell's front edge. far: its other crossing edge.
+    side: the trapezoid's front edge. far: its other crossing edge.
     """
     diagonal = 0.5 * np.logaddexp(2 * side, middle + far)
     both = side + diagonal
@@ -156,7 +157,7 @@ def _claims(mesh: MirrorMesh, edges: Ints) -> Ints:
 
 
 def _independent(mesh: MirrorMesh, edges: Ints) -> tuple[Ints, Ints]:
-    """A set of edges no two of which touch the same triangle or cell, greedy by a scrambled order."""
+    """A set of edges no two of which touch the same triangle or trapezoid, greedy by a scrambled order."""
     claims = _claims(mesh, edges)
     rank = (edges * 2654435761) % 4294967291  # neighbours in the numbering must not wait for each other
     best = np.full(len(mesh.origin), np.iinfo(np.int64).max)
@@ -175,13 +176,19 @@ def _around(mesh: MirrorMesh, claims: Ints, bad: Ints) -> Ints:
 
 def flip(mesh: MirrorMesh, edges: Ints, length: Floats, euclidean: bool) -> None:
     """Flips independent edges; ``length`` (e,) gets the new scaled log-lengths."""
-    crossing = mesh.crossing[edges]
-    cell = mesh.outer[2 * edges] | mesh.outer[2 * edges + 1]
-    across = ~(crossing | cell)
-    for kind, which in ((_flip_up, crossing), (_flip_down, cell & ~crossing), (_flip_across, across)):
-        if which.any():
-            kind(mesh, edges[which], length, euclidean)
+    across, up, below = kinds(mesh, edges)
+    for kind, which in ((_flip_up, up), (_flip_down, below), (_flip_across, across)):
+        if len(which):
+            kind(mesh, which, length, euclidean)
     mesh.flipped()
+
+
+def kinds(mesh: MirrorMesh, edges: Ints) -> tuple[Ints, Ints, Ints]:
+    """Edges to be flipped across and up, and the outer half-edges of those that go down."""
+    crossing = mesh.crossing[edges]
+    lowest = ~crossing & (mesh.outer[2 * edges] | mesh.outer[2 * edges + 1])
+    low = edges[lowest]
+    return edges[~(crossing | lowest)], edges[crossing], np.where(mesh.outer[2 * low], 2 * low, 2 * low + 1)
 
 
 def _flip_across(mesh: MirrorMesh, edges: Ints, length: Floats, euclidean: bool) -> None:
@@ -194,18 +201,16 @@ def _flip_across(mesh: MirrorMesh, edges: Ints, length: Floats, euclidean: bool)
     else:
         length[edges] = np.logaddexp(jk + il, ki + lj) - e
     mesh.origin[h], mesh.origin[t] = mesh.origin[t2], mesh.origin[h2]
-    mesh.turn[h] = mesh.turn[t2] + mesh.turn[h1]
-    mesh.turn[t] = -mesh.turn[h]
+    mesh.winding[h] = mesh.winding[t2] + mesh.winding[h1]
+    mesh.winding[t] = -mesh.winding[h]
     link(mesh, h, h2, t1)
     link(mesh, t, t2, h1)
 
 
-def _flip_down(mesh: MirrorMesh, edges: Ints, length: Floats, euclidean: bool) -> None:
-    below = np.where(mesh.outer[2 * edges], 2 * edges, 2 * edges + 1)
-    h = below ^ 1
+def _flip_down(mesh: MirrorMesh, below: Ints, length: Floats, euclidean: bool) -> None:
+    edges, h = below >> 1, below ^ 1
     h1, h2 = mesh.next[h], mesh.prev[h]  # i → j is h, the apex x stands at the origin of h2
-    before, after = mesh.prev[below], mesh.next[below]
-    m_j, m_i = mesh.cross_length(below, length), mesh.cross_length(after, length)
+    m_j, m_i = mesh.cross_length(below, length), mesh.cross_length(mesh.next[below], length)
     e, b, a = length[edges], length[h1 >> 1], length[h2 >> 1]
     if euclidean:
         slope = (np.exp(m_j - e) - np.exp(m_i - e)) / 2
@@ -217,24 +222,14 @@ def _flip_down(mesh: MirrorMesh, edges: Ints, length: Floats, euclidean: bool) -
         length[edges] = (
             np.logaddexp(np.logaddexp(2 * a + m_j, 2 * b + m_i), np.log(2.0) + a + b + diagonal) - 2 * e
         )
-    set_cross(mesh, h1, mesh.cross[below])
-    set_cross(mesh, h2, edges)
-    mesh.outer[h1] = mesh.outer[h2] = True
-    mesh.outer[below] = False
-    mesh.crossing[edges] = True
-    mesh.origin[h] = mesh.origin[below] = mesh.origin[h2]
-    mesh.turn[h] = mesh.turn[below] = 0
-    mesh.next[before], mesh.prev[h1] = h1, before
-    mesh.next[h1], mesh.prev[h2] = h2, h1
-    mesh.next[h2], mesh.prev[after] = after, h2
+    lower(mesh, below)
 
 
 def _flip_up(mesh: MirrorMesh, edges: Ints, length: Floats, euclidean: bool) -> None:
-    h, below = 2 * edges, 2 * edges + 1
-    right = mesh.next[h]
+    right = mesh.next[2 * edges]
     left = mesh.prev[right]
-    before, after = mesh.prev[left], mesh.next[right]
-    m, m_i, m_j = length[edges], mesh.cross_length(left, length), mesh.cross_length(after, length)
+    m_i, m_j = mesh.cross_length(left, length), mesh.cross_length(mesh.next[right], length)
+    m = length[edges]
     a, b = length[left >> 1], length[right >> 1]
     if euclidean:
         first, second = (np.exp(m - a) - np.exp(m_i - a)) / 2, (np.exp(m_j - b) - np.exp(m - b)) / 2
@@ -244,16 +239,7 @@ def _flip_up(mesh: MirrorMesh, edges: Ints, length: Floats, euclidean: bool) -> 
         length[edges] = (
             np.logaddexp(a + 0.5 * np.logaddexp(2 * b, m + m_j), b + 0.5 * np.logaddexp(2 * a, m + m_i)) - m
         )
-    set_cross(mesh, below, mesh.cross[left])
-    mesh.outer[left] = mesh.outer[right] = False
-    mesh.outer[below] = True
-    mesh.crossing[edges] = False
-    mesh.origin[h], mesh.origin[below] = mesh.origin[after], mesh.origin[left]
-    mesh.turn[below] = mesh.turn[left] + mesh.turn[right]
-    mesh.turn[h] = -mesh.turn[below]
-    link(mesh, left, right, h)
-    mesh.next[before], mesh.prev[below] = below, before
-    mesh.next[below], mesh.prev[after] = after, below
+    raise_(mesh, 2 * edges + 1)
 
 
 def apex_over(base: Floats, left: Floats, right: Floats) -> Complexes:

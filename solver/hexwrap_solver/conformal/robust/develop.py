@@ -19,7 +19,7 @@ from hexwrap_solver.tolerances import is_zero
 @dataclass(frozen=True)
 class Development:
     """uv: (n,) one copy of each vertex. lift: (n,) how many turns lie between that copy and the one that
-    ``MirrorMesh.turn`` counts from: along a half-edge from v to w with turn c, from the copy uv[v],
+    ``MirrorMesh.winding`` counts from: along a half-edge from v to w with winding c, from the copy uv[v],
     lies g^{lift[v] + c − lift[w]}(uv[w]). translation: that of g. gap: greatest disagreement of any edge,
     relative to the length of one turn where it lies."""
 
@@ -40,7 +40,7 @@ def develop(mesh: MirrorMesh, metric: Metric, cone_angle: float) -> Development:
     root = int(mesh.origin[live[np.argmin(metric.length[live >> 1])]])
     step = _directions(mesh, metric, cone_angle, live) * np.exp(metric.length[live >> 1])
     tail, head = mesh.origin[live], mesh.origin[live ^ 1]
-    turn = mesh.turn[live]
+    winding = mesh.winding[live]
 
     above = _parents(head, np.searchsorted(tail, np.arange(mesh.n + 1)), root)
     on_tree = np.flatnonzero(above[head] == tail)
@@ -49,14 +49,14 @@ def develop(mesh: MirrorMesh, metric: Metric, cone_angle: float) -> Development:
     below = np.flatnonzero(above >= 0)
     via, up = via[below], np.where(above >= 0, above, root)
     lift: Ints = np.zeros(mesh.n, dtype=np.int64)
-    lift[below] = turn[via]
+    lift[below] = winding[via]
     lift = sums_to_root(lift, up, root)
     step = step * np.exp(1j * cone_angle * lift[tail])
     uv: Complexes = np.zeros(mesh.n, dtype=np.complex128)
     uv[below] = step[via]
     uv = sums_to_root(uv, up, root)
 
-    power = lift[tail] + turn - lift[head]
+    power = lift[tail] + winding - lift[head]
     rotation = np.exp(1j * cone_angle)
     translation = _translation(uv, step, tail, head, power, rotation)
     near = np.flatnonzero(np.abs(power) <= 1)
@@ -93,26 +93,26 @@ def _translation(
 def _directions(mesh: MirrorMesh, metric: Metric, cone_angle: float, live: Ints) -> Complexes:
     """(k,) unit vector along each live half-edge, seen from the copy of its origin that turns count from.
 
-    Found over a tree of triangles and cells: those on both sides of an edge, and neighbouring cells of one
-    edge of the boundary, know each other's direction; beyond a boundary vertex lies the back of the double,
-    so no step is made there.
+    Found over a tree of triangles and trapezoids: those on both sides of an edge, and neighbouring trapezoids
+    of one edge of the boundary, know each other's direction; beyond a boundary vertex lies the back of the
+    double, so no step is made there.
     """
-    triangles, cells = mesh.triangles(), mesh.chain()
+    triangles, trapezoids = mesh.triangles(), mesh.chain()
     first, second, third = triangles
-    t, k = len(first), len(cells)
+    t, k = len(first), len(trapezoids)
     piece = np.zeros(len(mesh.origin), dtype=np.int64)
     piece[triangles] = np.arange(t)
-    piece[cells] = t + np.arange(k)
+    piece[trapezoids] = t + np.arange(k)
 
-    turned = cone_angle * mesh.turn
+    turned = cone_angle * mesh.winding
     bend = np.pi - metric.end - turned  # from a half-edge to the next one
     within = np.zeros(len(mesh.origin))  # direction, seen from its piece's first half-edge
     within[second] = bend[first]
     within[third] = -bend[third]
     over = within + np.pi - turned
     over -= within.reshape(-1, 2)[:, ::-1].ravel()  # from a half-edge's piece to that of its other side
-    following = mesh.next[cells]
-    bend = bend[cells] - metric.start[following]
+    following = mesh.next[trapezoids]
+    bend = bend[trapezoids] - metric.start[following]
     joined = mesh.cross[following] >= 0
     own = t + np.arange(k)
     after, before = piece[following], own.copy()
@@ -121,8 +121,10 @@ def _directions(mesh: MirrorMesh, metric: Metric, cone_angle: float, live: Ints)
     back = np.zeros(k)
     back[after[joined] - t] = -bend[joined]
 
-    beside = np.concatenate([piece[triangles.T ^ 1], np.stack([piece[cells ^ 1], after, before], axis=1)])
-    angle = np.concatenate([over[triangles.T], np.stack([over[cells], bend, back], axis=1)])
+    beside = np.concatenate(
+        [piece[triangles.T ^ 1], np.stack([piece[trapezoids ^ 1], after, before], axis=1)]
+    )
+    angle = np.concatenate([over[triangles.T], np.stack([over[trapezoids], bend, back], axis=1)])
     parent = _parents(beside.ravel(), np.arange(0, 3 * (t + k) + 1, 3), 0)
     below = np.flatnonzero(parent >= 0)
     up = np.where(parent >= 0, parent, 0)

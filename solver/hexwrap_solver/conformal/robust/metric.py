@@ -19,7 +19,8 @@ CERTAIN = 1e-6
 class Metric:
     """Everything is indexed by half-edge and zero for the sides of crossing edges.
 
-    start, end: (2e,) interior angle at the origin and at the end of the half-edge, in its triangle or cell.
+    start, end: (2e,) interior angle at the origin and at the end of the half-edge, in its triangle or
+    trapezoid.
     cotangent: (2e,) of the angle that the half-edge is seen under.
     length: (e,) scaled log-lengths.
     """
@@ -59,29 +60,28 @@ def measure(mesh: MirrorMesh, u: Floats) -> Metric:
     end[sides] = corners.angle[[2, 0, 1]]
     cotangent[sides] = corners.cotangent()
 
-    cells = mesh.chain()
-    following = mesh.next[cells]
-    side = mesh.log_length[cells >> 1]
-    slope = (u[mesh.origin[cells]] - u[mesh.origin[following]]) / 2
-    m = 0.5 * np.exp(mesh.cross_length(cells, mesh.log_length) - side + slope)
+    trapezoids = mesh.chain()
+    following = mesh.next[trapezoids]
+    side = mesh.log_length[trapezoids >> 1]
+    slope = (u[mesh.origin[trapezoids]] - u[mesh.origin[following]]) / 2
+    m = 0.5 * np.exp(mesh.cross_length(trapezoids, mesh.log_length) - side + slope)
     n = 0.5 * np.exp(mesh.cross_length(following, mesh.log_length) - side - slope)
     along = np.sqrt(np.maximum((1 - (n - m)) * (1 + (n - m)), 0.0))  # its share of the mirror line / side
-    start[cells] = np.arctan2(along, m - n)
-    end[cells] = np.arctan2(along, n - m)
+    start[trapezoids] = np.arctan2(along, m - n)
+    end[trapezoids] = np.arctan2(along, n - m)
     with np.errstate(divide="ignore"):
-        cotangent[cells] = np.where(along > 0, (m + n) / along, 0.0)
+        cotangent[trapezoids] = np.where(along > 0, (m + n) / along, 0.0)
     return Metric(start, end, cotangent, mesh.scaled(u))
 
 
 def angle_sums(mesh: MirrorMesh, metric: Metric) -> Floats:
     """(n,) angle sum at each vertex of the annulus (half of what the double has on the mirror line)."""
     total: Floats = np.bincount(mesh.origin, weights=metric.start, minlength=mesh.n).astype(np.float64)
-    cells = mesh.chain()
-    following = mesh.next[cells]
-    total += np.bincount(mesh.origin[following], weights=metric.end[cells], minlength=mesh.n)
-    corner = cells[
-        mesh.cross[cells] < 0
-    ]  # both cells at a boundary vertex reckon to its right angle with the mirror
+    trapezoids = mesh.chain()
+    following = mesh.next[trapezoids]
+    total += np.bincount(mesh.origin[following], weights=metric.end[trapezoids], minlength=mesh.n)
+    # both trapezoids at a boundary vertex reckon to its right angle with the mirror
+    corner = trapezoids[mesh.cross[trapezoids] < 0]
     total[mesh.origin[corner]] -= np.pi
     return total
 

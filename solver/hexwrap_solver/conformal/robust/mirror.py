@@ -3,18 +3,18 @@
 The double of the annulus is a closed torus; its mirror line consists of the two boundary loops. A Delaunay
 triangulation of the double that respects the mirror has two kinds of edges: those that lie in the front (and,
 mirrored, in the back), and those that cross the mirror line at right angles and join a vertex w to its own
-image w'. Below an edge (i, j) of the front that faces the mirror there is hence always a *cell*: an isosceles
-trapezoid (i, j, j', i') with its mirror line through the middle. Where i lies on the boundary itself i' = i
+image w'. Below an edge (i, j) of the front that faces the mirror there is hence always an isosceles
+*trapezoid* (i, j, j', i') with its mirror line through the middle. Where i lies on the boundary itself i' = i
 and the trapezoid is a triangle, and where both do it is flat: an edge of the boundary.
 
-    front triangles          w1 ------ w2          edges (v0,w1), (w1,w2), (w2,v1): one cell below each
+    front triangles          w1 ------ w2          edges (v0,w1), (w1,w2), (w2,v1): one trapezoid below each
                            / :         : \\        dotted: crossing edges (w1,w1'), (w2,w2'), upper halves
     mirror line      v0 --------------------- v1
 
 Half-edges 2e and 2e + 1 are the two sides of edge e. A half-edge is either the side of a triangle, or
-*outer*: the upper side of a cell. Outer half-edges form closed chains, one per boundary loop. When a triangle
-is flipped away over the mirror line its edge becomes the crossing edge of its apex, so that edges are as many
-as ever and every edge keeps one length.
+*outer*: the upper side of a trapezoid. Outer half-edges form closed chains, one per boundary loop. When a
+triangle is flipped away over the mirror line its edge becomes the crossing edge of its apex, so that edges
+are as many as ever and every edge keeps one length.
 """
 
 from __future__ import annotations
@@ -34,10 +34,11 @@ class MirrorMesh:
 
     origin: (2e,) vertex where the half-edge starts (both sides of a crossing edge start at its vertex).
     next, prev: (2e,) neighbours in the triangle, or in the chain of outer half-edges.
-    outer: (2e,) whether it is the upper side of a cell.
-    cross: (2e,) for outer half-edges the crossing edge that ends the cell at the origin, −1 on the boundary.
+    outer: (2e,) whether it is the upper side of a trapezoid.
+    cross: (2e,) for outer half-edges the crossing edge that ends the trapezoid at the origin, −1 on the
+    boundary.
     crossing: (e,) whether the edge crosses the mirror line.
-    turn: (2e,) how often the half-edge goes around the annulus, counted where it crosses a fixed cut:
+    winding: (2e,) how often the half-edge goes around the annulus, counted where it crosses a fixed cut:
     sums to 0 over every triangle and to 1 over loop 0.
     log_length: (e,) of the whole edge (from w to w' for a crossing one), before it is scaled by u.
     """
@@ -49,7 +50,7 @@ class MirrorMesh:
     outer: Bools
     cross: Ints
     crossing: Bools
-    turn: Ints
+    winding: Ints
     log_length: Floats
     _faces: tuple[Ints, Ints] | None = None
 
@@ -97,8 +98,8 @@ def half_edge_names(surface: Surface) -> Ints:
     return np.asarray(2 * edge + ~lead)
 
 
-def mirror_mesh(surface: Surface, log_length: Floats, turn: Ints) -> MirrorMesh:
-    """The double of a surface. log_length, turn: (3m,) per half-edge of the faces (see ``topology``)."""
+def mirror_mesh(surface: Surface, log_length: Floats, winding: Ints) -> MirrorMesh:
+    """The double of a surface. log_length, winding: (3m,) per half-edge of the faces (see ``topology``)."""
     faces, twin, n = surface.faces, surface.twin, len(surface.vertices)
     name = half_edge_names(surface)
     edge = name >> 1
@@ -106,7 +107,7 @@ def mirror_mesh(surface: Surface, log_length: Floats, turn: Ints) -> MirrorMesh:
     boundary = np.flatnonzero(twin < 0)
     outside = name[boundary] + 1
 
-    origin, following, previous, turns = (np.zeros(size, dtype=np.int64) for _ in range(4))
+    origin, following, previous, around = (np.zeros(size, dtype=np.int64) for _ in range(4))
     origin[name] = faces.ravel()
     origin[outside] = np.roll(faces, -1, axis=1).ravel()[boundary]
     following[name] = name[next_half_edge(np.arange(faces.size))]
@@ -116,8 +117,8 @@ def mirror_mesh(surface: Surface, log_length: Floats, turn: Ints) -> MirrorMesh:
     previous[following] = np.arange(size)
     outer = np.zeros(size, dtype=bool)
     outer[outside] = True
-    turns[name] = turn
-    turns[outside] = -turn[boundary]
+    around[name] = winding
+    around[outside] = -winding[boundary]
     lengths = np.zeros(size // 2)
     lengths[edge] = log_length
     return MirrorMesh(
@@ -128,7 +129,7 @@ def mirror_mesh(surface: Surface, log_length: Floats, turn: Ints) -> MirrorMesh:
         outer,
         np.full(size, -1, dtype=np.int64),
         np.zeros(size // 2, dtype=bool),
-        turns,
+        around,
         lengths,
     )
 
@@ -139,8 +140,46 @@ def link(mesh: MirrorMesh, *ring: Ints) -> None:
         mesh.prev[two] = one
 
 
-def set_cross(mesh: MirrorMesh, cells: Ints, cross: Ints) -> None:
-    """The crossing edges at the origins of cells; ``next`` leads back from a crossing edge to its cell."""
-    mesh.cross[cells] = cross
+def set_cross(mesh: MirrorMesh, trapezoids: Ints, cross: Ints) -> None:
+    """The crossing edges at the origins of trapezoids; ``next`` leads back from such an edge to its
+    trapezoid."""
+    mesh.cross[trapezoids] = cross
     is_edge = cross >= 0
-    mesh.next[2 * cross[is_edge]] = cells[is_edge]
+    mesh.next[2 * cross[is_edge]] = trapezoids[is_edge]
+
+
+def lower(mesh: MirrorMesh, below: Ints) -> None:
+    """The triangle (i, j, x) over each outer half-edge j → i, and the trapezoid below it, become the
+    trapezoids below j → x and x → i; the edge ij becomes the crossing edge at x. Links only, no lengths."""
+    edges, h = below >> 1, below ^ 1
+    left, right = mesh.next[h], mesh.prev[h]
+    before, after = mesh.prev[below], mesh.next[below]
+    set_cross(mesh, left, mesh.cross[below])
+    set_cross(mesh, right, edges)
+    mesh.outer[left] = mesh.outer[right] = True
+    mesh.outer[below] = False
+    mesh.crossing[edges] = True
+    mesh.origin[h] = mesh.origin[below] = mesh.origin[right]
+    mesh.winding[h] = mesh.winding[below] = 0
+    mesh.next[before], mesh.prev[left] = left, before
+    mesh.next[left], mesh.prev[right] = right, left
+    mesh.next[right], mesh.prev[after] = after, right
+
+
+def raise_(mesh: MirrorMesh, below: Ints) -> None:
+    """The reverse of ``lower``. below: (k,) the side of each crossing edge that becomes outer."""
+    edges, h = below >> 1, below ^ 1
+    right = mesh.next[2 * edges]
+    left = mesh.prev[right]
+    before, after = mesh.prev[left], mesh.next[right]
+    set_cross(mesh, below, mesh.cross[left])
+    mesh.cross[left] = mesh.cross[right] = -1
+    mesh.outer[left] = mesh.outer[right] = False
+    mesh.outer[below] = True
+    mesh.crossing[edges] = False
+    mesh.origin[h], mesh.origin[below] = mesh.origin[after], mesh.origin[left]
+    mesh.winding[below] = mesh.winding[left] + mesh.winding[right]
+    mesh.winding[h] = -mesh.winding[below]
+    link(mesh, left, right, h)
+    mesh.next[before], mesh.prev[below] = below, before
+    mesh.next[below], mesh.prev[after] = after, below

@@ -1,8 +1,8 @@
 """New vertices in a map that has been found with flips, without solving again.
 
 The map is known everywhere, not only at vertices: on what triangles of the surface and of the flat Delaunay
-metric have in common it is projective, from circumcircle to circumcircle (see ``trail``). A new vertex on the
-surface hence has its place in the domain, and changes nothing for the others.
+metric have in common it is projective, from circumcircle to circumcircle (see ``transport``). A new vertex on
+the surface hence has its place in the domain, and changes nothing for the others.
 """
 
 from __future__ import annotations
@@ -12,8 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hexwrap_solver.arrays import Complexes, Floats, Ints
-from hexwrap_solver.conformal.orientation import misdrawn
+from hexwrap_solver.conformal.orientation import inverted
 from hexwrap_solver.conformal.robust.delaunay import make_delaunay
+from hexwrap_solver.conformal.robust.flip_sequence import FlipSequence
 from hexwrap_solver.conformal.robust.mirror import MirrorMesh, half_edge_names, mirror_mesh
 from hexwrap_solver.conformal.robust.refine import (
     Problem,
@@ -23,7 +24,7 @@ from hexwrap_solver.conformal.robust.refine import (
     split_places,
 )
 from hexwrap_solver.conformal.robust.straight import straighten
-from hexwrap_solver.conformal.robust.trail import Places, Trail
+from hexwrap_solver.conformal.robust.transport import Places
 from hexwrap_solver.conformal.types import ConformalMap, Targets
 from hexwrap_solver.surface.topology import half_edges
 
@@ -77,16 +78,16 @@ class Overlay:
     """The surface's triangles and those of a flat metric, one over the other.
 
     found: the map that was drawn. log_length: (3m,) of its surface's half-edges, in the unit that the metric
-    was found in. turn: (m, 3) of them, see ``MirrorMesh``. u: (n,) of the metric. lift: (n,) see
+    was found in. winding: (m, 3) of them, see ``MirrorMesh``. u: (n,) of the metric. lift: (n,) see
     ``Development``.
     """
 
-    def __init__(self, found: ConformalMap, log_length: Floats, turn: Ints, u: Floats, lift: Ints) -> None:
-        mesh = mirror_mesh(found.surface, log_length, turn.ravel())
+    def __init__(self, found: ConformalMap, log_length: Floats, winding: Ints, u: Floats, lift: Ints) -> None:
+        mesh = mirror_mesh(found.surface, log_length, winding.ravel())
         self.found, self.u, self.lift = found, u, lift
-        self._turn = turn
+        self._winding = winding
         self._first = half_edge_names(found.surface)[::3]
-        self._flat, self._curved = Trail(), Trail()
+        self._flat, self._curved = FlipSequence(with_points=True), FlipSequence(with_points=True)
         make_delaunay(mesh, np.zeros(mesh.n), euclidean=True, do=self._flat.flip)
         self._corners = _corners(mesh)
         make_delaunay(mesh, u, do=self._curved.flip)
@@ -98,23 +99,23 @@ class Overlay:
         """Points of the surface in the domain, beside the copy uv[owner] of one of their face's corners, and
         their u. face: (k,). weight: (k, 3) barycentric. owner: (k,)."""
         corner = self.found.surface.faces[face]
-        turn = self._turn[face]
-        to_corner = np.stack([np.zeros(len(face), dtype=np.int64), turn[:, 0], -turn[:, 2]], axis=1)
+        winding = self._winding[face]
+        to_corner = np.stack([np.zeros(len(face), dtype=np.int64), winding[:, 0], -winding[:, 2]], axis=1)
         which = (corner == owner[:, None]).argmax(axis=1)
         power = self.lift[owner] - to_corner[np.arange(len(face)), which]
         size = len(self._mesh.origin)
-        at = self._flat.follow(Places(self._first[face], weight, power), size)
+        at = self._flat.transport(Places(self._first[face], weight, power), size)
         corners = self._corners[at.half_edge]
         scaled = at.weight * np.where(corners >= 0, np.exp(-self.u[corners]), 1.0)
-        return self._drawn(self._curved.follow(replace(at, weight=scaled), size))
+        return self._drawn(self._curved.transport(replace(at, weight=scaled), size))
 
     def _drawn(self, at: Places) -> tuple[Complexes, Floats]:
         mesh, h = self._mesh, at.half_edge
         following, before = mesh.next[h], mesh.prev[h]
         outer = mesh.outer[h]
         start = self._copy(mesh.origin[h], at.power)
-        end = self._copy(mesh.origin[following], at.power + mesh.turn[h])
-        apex = self._copy(mesh.origin[before], at.power - mesh.turn[before])
+        end = self._copy(mesh.origin[following], at.power + mesh.winding[h])
+        apex = self._copy(mesh.origin[before], at.power - mesh.winding[before])
         side = self._length[h >> 1]
         m, n = mesh.cross_length(h, self._length), mesh.cross_length(following, self._length)
         slope = np.where(outer, (np.exp(n - side) - np.exp(m - side)) / 2, 0.0)
@@ -171,7 +172,7 @@ def insert(overlay: Overlay, targets: Targets) -> Refined | None:
 
     targets: of the surface that the map was found on.
     """
-    wrong = np.flatnonzero(misdrawn(overlay.found))
+    wrong = np.flatnonzero(inverted(overlay.found))
     surface, uv = overlay.found.surface, overlay.found.uv
     corners, n = surface.faces, len(surface.vertices)
     problem = Problem(surface, targets, overlay.found.log_scale, np.arange(len(corners)))
@@ -189,12 +190,12 @@ def insert(overlay: Overlay, targets: Targets) -> Refined | None:
             problem.u[before:] = u
             uv = np.concatenate([uv, added])
             drawn, start = overlay.drawn(problem, anchors, uv)
-            turn = np.roll(drawn.sheet, -1, axis=1) - drawn.sheet
-            marked = collapsing(problem.surface, problem.targets, turn.ravel())
+            winding = np.roll(drawn.sheet, -1, axis=1) - drawn.sheet
+            marked = collapsing(problem.surface, problem.targets, winding.ravel())
             place = np.full(len(marked), 0.5)
         if len(uv) > MOST * n + MOST_MORE or not (np.isfinite(uv).all() and np.isfinite(problem.u).all()):
             return None
-        wrong = np.flatnonzero(misdrawn(drawn))
+        wrong = np.flatnonzero(inverted(drawn))
         if not len(wrong):
             return Refined(drawn, problem.parent, start)
         counts.append(len(wrong))

@@ -52,7 +52,7 @@ def split_edges(problem: Problem, marked: Ints, place: Floats) -> Problem:
 
     marked: (k,) half-edges, any number per face; of two sides of one edge the first counts. place: (k,) in
     (0, 1) from the start of the half-edge to its end. On the boundary new vertices get target angle π, and
-    belong to the tie that both ends belong to.
+    share the unknown that both ends share.
     """
     surface, targets = problem.surface, problem.targets
     faces, twin, n = surface.faces, surface.twin, len(surface.vertices)
@@ -84,12 +84,12 @@ def split_edges(problem: Problem, marked: Ints, place: Floats) -> Problem:
         patch=None if surface.patch is None else surface.patch[source],
         parameters=_blend_parameters(surface, i, j, s),
     )
-    tie = np.where(inner | (targets.tie[i] != targets.tie[j]), -1, targets.tie[i])
-    counts = np.bincount(tie[tie >= 0], minlength=len(targets.tie_angle))
+    shared = np.where(inner | (targets.shared[i] != targets.shared[j]), -1, targets.shared[i])
+    counts = np.bincount(shared[shared >= 0], minlength=len(targets.shared_angle))
     grown = Targets(
         np.concatenate([targets.angle, np.where(inner, 2 * np.pi, np.pi)]),
-        np.concatenate([targets.tie, tie]),
-        targets.tie_angle + np.pi * counts,
+        np.concatenate([targets.shared, shared]),
+        targets.shared_angle + np.pi * counts,
         None if targets.offset is None else blend(targets.offset),
     )
     return Problem(refined, grown, blend(problem.u), parent)
@@ -190,18 +190,18 @@ def _feet(surface: Surface, faces: Ints, h: Ints, t: Ints) -> Floats:
     return best
 
 
-def collapsing(surface: Surface, targets: Targets, turn: Ints) -> Ints:
+def collapsing(surface: Surface, targets: Targets, winding: Ints) -> Ints:
     """(k,) half-edges that must be split before any map can exist on these triangles.
 
     An interior edge between two vertices of one straight side would fall onto the boundary, and so would all
     that it cuts off; and around a boundary vertex with few triangles their angles, below π each, cannot add
-    up to a large target. turn: (3m,) as in ``MirrorMesh``.
+    up to a large target. winding: (3m,) as in ``MirrorMesh``.
     """
     crowded = _crowded(surface, targets, FULLEST, surface.boundary)
-    return np.union1d(_chords(surface, targets, turn), crowded)
+    return np.union1d(_chords(surface, targets, winding), crowded)
 
 
-def _chords(surface: Surface, targets: Targets, turn: Ints) -> Ints:
+def _chords(surface: Surface, targets: Targets, winding: Ints) -> Ints:
     faces, twin, n = surface.faces, surface.twin, len(surface.vertices)
     tail, head = half_edges(faces)
     found = [np.zeros(0, dtype=np.int64)]
@@ -212,13 +212,13 @@ def _chords(surface: Surface, targets: Targets, turn: Ints) -> Ints:
         boundary = np.flatnonzero((twin < 0) & (place[tail] >= 0))
         at[tail[boundary]] = boundary
         # turns and convex corners up to each vertex, twice around so that no way along the loop wraps
-        around = np.concatenate([[0], np.cumsum(np.tile(turn[at[loop]], 2))])
-        convex = (targets.angle[loop] < np.pi - ANGLE) & (targets.tie[loop] < 0)
+        around = np.concatenate([[0], np.cumsum(np.tile(winding[at[loop]], 2))])
+        convex = (targets.angle[loop] < np.pi - ANGLE) & (targets.shared[loop] < 0)
         corners = np.concatenate([[0], np.cumsum(np.tile(convex, 2))])
         h = np.flatnonzero((twin >= 0) & (place[tail] >= 0) & (place[head] >= 0))
         start, end = place[tail[h]], place[head[h]]
         end = np.where(end < start, end + len(loop), end)
-        along = around[end] - around[start] == turn[h]  # the way along the loop that the edge cuts off
+        along = around[end] - around[start] == winding[h]  # the way along the loop that the edge cuts off
         found.append(h[along & (corners[end] == corners[start + 1])])
     return np.concatenate(found)
 
@@ -230,7 +230,7 @@ def _crowded(surface: Surface, targets: Targets, most: float, among: Ints) -> In
     count = np.bincount(faces.ravel(), minlength=len(surface.vertices))
     boundary = np.zeros(len(count), dtype=bool)
     boundary[surface.boundary] = True
-    among = among[boundary[among] & (targets.tie[among] < 0)]
+    among = among[boundary[among] & (targets.shared[among] < 0)]
     crowded = np.zeros(len(count), dtype=bool)
     crowded[among] = targets.angle[among] > count[among] * most
     corner = np.flatnonzero(crowded[faces.ravel()])
@@ -292,5 +292,5 @@ def _opened(surface: Surface, targets: Targets) -> Bools:
     surface, and where what the corner gets of it is wide. Narrow corners of a fan need no finer fan."""
     angle = corner_angles(opposite_lengths(surface.vertices, surface.faces)).angle.T
     sums = np.bincount(surface.faces.ravel(), weights=angle.ravel(), minlength=len(surface.vertices))
-    ratio = np.where(targets.tie < 0, targets.angle / sums, 0.0)[surface.faces]
+    ratio = np.where(targets.shared < 0, targets.angle / sums, 0.0)[surface.faces]
     return np.asarray((ratio > OPENED) & (ratio * angle > BROAD))

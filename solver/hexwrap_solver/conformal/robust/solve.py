@@ -12,10 +12,11 @@ from hexwrap_solver.conformal.boundary import curvatures
 from hexwrap_solver.conformal.cut import cut_open
 from hexwrap_solver.conformal.energy import Energy, corner_angles, opposite_lengths, total
 from hexwrap_solver.conformal.layout import lay_out, normalise
-from hexwrap_solver.conformal.orientation import drawn_errors, misdrawn, positive
+from hexwrap_solver.conformal.orientation import inverted, layout_errors, positively_oriented
 from hexwrap_solver.conformal.robust.delaunay import make_delaunay
 from hexwrap_solver.conformal.robust.descent import ACCEPTED, Descent, FlipEnergy, descend
 from hexwrap_solver.conformal.robust.develop import develop
+from hexwrap_solver.conformal.robust.flip_sequence import FlipSequence
 from hexwrap_solver.conformal.robust.metric import Metric, angle_sums, measure
 from hexwrap_solver.conformal.robust.mirror import MirrorMesh, half_edge_names, mirror_mesh
 from hexwrap_solver.conformal.robust.overlay import Overlay, insert
@@ -28,7 +29,6 @@ from hexwrap_solver.conformal.robust.refine import (
     spread,
 )
 from hexwrap_solver.conformal.robust.straight import straighten
-from hexwrap_solver.conformal.robust.unflip import Record
 from hexwrap_solver.conformal.span import (
     MAX_SPAN,
     check_reach,
@@ -77,7 +77,7 @@ def solve_with_flips(
     Raises ConvergenceError where double precision does not suffice.
     """
     cones = Cones.none() if cones is None else cones
-    problem = _problem(surface, targets, start)
+    problem = problem_of(surface, targets, start)
     omitted: list[int] = []
     try:
         return _refined(surface, problem, cones, progress, SPREAD_MOST, omitted)
@@ -95,12 +95,12 @@ def _refined(
     iterations, fewest, span = 0, len(surface.faces), np.inf
     unrolled = is_annulus(surface, cones)
     for attempt in range(MAX_ROUNDS):
-        problem, cut = _uncollapse(problem, unrolled)
-        flat = _flatten(problem, cut, cones, progress, span)
+        problem, cut = uncollapsed(problem, unrolled)
+        flat = flatten(problem, cut, cones, progress, span)
         iterations += flat.descent.iterations
         if unrolled:
-            found, lift, first = _draw(problem, flat)
-            u, wrong = found.log_scale, np.flatnonzero(misdrawn(found))
+            found, lift, first = draw(problem, flat)
+            u, wrong = found.log_scale, np.flatnonzero(inverted(found))
             if not len(wrong):
                 _check_drawn(found, flat.off)
                 return _with_notes(_in_one_piece(found, first), surface, iterations)
@@ -143,13 +143,13 @@ def _refined(
 
 
 def _inserted(
-    problem: Problem, flat: _Flat, found: ConformalMap, lift: Ints, first: Ints
+    problem: Problem, flat: Flat, found: ConformalMap, lift: Ints, first: Ints
 ) -> ConformalMap | None:
     """The map that was found, with new vertices where it puts them, until no triangle turns over; None where
     that does not succeed."""
     try:
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            overlay = Overlay(found, flat.log_length, flat.turn, flat.descent.u, lift)
+            overlay = Overlay(found, flat.log_length, flat.winding, flat.descent.u, lift)
             refined = insert(overlay, problem.targets)
         if refined is None:
             return None
@@ -164,9 +164,9 @@ def _in_one_piece(found: ConformalMap, first: Ints) -> ConformalMap:
     """The same map with its faces laid out side by side, but for one cut, if corners are near enough to the
     origin there to keep their digits. first: (m,) where the first corner of each face then stands."""
     whole = found.with_domain(sheet=found.sheet + first[:, None])
-    if misdrawn(whole).any():
+    if inverted(whole).any():
         return found
-    before, after = drawn_errors(found), drawn_errors(whole)
+    before, after = layout_errors(found), layout_errors(whole)
     least = PROMISED / 100
     exact = after.angle <= max(least, before.angle) and after.turn <= max(least, before.turn)
     return whole if exact else found
@@ -193,44 +193,43 @@ def metric_with_flips(
 ) -> FlatMetric:
     """The metric of ``solve_with_flips``, whether or not straight triangles can be drawn in it."""
     cones = Cones.none() if cones is None else cones
-    problem, cut = _uncollapse(_problem(surface, targets, start), is_annulus(surface, cones))
-    flat = _flatten(problem, cut, cones, progress)
+    problem, cut = uncollapsed(problem_of(surface, targets, start), is_annulus(surface, cones))
+    flat = flatten(problem, cut, cones, progress)
     return FlatMetric(problem.surface, flat.descent.u, flat.sums, problem.targets)
 
 
-def _problem(surface: Surface, targets: Targets, start: Floats | None) -> Problem:
+def problem_of(surface: Surface, targets: Targets, start: Floats | None) -> Problem:
     u = np.zeros(len(surface.vertices)) if start is None else start
     return Problem(surface, targets, u, np.arange(len(surface.faces)))
 
 
-def _turns(sheet: Ints) -> Ints:
+def winding_of(sheet: Ints) -> Ints:
     """(m, 3) how often the side from each corner to the next goes around the annulus (see
-    ``MirrorMesh.turn``). sheet: (m, 3) see ``Cut``."""
+    ``MirrorMesh.winding``). sheet: (m, 3) see ``Cut``."""
     return np.asarray(np.roll(sheet, -1, axis=1) - sheet)
 
 
-def _sheets(surface: Surface) -> Ints:
+def annulus_sheets(surface: Surface) -> Ints:
     """(m, 3) sheet of every corner of an annulus: 1 to the left of the cut, 0 elsewhere."""
     fan = cut_open(surface, np.zeros(0, dtype=np.int64)).fan
     return np.where(fan > 0, 1, 0).reshape(-1, 3)
 
 
-def _uncollapse(problem: Problem, unrolled: bool) -> tuple[Problem, Ints]:
+def uncollapsed(problem: Problem, unrolled: bool) -> tuple[Problem, Ints]:
     """Splits what has no room in the domain, until there is nothing of the kind. Also gives the sheets of an
     annulus. In other nets every edge between two vertices of one side counts, so more are split than
     need be."""
     while True:
-        sheet = (
-            _sheets(problem.surface) if unrolled else np.zeros(problem.surface.faces.shape, dtype=np.int64)
-        )
-        marked = collapsing(problem.surface, problem.targets, _turns(sheet).ravel())
+        surface = problem.surface
+        sheet = annulus_sheets(surface) if unrolled else np.zeros(surface.faces.shape, dtype=np.int64)
+        marked = collapsing(surface, problem.targets, winding_of(sheet).ravel())
         if not len(marked):
             return problem, sheet
         problem = split_edges(problem, marked, np.full(len(marked), 0.5))
 
 
 @dataclass(frozen=True)
-class _Flat:
+class Flat:
     """A flat Delaunay metric on the mirrored surface.
 
     cut: (m, 3) sheets of an annulus. unit: logarithm of the length in which the metric is measured.
@@ -249,8 +248,8 @@ class _Flat:
     off: float
 
     @property
-    def turn(self) -> Ints:
-        return _turns(self.cut)
+    def winding(self) -> Ints:
+        return winding_of(self.cut)
 
     @property
     def cone_angle(self) -> float | None:
@@ -258,19 +257,19 @@ class _Flat:
         return float(self.curvature[0]) if len(self.curvature) == 2 else None
 
 
-def _flatten(
+def flatten(
     problem: Problem, cut: Ints, cones: Cones, progress: Progress, known_span: float = np.inf
-) -> _Flat:
+) -> Flat:
     """The metric with the problem's angle sums. Raises ConvergenceError.
 
     cut: (m, 3) sheets of an annulus. known_span: the least span of u that came out of the rounds of
     refinement so far; later ones may have run away.
     """
     surface, targets = problem.surface, problem.targets
-    free = bool((targets.tie == 0).any() and len(targets.tie_angle) == 1)  # the cone angle comes out
+    free = bool((targets.shared == 0).any() and len(targets.shared_angle) == 1)  # the cone angle comes out
     log_length = np.log(opposite_lengths(surface.vertices, surface.faces))[[2, 0, 1]].T.ravel()
     unit = float(np.median(log_length))  # logarithms near 0 have the most digits behind the point
-    mesh = mirror_mesh(surface, log_length - unit, _turns(cut).ravel())
+    mesh = mirror_mesh(surface, log_length - unit, winding_of(cut).ravel())
     flips = make_delaunay(mesh, np.zeros(mesh.n), euclidean=True)
     known = curvatures(targets, targets.angle, surface, cones)
     span = MAX_SPAN if free else largest_span(cone_angle_of(surface, known))
@@ -289,19 +288,19 @@ def _flatten(
             "double precision cannot hold the map of this surface; remesh it more evenly",
             [],
         )
-    return _Flat(mesh, cut, log_length - unit, unit, curvature, descent, sums, flips + descent.flips, off)
+    return Flat(mesh, cut, log_length - unit, unit, curvature, descent, sums, flips + descent.flips, off)
 
 
-def _draw_net(problem: Problem, flat: _Flat, cones: Cones) -> tuple[ConformalMap | None, Ints]:
+def _draw_net(problem: Problem, flat: Flat, cones: Cones) -> tuple[ConformalMap | None, Ints]:
     """The map of the vertices with the triangles as they are, and none; or None, and (k,) the triangles that
     turn over in it."""
     surface, descent = problem.surface, flat.descent
-    mesh, record = mirror_mesh(surface, flat.log_length, flat.turn.ravel()), Record()
-    make_delaunay(mesh, np.zeros(mesh.n), euclidean=True, do=record.flip)
+    mesh, flips = mirror_mesh(surface, flat.log_length, flat.winding.ravel()), FlipSequence()
+    make_delaunay(mesh, np.zeros(mesh.n), euclidean=True, do=flips.flip)
     u, _ = _centred(descent, problem.targets)
-    make_delaunay(mesh, u, do=record.flip)
-    side = record.undone(mesh, measure(mesh, u))[half_edge_names(surface)].reshape(-1, 3)
-    turned = ~positive(np.stack([0 * side[:, 0], side[:, 0], side[:, 0] + side[:, 1]], axis=1))
+    make_delaunay(mesh, u, do=flips.flip)
+    side = flips.undo(mesh, measure(mesh, u))[half_edge_names(surface)].reshape(-1, 3)
+    turned = ~positively_oriented(np.stack([0 * side[:, 0], side[:, 0], side[:, 0] + side[:, 1]], axis=1))
     if turned.any():
         return None, np.flatnonzero(turned)
     lengths = np.ascontiguousarray(np.abs(side).T[[1, 2, 0]]) * np.exp(flat.unit)
@@ -324,11 +323,11 @@ def _draw_net(problem: Problem, flat: _Flat, cones: Cones) -> tuple[ConformalMap
         closing_error=layout.closing_error,
         cones=cones,
     )
-    wrong = np.flatnonzero(misdrawn(found))
+    wrong = np.flatnonzero(inverted(found))
     return (None if len(wrong) else found), wrong
 
 
-def _draw(problem: Problem, flat: _Flat) -> tuple[ConformalMap, Ints, Ints]:
+def draw(problem: Problem, flat: Flat) -> tuple[ConformalMap, Ints, Ints]:
     """The map of the vertices, with the triangles as they are, whether they turn over or not; the lift of its
     ``Development``; and (m,) where the first corner of each face stands if all are laid out side by side."""
     surface, targets, descent, sums = problem.surface, problem.targets, flat.descent, flat.sums
@@ -359,13 +358,13 @@ def _draw(problem: Problem, flat: _Flat) -> tuple[ConformalMap, Ints, Ints]:
 
 def _off(targets: Targets, sums: Floats, surface: Surface) -> float:
     """How far prescribed boundary angles are missed, radians."""
-    listed = surface.boundary[targets.tie[surface.boundary] < 0]
+    listed = surface.boundary[targets.shared[surface.boundary] < 0]
     return float(np.abs(sums - targets.angle)[listed].max(initial=0.0))
 
 
 def _centred(descent: Descent, targets: Targets) -> tuple[Floats, Metric]:
     """u and its metric, shifted to the middle of the doubles where u has a free constant."""
-    if (targets.tie == 0).any():
+    if (targets.shared == 0).any():
         return descent.u, descent.metric
     middle = float(descent.u.min() + descent.u.max()) / 2
     return descent.u - middle, replace(descent.metric, length=descent.metric.length - middle)
@@ -373,8 +372,8 @@ def _centred(descent: Descent, targets: Targets) -> tuple[Floats, Metric]:
 
 def _check_drawn(found: ConformalMap, off: float) -> None:
     """Raises ConvergenceError where boundary angles, as drawn, are not as exact as promised: small residuals
-    add up along the way through a domain of very large and very small parts. off: as in ``_Flat``."""
-    drawn = drawn_errors(found)
+    add up along the way through a domain of very large and very small parts. off: as in ``Flat``."""
+    drawn = layout_errors(found)
     error = np.maximum(drawn.angle + off, drawn.turn)
     if not error <= PROMISED:  # nor if it is NaN
         raise failure(

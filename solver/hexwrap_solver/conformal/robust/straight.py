@@ -26,7 +26,7 @@ def straighten(surface: Surface, targets: Targets, uv: Complexes, sheet: Ints, d
     along = following[tail] == head
     step[tail[along]] = (np.roll(sheet, -1, axis=1) - sheet).ravel()[along]
     for loop in surface.loops:
-        corner = (np.abs(targets.angle[loop] - np.pi) > ROUNDING) | (targets.tie[loop] >= 0)
+        corner = (np.abs(targets.angle[loop] - np.pi) > ROUNDING) | (targets.shared[loop] >= 0)
         if corner.any():
             loop = np.roll(loop, -int(np.argmax(corner)))
             _project(uv, loop, np.roll(corner, -int(np.argmax(corner))), step[loop], deck)

@@ -52,7 +52,10 @@ class CellMatrix:
             square = slope.transpose(0, 2, 1) @ slope
             i, j = np.tril_indices(slope.shape[2])
             value += np.bincount(places.ravel(), weights=square[:, i, j].ravel(), minlength=self._entries)
-        self._factor.factorise(value[self._diagonal] * (1 + RIDGE) + ridge, value[self._below])
+        diagonal = value[self._diagonal].reshape(-1, 3)
+        # The same in all directions: a surface of revolution is to keep its symmetry.
+        guard = RIDGE * diagonal.mean(axis=1, keepdims=True) + ridge
+        self._factor.factorise((diagonal + guard).ravel(), value[self._below])
 
     def solve(self, right: Floats) -> Floats:
         """b (3n,) → x, with the matrix factorised last."""

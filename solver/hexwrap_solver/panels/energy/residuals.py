@@ -39,24 +39,32 @@ def bounded(weights: Weights) -> tuple[Weights, float]:
 
 
 def residuals(points: Points, length: Floats, weights: Weights, *, angles: bool = True) -> Points:
-    """points: (q, p, 3), length: (q,) → (q, m), each scaled by the root of its weight; without the surface's.
+    """points: (q, p, 3), length: (q,) → (q, m), each scaled by the root of its weight, none where
+    that is 0; without the surface's.
 
     angles: False leaves them out (cells of irregular shape).
     """
-    parts = [np.sqrt(weights.planarity) * planarity(points, length)]
-    if angles:
-        p = points.shape[1]
+    q, p, _ = points.shape
+    parts = [np.zeros((q, 0))]
+    if weights.planarity:
+        parts.append(np.sqrt(weights.planarity) * planarity(points, length))
+    if angles and weights.angle:
         parts.append(np.sqrt(weights.angle) * (corner_angles(points) - np.pi * (p - 2) / p))
-    parts.append(np.sqrt(weights.edge) * (_norm(edges_of(points)) / length[:, None] - 1))
+    if weights.edge:
+        parts.append(np.sqrt(weights.edge) * (_norm(edges_of(points)) / length[:, None] - 1))
     return np.concatenate(parts, axis=1)
 
 
 def jacobian(points: Floats, length: Floats, weights: Weights, *, angles: bool = True) -> Floats:
     """(q, m, p, 3) derivatives of ``residuals`` by the corners."""
-    parts = [np.sqrt(weights.planarity) * _planarity_derivative(points, length)]
-    if angles:
+    q, p, _ = points.shape
+    parts = [np.zeros((q, 0, p, 3))]
+    if weights.planarity:
+        parts.append(np.sqrt(weights.planarity) * _planarity_derivative(points, length))
+    if angles and weights.angle:
         parts.append(np.sqrt(weights.angle) * _angle_derivative(points))
-    parts.append(np.sqrt(weights.edge) * _edge_derivative(points, length))
+    if weights.edge:
+        parts.append(np.sqrt(weights.edge) * _edge_derivative(points, length))
     return np.concatenate(parts, axis=1)
 
 
@@ -101,10 +109,46 @@ def plane_slopes(points: Floats, length: Floats) -> Floats:
     return np.asarray(projector[..., None] * (axes[:, :, 0] / length[:, None])[:, None, None])
 
 
-def _best_planes(points: Floats) -> tuple[Floats, Floats]:
-    """(q, p, 3) corners about their mean; (q, 3, 3) principal axes in columns, the normal first."""
+def triangle_areas(points: Floats, triangles: Floats) -> Floats:
+    """(q, t) areas of triangles in polygons (q, p, 3), seen along their normals; triangles: (t, 3, p) their
+    corners as weights of the polygon's."""
+    normal, opposite, spoke = _triangles(points, triangles)
+    return np.asarray(np.einsum("qtd,qtd->qt", np.cross(opposite, spoke), normal[:, None]) / 2)
+
+
+def triangle_slopes(points: Floats, triangles: Floats) -> Floats:
+    """(q, t, p, 3) derivatives of ``triangle_areas`` by the corners.
+
+    They hold for flat polygons: how the normal turns is left out, which areas there do not feel.
+    """
+    normal, opposite, spoke = _triangles(points, triangles)
+    turned, along = np.cross(normal[:, None], opposite) / 2, np.cross(normal[:, None], spoke) / 2
+    a, b, c = (triangles[None, :, k, :, None] for k in range(3))
+    # The first corner moves against the opposite edge, the others against the spokes.
+    return np.asarray(turned[:, :, None] * (a - b) - along[:, :, None] * (c - b))
+
+
+def _triangles(points: Floats, triangles: Floats) -> tuple[Floats, Floats, Floats]:
+    """(q, 3) unit normals of the polygons; (q, t, 3) of triangles a b c the edge b → c, and b → a."""
     spokes = points - points.mean(axis=1, keepdims=True)
-    return spokes, np.linalg.eigh(spokes.transpose(0, 2, 1) @ spokes)[1]
+    normal = _area_vectors(spokes)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1), np.finfo(float).tiny)[:, None]
+    a, b, c = (triangles[:, k] for k in range(3))
+    return normal, (c - b) @ points, (a - b) @ points
+
+
+def _best_planes(points: Floats) -> tuple[Floats, Floats]:
+    """(q, p, 3) corners about their mean; (q, 3, 3) principal axes in columns, the normal first, on the side
+    from which the corners run counter-clockwise: distances at one place go with derivatives at another."""
+    spokes = points - points.mean(axis=1, keepdims=True)
+    axes = np.linalg.eigh(spokes.transpose(0, 2, 1) @ spokes)[1]
+    axes[:, :, 0] *= np.where(np.einsum("qd,qd->q", axes[:, :, 0], _area_vectors(spokes)) < 0, -1, 1)[:, None]
+    return spokes, axes
+
+
+def _area_vectors(spokes: Floats) -> Floats:
+    """(q, 3) twice the area of polygons about the origin, along their normals."""
+    return np.asarray(np.cross(spokes, np.roll(spokes, -1, axis=1)).sum(axis=1))
 
 
 def planarity(points: Points, length: Floats) -> Points:

@@ -10,9 +10,13 @@ subject to flat faces. The last term keeps away waves from row to row, like bell
 become flat near any surface; of opposite edges, because nodes that a translation of the pattern takes to
 each other lie there, whereas flat hexagons on a saddle need neighbouring corners to move apart.
 
+Faces stay clear of collapsing, folding over and crossing themselves by a barrier, see ``guard``.
+
 Gauss–Newton steps with the distances from the faces' best planes as a penalty, hundredfold from stage to
 stage, lead near the minimum; Newton's method on the planes alone then makes them flat to rounding, along the
-shortest way in the sense of E. All matrices have the same pattern of entries and are analysed once.
+shortest way in the sense of E. Where the surface is hardly curved in one direction corners may slide far for
+little, so that steps which had to be shortened are damped afterwards (Levenberg 1944, Marquardt 1963). All
+matrices have the same pattern of entries and are analysed once.
 """
 
 from __future__ import annotations
@@ -23,6 +27,7 @@ import numpy as np
 
 from hexwrap_solver.arrays import Floats, Ints, Progress, no_progress
 from hexwrap_solver.panels.energy.cell_matrix import CellMatrix
+from hexwrap_solver.panels.energy.guard import Guard, free_corners
 from hexwrap_solver.panels.energy.residuals import (
     bounded,
     jacobian,
@@ -35,18 +40,31 @@ from hexwrap_solver.pattern.types import Pattern
 from hexwrap_solver.surface.types import Surface
 
 #: Weights of the plane distances, stage by stage; the surface weighs 1.
-FLATNESS = (1.0, 1e2, 1e4)
+FLATNESS = (1e2, 1e4, 1e6, 1e8)
 
-#: Most Gauss–Newton steps in a stage, and the fraction of its energy that a step takes away if another one is
-#: to follow. What a stage leaves undone, the next does along with its own work; nothing comes after the last,
-#: nor after the only one where nothing is to become flat.
-STEPS, LAST_STEPS, ONLY_STEPS = (1, 1.0), (3, 0.2), (15, 1e-4)
+#: After so many stages Newton's method is tried; the others follow only where it makes no headway.
+USUAL = 3
+
+#: Most Gauss–Newton steps, and the fraction of its energy that a step takes away if another one is to follow
+#: in its stage: what is left undone, the next stage does along with its own work. A heavier weight is no help
+#: where the planes are most of the energy; there it is less. The first stage has one step.
+MOST_STEPS, ENOUGH, LITTLE = 25, 0.35, 0.1
+
+#: The same where nothing is to become flat, and so nothing comes after.
+ONLY_STEPS, ONLY_ENOUGH = 15, 1e-4
+
+#: Damping after the first shortened step, relative to the weight of the planes; by how much it falls after
+#: full steps, and rises after shortened ones.
+DAMPING, EASE, TIGHTEN = 1e-4, 4.0, 4.0
 
 #: Weight of the planes in Newton's method at the end, so large that the rest only chooses among flat meshes.
 DECISIVE = 1e9
 
 #: Distances from planes / ℓ below this are rounding; Newton's method takes at most so many steps to it.
 FLAT, NEWTON_STEPS = 1e-12, 12
+
+#: See ``_flattened``.
+HEADWAY = 0.3
 
 #: Corners leave the surface by about this / ℓ before the first step. A regular pattern on a saddle can become
 #: flat in mirrored ways and balances between them, so that rounding would tip it over, here one way and there
@@ -55,6 +73,14 @@ NUDGE = 0.03
 
 #: Cosine of the angle to the normal above which the way to the nearest point leads off a boundary.
 ASLANT = 0.7
+
+#: Newton's steps to the place whose interpolated normal leads to a point; barycentric coordinates below that
+#: lie outside a face, and normals whose cosine is less are not near each other.
+PROJECTIONS, INSIDE, ALIKE = 3, 1e-9, 0.8
+
+#: With the same derivatives at most so many corrections follow a step, as long as each leaves less than this
+#: fraction of the energy; and at most so many of Newton's steps follow each other.
+CORRECTIONS, CHORDS, WORTH = 4, 8, 0.6
 
 #: A step is halved at most down to this fraction.
 SHORTEST = 1e-3
@@ -90,6 +116,7 @@ class _Group:
     length: Floats
     regular: bool
     across: Floats
+    guard: Guard
 
 
 @dataclass(frozen=True)
@@ -121,69 +148,93 @@ def minimise_watertight(
     """
     weights, factor = bounded(aims.weights)
     problem = _Problem(pattern, length, replace(aims, weights=weights), surface)
-    stages = FLATNESS if aims.flat else (0.0,)
     points = pattern.vertices
     curve: list[float] = []
     if aims.flat and problem.bend(points) >= FLAT:
         points = points + NUDGE * pattern.edge_length * _nudges(pattern)
-    for stage, flatness in enumerate(stages):
-        most, enough = STEPS if stage < len(stages) - 1 else LAST_STEPS if aims.flat else ONLY_STEPS
-        for step in range(most):
-            state = problem.linearise(points, flatness)
-            if not curve:
-                curve.append(state.asked)
-            done = (stage + step / most) / (len(stages) + 1)
-            progress(done, f"flatness weight {flatness:.0e}, energy {state.energy:.3e}")
-            found = _search(problem, state)
-            if found is None:
-                break
+    stages, most, enough = FLATNESS, MOST_STEPS, ENOUGH
+    if not aims.flat:
+        stages, most, enough = (0.0,), ONLY_STEPS, ONLY_ENOUGH
+    stage, damping = 0, 0.0
+    for step in range(most):
+        state = problem.linearise(points, stages[stage], damping)
+        if not curve:
+            curve.append(state.asked)
+        done = 0.9 * max(step / most, stage / len(stages))
+        progress(done, f"flatness weight {stages[stage]:.0e}, energy {state.energy:.3e}")
+        found, fraction = _search(problem, state)
+        if found is not None:
             points = found.points
             curve.append(found.asked)
-            if state.energy - found.energy < enough * state.energy:
+        shortened = fraction < 1
+        damping = max(TIGHTEN * damping, DAMPING * stages[stage]) if shortened else damping / EASE
+        gain = 0.0 if found is None else 1 - found.energy / state.energy
+        bent = aims.flat and found is not None and found.planes > found.asked
+        tired = found is None or (gain < (LITTLE if bent else enough) and not shortened)
+        if tired or (aims.flat and not stage):
+            stage += 1
+            if stage == len(stages):
                 break
-    if aims.flat:
+            flat = _flattened(problem, points, HEADWAY) if stage >= USUAL else points
+            if stage >= USUAL and problem.bend(flat) < FLAT:
+                points = flat
+                break
+    if aims.flat and problem.bend(points) >= FLAT:
         progress(0.9, "flattening")
         points = _flattened(problem, points)
-        curve.append(problem.linearise(points, 0.0).asked)
-    return points, factor * np.array(curve)
+    curve.append(problem.at(points).asked)
+    energy = np.array(curve)
+    return points, factor * energy[np.isfinite(energy)]  # Newton's method may end beyond the barrier
 
 
-def _search(problem: _Problem, state: _State) -> _State | None:
-    """A state of less energy, None where none was found.
+def _search(problem: _Problem, state: _State) -> tuple[_State | None, float]:
+    """A state of less energy, None where none was found, and the fraction of the step that leads there.
 
-    Faces turn as they move, so that a long step leaves their planes. A second step from where the first one
-    ends, with the same derivatives and so without another factorisation, leads back to them (second-order
-    correction; Fletcher 1982). If that is not enough, both are shortened along t·step + t²·correction.
+    Faces turn as they move, so that a long step leaves their planes. More steps from where the first one
+    ends, with the same derivatives and so without another factorisation, lead back to them (second-order
+    correction; Fletcher 1982). If that is not enough, all are shortened along t·step + t²·corrections.
     """
     step = problem.step(state)
     best = problem.at(state.points + step)
     correction = np.zeros_like(step)
-    if np.isfinite(best.energy):
-        correction = problem.step(best)
-        corrected = problem.at(best.points + correction)
-        best = corrected if corrected.energy < best.energy else best
+    for _ in range(CORRECTIONS if np.isfinite(best.energy) else 0):
+        more = problem.step(best)
+        before, corrected = best, problem.at(best.points + more)
+        if corrected.energy < before.energy:
+            correction, best = correction + more, corrected
+        if not corrected.energy < WORTH * before.energy:
+            break
     fraction = 1.0
     while not best.energy < state.energy:  # nor where it is no number
         fraction /= 2
         if fraction < SHORTEST:
-            return None
+            return None, 0.0
         best = problem.at(state.points + fraction * step + fraction**2 * correction)
-    return best
+    return best, fraction
 
 
-def _flattened(problem: _Problem, points: Floats) -> Floats:
-    """The nearest flat mesh: however heavy, a penalty leaves distances that the rest still pulls at."""
+def _flattened(problem: _Problem, points: Floats, headway: float = 1.0) -> Floats:
+    """The nearest flat mesh: however heavy, a penalty leaves distances that the rest still pulls at.
+
+    What remains to be moved is little. headway: gives up where derivatives taken anew leave more than this
+    fraction of the distances' squares; 1: goes through the barrier if it must.
+    """
     for _ in range(NEWTON_STEPS):
-        state = problem.linearise(points, DECISIVE)
-        step, fraction = problem.step(state, planes_only=True), 1.0
-        best = problem.at(points + step)
-        while not best.planes < state.planes and fraction > SHORTEST:
-            fraction /= 2
-            best = problem.at(points + fraction * step)
-        if not best.planes < state.planes:
-            break
-        points = best.points
-        if problem.bend(points) < FLAT:
+        start = state = problem.linearise(points, DECISIVE, guarded=headway < 1)
+        for _ in range(CHORDS):
+            step, fraction = problem.step(state, planes_only=True), 1.0
+            best = problem.at(state.points + step)
+            while not best.planes < state.planes and state is start and fraction > SHORTEST:
+                fraction /= 2
+                best = problem.at(state.points + fraction * step)
+            if not best.planes < state.planes:
+                break
+            swift = best.planes < WORTH**2 * state.planes
+            state = best
+            if not swift or problem.bend(state.points) < FLAT:
+                break
+        points = state.points
+        if state is start or problem.bend(points) < FLAT or state.planes > headway * start.planes:
             break
     return points
 
@@ -224,12 +275,15 @@ class _Problem:
         self._slopes: list[Floats] = []
         self._away: Floats = np.zeros((0, 1))
 
-    def linearise(self, points: Floats, flatness: float) -> _State:
-        """Takes the derivatives there, with that weight of the planes, and gives the state."""
+    def linearise(
+        self, points: Floats, flatness: float, damping: float = 0.0, *, guarded: bool = True
+    ) -> _State:
+        """Takes the derivatives there, with that weight of the planes, and gives the state. damping: of
+        steps, as the anchor's weight. guarded: whether they feel the barrier."""
         self._flatness, self._from, self._slopes = flatness, points, []
         for g in self._groups:
             corner = points[g.corner]
-            shape = self._shape_slopes(g, corner)
+            shape = self._shape_slopes(g, corner, guarded)
             plane = np.sqrt(flatness) * plane_slopes(corner, g.length)
             slope = np.concatenate([shape, plane], axis=1)
             self._slopes.append(slope.reshape(*slope.shape[:2], -1))
@@ -238,7 +292,7 @@ class _Problem:
             away, direction = _beside(points, self._surface)
             self._away = np.sqrt(weight) / self._unit * away[:, None]
             self._slopes.append(np.sqrt(weight) / self._unit * direction[:, None])
-        self._matrix.factorise(self._slopes, self._aims.anchor / self._unit**2)
+        self._matrix.factorise(self._slopes, (self._aims.anchor + damping) / self._unit**2)
         return self.at(points)
 
     def at(self, points: Floats) -> _State:
@@ -271,15 +325,17 @@ class _Problem:
         moved = corner - self._start[g.corner]
         change = (np.sqrt(self._aims.evenness) / self._unit) * (g.across @ moved)
         shape = residuals(corner, g.length, self._aims.weights, angles=g.regular)
-        return np.concatenate([change.reshape(len(change), -1), shape], axis=1)
+        guard = [g.guard.residuals(corner)] if self._aims.flat else []
+        return np.concatenate([change.reshape(len(change), -1), shape, *guard], axis=1)
 
-    def _shape_slopes(self, g: _Group, corner: Floats) -> Floats:
+    def _shape_slopes(self, g: _Group, corner: Floats, guarded: bool) -> Floats:
         """(q, r, p, 3) derivatives of it by the corners."""
         q, p, _ = corner.shape
         change = np.einsum("kc,xy->kxcy", g.across, np.eye(3)).reshape(-1, p, 3)
         change = np.broadcast_to(np.sqrt(self._aims.evenness) / self._unit * change, (q, *change.shape))
         shape = jacobian(corner, g.length, self._aims.weights, angles=g.regular)
-        return np.concatenate([change, shape], axis=1)
+        guard = [g.guard.slopes(corner) * guarded] if self._aims.flat else []
+        return np.concatenate([change, shape, *guard], axis=1)
 
     def bend(self, points: Floats) -> float:
         """Greatest distance of a corner from its face's plane / ℓ; ∞ where points are no numbers."""
@@ -308,17 +364,57 @@ class _Problem:
 def _beside(points: Floats, surface: Surface) -> tuple[Floats, Floats]:
     """(n,) distances from the surface, along (n, 3) unit vectors.
 
-    These are the normals, interpolated, so that facets leave no print; but beyond a boundary, where the way
-    back is not along them, those from the nearest points.
+    These are the normals, interpolated, of the place whose normal leads to the point: so facets leave no
+    print, and where two of them are equally near, it does not matter which is taken. But beyond a boundary,
+    where the way back is not along normals, they are those from the nearest points.
     """
     nearest = surface.tree.nearest(points)
-    face = surface.faces[nearest.face]
-    spoke = np.einsum("nc,ncd->nd", nearest.barycentric, points[:, None] - surface.vertices[face])
+    spoke = np.einsum(
+        "nc,ncd->nd", nearest.barycentric, points[:, None] - surface.vertices[surface.faces[nearest.face]]
+    )
     normal = surface.normals_at(nearest.face, nearest.barycentric)
     along = np.einsum("nd,nd->n", normal, spoke)
     beyond = np.abs(along) < ASLANT * nearest.distance
+    weight, height, lifted = _lifted(points, nearest.face, nearest.barycentric, surface)
+    sound = ~beyond & (np.abs(height) < 2 * nearest.distance)
+    outside = np.flatnonzero(sound & (weight.min(axis=1) < -INSIDE))
+    if len(outside):
+        down = surface.tree.nearest(points[outside] - height[outside, None] * lifted[outside])
+        _, height[outside], lifted[outside] = _lifted(points[outside], down.face, down.barycentric, surface)
+    # On coarse meshes normals may turn so much within a face that none of them leads to the point.
+    found = np.einsum("nd,nd->n", normal, lifted) > ALIKE
+    normal, along = np.where(found[:, None], lifted, normal), np.where(found, height, along)
     direction = np.where(beyond[:, None], spoke / np.maximum(nearest.distance, 1e-300)[:, None], normal)
     return np.where(beyond, nearest.distance, along), direction
+
+
+def _lifted(points: Floats, face: Ints, weight: Floats, surface: Surface) -> tuple[Floats, Floats, Floats]:
+    """The places in the planes of faces (n,) whose interpolated normals lead to points (n, 3): barycentric
+    coordinates (n, 3), first guessed as weight, heights (n,) above them and unit normals (n, 3)."""
+    vertex, normal = surface.vertices[surface.faces[face]], surface.normals[surface.faces[face]]
+    height = np.zeros(len(points))
+    with np.errstate(all="ignore"):
+        for _ in range(PROJECTIONS):
+            mean = np.einsum("nc,ncd->nd", weight, normal)
+            lifted = vertex + height[:, None, None] * normal
+            miss = points - np.einsum("nc,ncd->nd", weight, lifted)
+            sides = lifted[:, 1:] - lifted[:, :1]
+            more = _solved(np.concatenate([sides, mean[:, None]], axis=1), miss)
+            weight = weight + np.concatenate([-more[:, :1] - more[:, 1:2], more[:, :2]], axis=1)
+            height = height + more[:, 2]
+        mean = np.einsum("nc,ncd->nd", weight, normal)
+        size = np.maximum(np.linalg.norm(mean, axis=1), np.finfo(float).tiny)
+        return weight, height * size, mean / size[:, None]
+
+
+def _solved(rows: Floats, right: Floats) -> Floats:
+    """(n, 3) coefficients of sums of rows (n, 3, 3) that give the right-hand sides (n, 3); 0 where there are
+    none."""
+    a, b, c = rows[:, 0], rows[:, 1], rows[:, 2]
+    across = [np.cross(b, c), np.cross(c, a), np.cross(a, b)]
+    volume = np.einsum("nd,nd->n", a, across[0])
+    parts = np.stack([np.einsum("nd,nd->n", right, one) for one in across], axis=1)
+    return np.divide(parts, volume[:, None], out=np.zeros_like(parts), where=volume[:, None] != 0)
 
 
 def _square(residual: Floats) -> float:
@@ -326,16 +422,18 @@ def _square(residual: Floats) -> float:
 
 
 def _groups(pattern: Pattern, length: Floats) -> list[_Group]:
-    faces = pattern.faces
+    faces, free = pattern.faces, free_corners(pattern)
     p = np.bincount(faces.lengths[pattern.whole]).argmax() if pattern.whole.any() else 0
     regular = pattern.whole & (faces.lengths == p)
+    some_free = np.logical_or.reduceat(free, faces.offsets[:-1]) if faces.n_rows else regular
+    kind = 4 * faces.lengths + 2 * regular + some_free
     groups = []
-    for count in np.unique(faces.lengths):
-        for even in (False, True):
-            chosen = np.flatnonzero((faces.lengths == count) & (regular == even))
-            if len(chosen):
-                corner = faces.values[faces.offsets[chosen][:, None] + np.arange(count)].astype(np.int64)
-                groups.append(_Group(corner, length[chosen], even, _across(int(count))))
+    for one in np.unique(kind).tolist():
+        chosen = np.flatnonzero(kind == one)
+        at = faces.offsets[chosen][:, None] + np.arange(one // 4)
+        corner = faces.values[at].astype(np.int64)
+        guard = Guard.of(pattern.vertices[corner], free[at])
+        groups.append(_Group(corner, length[chosen], bool(one & 2), _across(one // 4), guard))
     return groups
 
 

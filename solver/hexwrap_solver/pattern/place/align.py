@@ -23,7 +23,7 @@ What is free, and how it is chosen:
    That response is linear in δ, so that its error is a quadratic form, computed once (``Strain``); single
    lines change as long as that lessens it.
 5. *Corners.* Two successive sides meet in a place of the lattice that should be a node, or, where three edges
-   meet at nodes, one about which the lattice is mirrored along with the corner (``_misplaced_corners``).
+   meet at nodes, one about which the lattice is mirrored along with the corner (``misplaced_corners``).
 
 The placements that cost least are then deformed for good (``deform``), and the best one is kept.
 """
@@ -99,7 +99,7 @@ class _Frame:
 
     cmap: ConformalMap
     lattice: Lattice
-    turns: int
+    cone_index: int
     around: int | None
     sides: Sides
     first: Floats
@@ -144,14 +144,14 @@ class Straightening:
         cmap: ConformalMap,
         lattice: Lattice,
         settings: PatternSettings,
-        turns: int,
+        cone_index: int,
         loops: list[int],
         chains: list[Chain] | None = None,
     ) -> Straightening:
         """settings: their sizes do not matter. loops: the ones to straighten, polygons. chains: features to
         straighten."""
-        rotation = Isometry(lattice, turns, (0, 0))
-        frame, features = _frame(cmap, lattice, settings, rotation, loops, chains or [])
+        rotation = Isometry(lattice, cone_index, (0, 0))
+        frame, features = frame_of(cmap, lattice, settings, rotation, loops, chains or [])
         lines = lines_of(len(cmap.uv), frame.sides, frame.normal, rotation)
         system = System(cmap, Glued.by_sheets(cmap, rotation), lines.normal)
         return cls(frame, lines, system, Strain.of(system, frame.sides, lines, frame.turned), features)
@@ -182,7 +182,7 @@ def place_by_sides(
     distortion, best, place = min(tried, key=lambda found: found[0] + found[1].extra)
     width = width_per_cell(lattice, angle) * lattice.edge
     around = round(cmap.circumference * abs(best.scale) / width)
-    if frame.turns == 0 and any(best.motion.shift):
+    if frame.cone_index == 0 and any(best.motion.shift):
         around = int(lattice.cells_around(np.array(best.motion.shift)))
     notes = (
         ("phase has no effect: lattice lines on all sides leave no freedom.",) if any(settings.phase) else ()
@@ -214,7 +214,7 @@ def _trials(
     return [
         trial
         for x in _sizes(frame, size, spread)
-        for trial in _trials_at(frame, strain, size * (1 + spread * x) * frame.unit, COST_OF_SIZE * x**2)
+        for trial in trials_at(frame, strain, size * (1 + spread * x) * frame.unit, COST_OF_SIZE * x**2)
     ]
 
 
@@ -223,7 +223,7 @@ def _sizes(frame: _Frame, size: float, spread: float) -> Floats:
     each; for then the places along it are tried, too."""
     if not (frame.sides.loop < 0).any():
         return np.linspace(-1, 1, SCALES)
-    if not frame.sides.closed.any() or frame.turns or frame.cmap.deck.translation == 0:
+    if not frame.sides.closed.any() or frame.cone_index or frame.cmap.deck.translation == 0:
         return np.linspace(-1, 1, SCALES_OF_FEATURES)
     row = frame.lattice.shortest_towards(frame.unit * frame.cmap.deck.translation)
     cells = size * abs(frame.cmap.deck.translation) / abs(complex(frame.lattice.position(row)))
@@ -233,7 +233,7 @@ def _sizes(frame: _Frame, size: float, spread: float) -> Floats:
     return np.asarray((near / cells - 1) / max(spread, 1e-9))
 
 
-def _frame(
+def frame_of(
     cmap: ConformalMap,
     lattice: Lattice,
     settings: PatternSettings,
@@ -264,7 +264,7 @@ def _frame(
     frame = _Frame(
         cmap,
         lattice,
-        rotation.turns,
+        rotation.cone_index,
         settings.around,
         sides,
         first,
@@ -288,7 +288,7 @@ def _common(
     return zero * abs(along) / along if along else zero  # a ring on a disk has no direction
 
 
-def _trials_at(frame: _Frame, strain: Strain, scale: complex, cost_of_size: float) -> list[_Trial]:
+def trials_at(frame: _Frame, strain: Strain, scale: complex, cost_of_size: float) -> list[_Trial]:
     """For every centre the best lines at one scale."""
     lattice, sides, normal = frame.lattice, frame.sides, frame.normal
     first, period = frame.first, frame.period
@@ -302,7 +302,7 @@ def _trials_at(frame: _Frame, strain: Strain, scale: complex, cost_of_size: floa
         moved = np.append(moved, abs(scale))
         moved = strain.nearest(moved, period)
         line = depth + moved[: sides.n]
-        extra = cost_of_size + COST_OF_CORNERS * _misplaced_corners(frame, motion, line)
+        extra = cost_of_size + COST_OF_CORNERS * misplaced_corners(frame, motion, line)
         trials.append(_Trial(scale, origin, motion, line, moved, extra))
     return trials
 
@@ -357,9 +357,9 @@ def _origins(frame: _Frame, scale: complex) -> list[tuple[Isometry, complex]]:
     then: on a cone at the kinds of symmetry centres; for a translation as two sides may lie on lines."""
     lattice, normal, first = frame.lattice, frame.normal, frame.first
     if frame.cmap.deck.apex is not None:
-        return symmetry_centres(lattice, frame.turns)
+        return symmetry_centres(lattice, frame.cone_index)
     shift = _translation(frame, scale * frame.cmap.deck.translation)
-    motion = Isometry(lattice, frame.turns, (int(shift[0]), int(shift[1])))
+    motion = Isometry(lattice, frame.cone_index, (int(shift[0]), int(shift[1])))
     depth = frame.depth * abs(scale)
     across = np.flatnonzero(abs((normal.conj() * normal[0]).imag) > 1e-6)
     if not len(across):
@@ -386,15 +386,15 @@ def _translation(frame: _Frame, wanted: complex) -> Ints:
     if frame.sides.closed.any():
         row = lattice.shortest_towards(wanted)
         return np.asarray(max(1, round(abs(wanted) / abs(complex(lattice.position(row))))) * row)
-    if frame.turns == 0 and frame.around is not None:
+    if frame.cone_index == 0 and frame.around is not None:
         return lattice.ring_near(frame.around, wanted)
     return lattice.translation_near(wanted)
 
 
-def symmetry_centres(lattice: Lattice, turns: int) -> list[tuple[Isometry, complex]]:
-    """Motions p ↦ ζ^turns·p + τ that differ by more than a translation of the lattice, with their fixed
+def symmetry_centres(lattice: Lattice, cone_index: int) -> list[tuple[Isometry, complex]]:
+    """Motions p ↦ ζ^cone_index·p + τ that differ by more than a translation of the lattice, with their fixed
     points: centres of 6-, 4-, 3- or 2-fold symmetry, the highest first."""
-    zeta = np.exp(1j * lattice.step_angle * turns)
+    zeta = np.exp(1j * lattice.step_angle * cone_index)
     e1 = complex(lattice.position(lattice.basis[0]))
     found: list[tuple[Isometry, complex]] = []
     reach = range(-2, 3)
@@ -404,11 +404,11 @@ def symmetry_centres(lattice: Lattice, turns: int) -> list[tuple[Isometry, compl
         centre = complex(lattice.position(shift)) / (1 - zeta)
         apart = [lattice.coordinates(np.array((centre - other) / e1)) for _, other in found]
         if all(abs(a - np.rint(a)).max() > 1e-9 for a in apart):
-            found.append((Isometry(lattice, turns, (int(shift[0]), int(shift[1]))), centre))
+            found.append((Isometry(lattice, cone_index, (int(shift[0]), int(shift[1]))), centre))
     return found
 
 
-def _misplaced_corners(frame: _Frame, motion: Isometry, line: Floats) -> float:
+def misplaced_corners(frame: _Frame, motion: Isometry, line: Floats) -> float:
     """Part of the corners between successive sides that stand badly.
 
     Corners stand well on nodes. Where three edges meet there, though, the lattice is mirrored at the

@@ -24,11 +24,11 @@ from hexwrap_solver.pattern.place.placement import (
     BEARABLE,
     Placement,
     check_phase,
+    cone_index_of,
     edge_angle,
     is_disk,
     is_straight,
     quantized,
-    quantum_turns,
 )
 from hexwrap_solver.pattern.place.sides import has_corners, is_polygon
 from hexwrap_solver.pattern.place.size import FREE, mean_stretch, wanted_edge
@@ -39,8 +39,8 @@ from hexwrap_solver.pattern.types import PatternSettings
 P99, MOST_PREDICTED, MOST_DISTORTED, FINE = 0.99, 0.15, 1.5, 0.02
 #: Features are given up, the costliest first, in so many rounds.
 MOST_GIVEN_UP = 8
-#: So many are told one by one.
-MOST_TOLD = 4
+#: More are not named one by one.
+MOST_NAMED = 4
 
 
 def place_lattice(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings) -> Placement:
@@ -59,7 +59,7 @@ class Placing:
     cmap: ConformalMap
     lattice: Lattice
     shape: PatternSettings
-    turns: int
+    cone_index: int
     loops: list[int]
     features: frozenset[int]
     notes: list[str]
@@ -69,19 +69,19 @@ class Placing:
         check_phase(settings)
         cmap = as_sheet(cmap) if cmap.kind == "net" else quantized(cmap, lattice)
         loops, notes = loops_to_align(cmap, lattice, settings)
-        turns = 0 if cmap.kind == "net" else quantum_turns(cmap, lattice)
+        cone_index = 0 if cmap.kind == "net" else cone_index_of(cmap, lattice)
         features: frozenset[int] = frozenset()
         if cmap.surface.features:
-            every = cls(cmap, lattice, settings, turns, loops, features, notes)
+            every = cls(cmap, lattice, settings, cone_index, loops, features, notes)
             cell = every.cell * mean_stretch(cmap)
-            features, told = worth_following(cmap.surface, cmap.surface.features, cell)
-            notes = [*notes, *told]
-        return cls(cmap, lattice, settings, turns, loops, features, notes)
+            features, sentences = worth_following(cmap.surface, cmap.surface.features, cell)
+            notes = [*notes, *sentences]
+        return cls(cmap, lattice, settings, cone_index, loops, features, notes)
 
     def at(self, settings: PatternSettings) -> Placement:
         """settings: those it was made for, but for the size."""
         cmap, lattice, loops = self.cmap, self.lattice, self.loops
-        along, told = self._along_features(settings)
+        along, sentences = self._along_features(settings)
         if cmap.kind == "net":
             placement = place_on_net(cmap, lattice, settings, loops)
         elif along is not None:
@@ -92,9 +92,12 @@ class Placing:
             placement = self._by_sides(settings)
         else:
             placement = self._freely(settings)
-        if len(told) > MOST_TOLD:
-            told = [*told[:MOST_TOLD], f"The same holds of {len(told) - MOST_TOLD} further folds."]
-        return replace(placement, notes=(*self.notes, *told, *placement.notes))
+        if len(sentences) > MOST_NAMED:
+            sentences = [
+                *sentences[:MOST_NAMED],
+                f"The same holds of {len(sentences) - MOST_NAMED} further folds.",
+            ]
+        return replace(placement, notes=(*self.notes, *sentences, *placement.notes))
 
     @cached_property
     def chains(self) -> list[Chain]:
@@ -118,10 +121,10 @@ class Placing:
                 "On this domain no line of the pattern follows a fold: cells are cut where it falls."
             ]
         chains = narrow(self.chains, self.cmap)
-        told = [self._wide_note(chain) for chain in self.chains if chain not in chains]
+        sentences = [self._wide_note(chain) for chain in self.chains if chain not in chains]
         for _ in range(MOST_GIVEN_UP):
             if not chains:
-                return None, told
+                return None, sentences
             straightening = self._straightened(tuple(chains))
             ratio, _ = predicted(straightening, settings)
             spread = None
@@ -134,7 +137,7 @@ class Placing:
                 if placed.distortion <= MOST_DISTORTED:
                     assert straightening.features is not None
                     return replace(placed, straight=straightening.features.straight), [
-                        *told,
+                        *sentences,
                         *(
                             self._third_note(c)
                             for c in chains
@@ -142,9 +145,11 @@ class Placing:
                         ),
                     ]
             left = self._without_worst(chains, ratio)
-            told += [self._costly_note(chain, straightening, ratio) for chain in chains if chain not in left]
+            sentences += [
+                self._costly_note(chain, straightening, ratio) for chain in chains if chain not in left
+            ]
             chains = left
-        return None, told
+        return None, sentences
 
     def _wide_note(self, chain: Chain) -> str:
         cells = chain.width / self.cell
@@ -202,7 +207,7 @@ class Placing:
         key = frozenset(chain.feature for chain in chains)
         if key not in known:
             known[key] = Straightening.of(
-                self.cmap, self.lattice, self.shape, self.turns, self.loops, list(chains)
+                self.cmap, self.lattice, self.shape, self.cone_index, self.loops, list(chains)
             )
         return known[key]
 
@@ -218,17 +223,19 @@ class Placing:
     @property
     def is_cylinder(self) -> bool:
         """And no disk."""
-        return self.turns == 0 and not is_disk(self.cmap)
+        return self.cone_index == 0 and not is_disk(self.cmap)
 
     @cached_property
     def _straightening(self) -> Straightening:
-        return Straightening.of(self.cmap, self.lattice, self.shape, self.turns, self.loops)
+        return Straightening.of(self.cmap, self.lattice, self.shape, self.cone_index, self.loops)
 
     @cached_property
     def _single_straightenings(self) -> list[Straightening]:
         """Of each of two loops alone."""
         loops = self.loops if len(self.loops) == 2 else []
-        return [Straightening.of(self.cmap, self.lattice, self.shape, self.turns, [loop]) for loop in loops]
+        return [
+            Straightening.of(self.cmap, self.lattice, self.shape, self.cone_index, [loop]) for loop in loops
+        ]
 
     def _freely(self, settings: PatternSettings) -> Placement:
         """Aligned nowhere."""
@@ -237,8 +244,8 @@ class Placing:
         if is_disk(self.cmap):
             return place_on_net(self.cmap, self.lattice, settings)
         if self.cmap.deck.is_translation:
-            return place_on_flat_ring(self.cmap, self.lattice, settings, self.turns)
-        return place_on_cone(self.cmap, self.lattice, settings, self.turns)
+            return place_on_flat_ring(self.cmap, self.lattice, settings, self.cone_index)
+        return place_on_cone(self.cmap, self.lattice, settings, self.cone_index)
 
     def _by_sides(self, settings: PatternSettings) -> Placement:
         """Aligned on as many of the loops as bearable deformations allow."""
@@ -249,18 +256,18 @@ class Placing:
         cost = f"distort cells by {tried.distortion:.2f}, more than {BEARABLE:g}"
         if not np.isfinite(tried.distortion):
             cost = "fold the layout over"
-        told = (
+        sentence = (
             f"To align loop {' and loop '.join(map(str, loops))} at this size would {cost}: smaller cells, "
             "or corners elsewhere, fit better."
         )
         turned = abs(np.rad2deg(turn_between_loops(cmap, lattice, loops)))
         if turned > 1:
-            told += f" The sides of the two loops stand at {turned:.1f}° to each other about the apex."
+            sentence += f" The sides of the two loops stand at {turned:.1f}° to each other about the apex."
         fewer = [place_by_sides(single, settings) for single in self._single_straightenings]
         best = min(fewer, key=lambda placement: placement.distortion, default=tried)
         if best.distortion > BEARABLE:
             best = self._freely(settings)
-        return replace(best, notes=(told, *best.notes))
+        return replace(best, notes=(sentence, *best.notes))
 
 
 def loops_to_align(

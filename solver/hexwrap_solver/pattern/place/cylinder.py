@@ -47,13 +47,13 @@ def place_on_cylinder(
     stretches = np.array([_stretch(strip, rows, lattice, T) if both else 1.0 for T in options])
     pick = int(np.argmin(abs(np.log(stretches))))
     T, stretch = options[pick], float(stretches[pick])
-    told = []
+    sentences = []
     if max(stretch, 1 / stretch) - 1 > BEARABLE:
-        loops, told = loops[:1], [_unbearable(cmap, lattice, angle, stretch)]
+        loops, sentences = loops[:1], [_unbearable(cmap, lattice, angle, stretch)]
         T, stretch = options[0], 1.0
     along = complex(lattice.position(T))
     around = int(lattice.cells_around(T))
-    notes = told + _told(lattice, angle, along)
+    notes = sentences + _direction_notes(lattice, angle, along)
     if loops and settings.phase[1]:
         notes.append("phase moves the pattern only around: its rows are bound to the boundary.")
     scale = abs(along) / strip.length
@@ -142,7 +142,7 @@ def _heights(strip: _Strip, rows: Rows, loops: list[int], scale: float) -> Float
     return line + (strip.place.imag - strip.height[loop]) * scale
 
 
-def _told(lattice: Lattice, angle: float, along: complex) -> list[str]:
+def _direction_notes(lattice: Lattice, angle: float, along: complex) -> list[str]:
     notes = []
     taken = angle_taken(lattice, along, angle)
     if abs(taken - angle) > 1e-9:

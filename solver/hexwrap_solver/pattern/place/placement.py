@@ -69,7 +69,7 @@ class Placement:
     @property
     def narrows(self) -> bool:
         """Whether fewer cells go around some places than others."""
-        return self.motion is None or self.motion.turns != 0
+        return self.motion is None or self.motion.cone_index != 0
 
 
 def quantum_name(lattice: Lattice) -> str:
@@ -77,7 +77,7 @@ def quantum_name(lattice: Lattice) -> str:
     return lattice.kind if lattice.kind in QUANTA else QUANTUM_OF[lattice.kind]
 
 
-def quantum_turns(cmap: ConformalMap, lattice: Lattice) -> int:
+def cone_index_of(cmap: ConformalMap, lattice: Lattice) -> int:
     """The cone angle in turns by ζ. Raises NotAdaptedError where it is no multiple of the quantum (paper,
     definition 2)."""
     quantum, K = lattice.quantum, cmap.deck.angle
@@ -99,7 +99,7 @@ def quantum_turns(cmap: ConformalMap, lattice: Lattice) -> int:
 def quantized(cmap: ConformalMap, lattice: Lattice) -> ConformalMap:
     """The map with exactly the multiple as its cone angle. Near a multiple of 2π even the last of seven
     digits would put an apex, far away, where there is only a translation."""
-    exact = quantum_turns(cmap, lattice) * lattice.step_angle
+    exact = cone_index_of(cmap, lattice) * lattice.step_angle
     if abs(cmap.deck.angle - exact) <= EXACT:
         return cmap
     return cmap.with_domain(deck=Deck(exact, cmap.deck.translation))

@@ -50,11 +50,11 @@ def with_rotation(
     nearest = half * round(angle / half)
     if abs(angle - nearest) < NEARLY:
         angle = nearest
-    told = (
+    sentence = (
         f"Edges follow the {settings.rotation} direction of the surface, at {np.rad2deg(angle):.2f}° to the "
         f"boundary (agreement {abs(mean):.2f} of 1)."
     )
-    return replace(settings, rotation=float(np.rad2deg(angle))), [told]
+    return replace(settings, rotation=float(np.rad2deg(angle))), [sentence]
 
 
 def parameter_directions(cmap: ConformalMap, direction: int) -> Complexes:

@@ -16,7 +16,7 @@ RATIOS = (10.0, 100.0, 1000.0, 12.0, 25.4, 39.37, 304.8)
 USUAL = 1 / 50
 #: The map shrinks a pinch by more than this, relative to the typical place.
 PINCHED = 8.0
-#: Larger ratios are not told.
+#: Larger ratios are not reported.
 MANY = 1_000_000
 
 

@@ -267,7 +267,7 @@ def chords(layout: Layout, boundary: Boundary) -> Chords:
     t = _meeting(boundary, edge, here, way)
     into = lattice.invert(isometry)
     there = lattice.stand(lattice.apply(into, start))
-    way_there = way * lattice.turns[into[:, 0]]
+    way_there = way * lattice.roots_of_unity[into[:, 0]]
     end_t = _meeting(boundary, end_edge, there, way_there)
     came = abs(boundary.tail[edge] + t * (boundary.head - boundary.tail)[edge] - here)
     went = abs(boundary.tail[end_edge] + end_t * (boundary.head - boundary.tail)[end_edge] - there)

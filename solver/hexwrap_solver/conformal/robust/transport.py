@@ -21,17 +21,17 @@ by −(w_j/β_j) times β_i and β_k. The point lies on that side of kl where wh
 negative, and then all three new weights are positive: no subtraction of nearly equal numbers is left that
 matters.
 
-A cell counts as a triangle (i, j, K): K is the unit vector at right angles to the mirror line, towards the
-mirror; ⟨v_i, K⟩ = −m_i / 2 and ⟨K, K⟩ = 1, with m_i the length of the crossing edge at i. All kinds of flips
-then put the other diagonal into a quad (i, l, j, k), any of which may be K, with the same relation, where
-β_k < 0 < β_i, β_j. Down, the diagonal ij becomes the one from x to K (k = x, l = K). Up, the diagonal from
-x to K becomes ij.
+A trapezoid counts as a triangle (i, j, K): K is the unit vector at right angles to the mirror line, towards
+the mirror; ⟨v_i, K⟩ = −m_i / 2 and ⟨K, K⟩ = 1, with m_i the length of the crossing edge at i. All kinds of
+flips then put the other diagonal into a quad (i, l, j, k), any of which may be K, with the same relation,
+where β_k < 0 < β_i, β_j. Down, the diagonal ij becomes the one from x to K (k = x, l = K). Up, the diagonal
+from x to K becomes ij.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -42,11 +42,11 @@ from hexwrap_solver.conformal.robust.mirror import MirrorMesh
 
 @dataclass(frozen=True)
 class Places:
-    """Points in pieces (triangles or cells) of a mirrored mesh.
+    """Points in pieces (triangles or trapezoids) of a mirrored mesh.
 
-    half_edge: (k,) a side of each point's triangle, or the outer half-edge of its cell.
+    half_edge: (k,) a side of each point's triangle, or the outer half-edge of its trapezoid.
     weight: (k, 3) of the vectors of its origin, its end, and its apex or K.
-    power: (k,) which copy of the origin belongs to it, counted as ``MirrorMesh.turn`` is.
+    power: (k,) which copy of the origin belongs to it, counted as ``MirrorMesh.winding`` is.
     """
 
     half_edge: Ints
@@ -55,7 +55,7 @@ class Places:
 
 
 @dataclass(frozen=True)
-class _Flips:
+class Flips:
     """Independent flips from the diagonal (I, J) between pieces (I, J, k) and (J, I, l) to (k, l).
 
     Of the old pieces, for any half-edge of theirs: old: (r,) half-edge. flip: (r,) the flip that replaces it.
@@ -77,35 +77,20 @@ class _Flips:
     relation: Floats
 
 
-@dataclass
-class Trail:
-    """All flips from one triangulation to another, in the order in which they were done."""
-
-    rounds: list[_Flips] = field(default_factory=list)
-
-    def flip(self, mesh: MirrorMesh, edges: Ints, length: Floats, euclidean: bool) -> None:
-        """``delaunay.flip``, taken down."""
-        crossing = mesh.crossing[edges]
-        cell = (mesh.outer[2 * edges] | mesh.outer[2 * edges + 1]) & ~crossing
-        kinds = (_up, crossing), (_down, cell), (_across, ~(crossing | cell))
-        started = [kind(mesh, edges[which], length) for kind, which in kinds if which.any()]
-        delaunay.flip(mesh, edges, length, euclidean)
-        self.rounds += [finish(length, euclidean) for finish in started]
-
-    def follow(self, places: Places, size: int) -> Places:
-        """Where points of the first triangulation are in the last one. size: number of half-edges."""
-        at, weight, power = places.half_edge.copy(), places.weight.copy(), places.power.copy()
-        row = np.full(size, -1)
-        for flips in self.rounds:
-            row[flips.old] = np.arange(len(flips.old))
-            hit = np.flatnonzero(row[at] >= 0)
-            if len(hit):
-                at[hit], weight[hit], power[hit] = _carried(flips, row[at[hit]], weight[hit], power[hit])
-            row[flips.old] = -1
-        return Places(at, weight, power)
+def transport(places: Places, rounds: Iterable[Flips], size: int) -> Places:
+    """Where points of the first triangulation are in the last one. size: number of half-edges."""
+    at, weight, power = places.half_edge.copy(), places.weight.copy(), places.power.copy()
+    row = np.full(size, -1)
+    for flips in rounds:
+        row[flips.old] = np.arange(len(flips.old))
+        hit = np.flatnonzero(row[at] >= 0)
+        if len(hit):
+            at[hit], weight[hit], power[hit] = _carried(flips, row[at[hit]], weight[hit], power[hit])
+        row[flips.old] = -1
+    return Places(at, weight, power)
 
 
-def _carried(flips: _Flips, row: Ints, weight: Floats, power: Ints) -> tuple[Ints, Floats, Ints]:
+def _carried(flips: Flips, row: Ints, weight: Floats, power: Ints) -> tuple[Ints, Floats, Ints]:
     """Points in old pieces ``row`` in the new pieces: half-edges, weights and powers."""
     f, over = flips.flip[row], flips.over[row]
     weight = np.take_along_axis(weight, flips.order[row], axis=1)
@@ -125,17 +110,17 @@ def _carried(flips: _Flips, row: Ints, weight: Floats, power: Ints) -> tuple[Int
     return flips.new[side, f], carried, power + flips.shift[row] + flips.lead[side, f]
 
 
-#: What finishes the record of flips after they are done: it gets the new lengths.
-_Finish = Callable[[Floats, bool], _Flips]
+#: Finishes the record of flips after they are done: it gets the new lengths.
+Finish = Callable[[Floats, bool], Flips]
 #: Half-edges, whether they are sides of the piece at l, ``order``, ``shift``.
 _Old = tuple[Ints, bool, tuple[int, int, int], Ints]
 #: Half-edges, ``sort``, ``lead``.
 _New = tuple[Ints, tuple[int, int, int], Ints]
 
 
-def _record(old: Sequence[_Old], at_i: _New, at_j: _New, relation: Floats) -> _Flips:
+def _record(old: Sequence[_Old], at_i: _New, at_j: _New, relation: Floats) -> Flips:
     count = len(at_i[0])
-    return _Flips(
+    return Flips(
         old=np.concatenate([half_edges for half_edges, _, _, _ in old]),
         flip=np.tile(np.arange(count), len(old)),
         over=np.repeat([over for _, over, _, _ in old], count),
@@ -148,20 +133,20 @@ def _record(old: Sequence[_Old], at_i: _New, at_j: _New, relation: Floats) -> _F
     )
 
 
-def _across(mesh: MirrorMesh, edges: Ints, length: Floats) -> _Finish:
+def across(mesh: MirrorMesh, edges: Ints, length: Floats) -> Finish:
     """Triangles (i, j, k) and (j, i, l) become (i, l, k) and (j, k, l)."""
     h, t = 2 * edges, 2 * edges + 1
     h1, h2, t1, t2 = mesh.next[h], mesh.prev[h], mesh.next[t], mesh.prev[t]
-    e, turn, none = length[edges], mesh.turn, np.zeros(len(edges), dtype=np.int64)
+    e, winding, none = length[edges], mesh.winding, np.zeros(len(edges), dtype=np.int64)
     old = (
         *_triangle(mesh, h),
-        (t, True, (1, 0, 2), turn[t]),
+        (t, True, (1, 0, 2), winding[t]),
         (t1, True, (0, 2, 1), none),
-        (t2, True, (2, 1, 0), -turn[t1]),
+        (t2, True, (2, 1, 0), -winding[t1]),
     )
-    at_i, at_j = (t1, (0, 1, 2), none), (h1, (0, 2, 1), turn[h])
+    at_i, at_j = (t1, (0, 1, 2), none), (h1, (0, 2, 1), winding[h])
 
-    def finish(length: Floats, euclidean: bool) -> _Flips:
+    def finish(length: Floats, euclidean: bool) -> Flips:
         jk, ki, il, lj, kl = (length[x >> 1] for x in (h1, h2, t1, t2, h))
         if euclidean:
             apex, other = delaunay.apex_over(e, ki, jk), np.conj(delaunay.apex_over(e, il, lj))
@@ -174,35 +159,36 @@ def _across(mesh: MirrorMesh, edges: Ints, length: Floats) -> _Finish:
     return finish
 
 
-def _down(mesh: MirrorMesh, edges: Ints, length: Floats) -> _Finish:
-    """Triangle (i, j, x) and cell (j, i, K) become the cells (x, i, K) and (j, x, K)."""
-    below = np.where(mesh.outer[2 * edges], 2 * edges, 2 * edges + 1)
-    h = below ^ 1
+def down(mesh: MirrorMesh, below: Ints, length: Floats) -> Finish:
+    """Triangle (i, j, x) and trapezoid (j, i, K) become the trapezoids (x, i, K) and (j, x, K)."""
+    edges, h = below >> 1, below ^ 1
     h1, h2 = mesh.next[h], mesh.prev[h]
-    turn = mesh.turn
-    old = (*_triangle(mesh, h), (below, True, (1, 0, 2), turn[below]))
-    at_i, at_j = (h2, (2, 0, 1), -turn[h2]), (h1, (0, 2, 1), turn[h])
+    winding = mesh.winding
+    old = (*_triangle(mesh, h), (below, True, (1, 0, 2), winding[below]))
+    at_i, at_j = (h2, (2, 0, 1), -winding[h2]), (h1, (0, 2, 1), winding[h])
     e, m_j, m_i = length[edges], mesh.cross_length(below, length), mesh.cross_length(mesh.next[below], length)
 
-    def finish(length: Floats, euclidean: bool) -> _Flips:
-        relation = _cell_relation(e, length[h2 >> 1], length[h1 >> 1], m_i, m_j, euclidean)
+    def finish(length: Floats, euclidean: bool) -> Flips:
+        relation = _trapezoid_relation(e, length[h2 >> 1], length[h1 >> 1], m_i, m_j, euclidean)
         i, j, pole = relation.T  # of x; those of K are
         return _record(old, at_i, at_j, np.stack([-i, -j, np.ones_like(i)], axis=1) / pole[:, None])
 
     return finish
 
 
-def _up(mesh: MirrorMesh, edges: Ints, length: Floats) -> _Finish:
-    """Cells (x, i, K) and (j, x, K) become triangle (x, i, j) and cell (j, i, K)."""
+def up(mesh: MirrorMesh, edges: Ints, length: Floats) -> Finish:
+    """Trapezoids (x, i, K) and (j, x, K) become triangle (x, i, j) and trapezoid (j, i, K)."""
     below, right = 2 * edges + 1, mesh.next[2 * edges]
     left = mesh.prev[right]
-    turn, none = mesh.turn, np.zeros(len(edges), dtype=np.int64)
-    old = (right, False, (0, 2, 1), none), (left, True, (1, 2, 0), turn[left])
-    at_x, at_pole = (right, (0, 2, 1), none), (below, (1, 2, 0), -turn[left])
+    winding, none = mesh.winding, np.zeros(len(edges), dtype=np.int64)
+    old = (right, False, (0, 2, 1), none), (left, True, (1, 2, 0), winding[left])
+    at_x, at_pole = (right, (0, 2, 1), none), (below, (1, 2, 0), -winding[left])
     m_j, m_i = mesh.cross_length(left, length), mesh.cross_length(mesh.next[right], length)
 
-    def finish(length: Floats, euclidean: bool) -> _Flips:
-        relation = _cell_relation(length[edges], length[right >> 1], length[left >> 1], m_i, m_j, euclidean)
+    def finish(length: Floats, euclidean: bool) -> Flips:
+        relation = _trapezoid_relation(
+            length[edges], length[right >> 1], length[left >> 1], m_i, m_j, euclidean
+        )
         i, j, pole = relation.T  # of x; those of j are
         return _record(old, at_x, at_pole, np.stack([np.ones_like(i), -pole, -i], axis=1) / j[:, None])
 
@@ -214,12 +200,14 @@ def _triangle(mesh: MirrorMesh, h: Ints) -> tuple[_Old, _Old, _Old]:
     second, third = mesh.next[h], mesh.prev[h]
     return (
         (h, False, (0, 1, 2), np.zeros(len(h), dtype=np.int64)),
-        (second, False, (2, 0, 1), -mesh.turn[h]),
-        (third, False, (1, 2, 0), mesh.turn[third]),
+        (second, False, (2, 0, 1), -mesh.winding[h]),
+        (third, False, (1, 2, 0), mesh.winding[third]),
     )
 
 
-def _cell_relation(ij: Floats, xi: Floats, xj: Floats, m_i: Floats, m_j: Floats, euclidean: bool) -> Floats:
+def _trapezoid_relation(
+    ij: Floats, xi: Floats, xj: Floats, m_i: Floats, m_j: Floats, euclidean: bool
+) -> Floats:
     """(f, 3) β with v_x = β_i v_i + β_j v_j + β_K K, from log-lengths."""
     if euclidean:
         slope = (np.exp(m_j - ij) - np.exp(m_i - ij)) / 2  # K is (−slope, −along) where i = 0, j = 1
