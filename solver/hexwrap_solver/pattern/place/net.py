@@ -188,7 +188,7 @@ def _on_fitted(
     motions = holonomy_of(cmap, lattice, net)
     rows = np.zeros((len(motions.turn), 4), dtype=np.int64)
     rows[:, 0] = motions.turn
-    wanted = A * motions.translation + B * (1 - lattice.turns[motions.turn])
+    wanted = A * motions.translation + B * (1 - lattice.roots_of_unity[motions.turn])
     rows[:, 1:3] = lattice.translations_near(wanted)
     off = abs(lattice.position(rows[:, 1:3]) - wanted)
     return (net, (0.0, A, B, rows)) if off.max() < NEARLY else None
@@ -249,7 +249,7 @@ def _shifts(
     turning = np.flatnonzero(motions.turn)
     if len(turning):
         off = lattice.position(rows[turning, 1:3]) - A * motions.translation[turning]
-        turn = 1 - lattice.turns[motions.turn[turning]]
+        turn = 1 - lattice.roots_of_unity[motions.turn[turning]]
         return np.array([(turn.conj() * off).sum() / (abs(turn) ** 2).sum()])
     anchor = int(np.flatnonzero(cmap.surface.faces.ravel() == anchor_vertex(cmap))[0])
     at = A * complex(cmap.corners().ravel()[anchor])
