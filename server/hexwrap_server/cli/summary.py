@@ -42,7 +42,9 @@ def print_summary(console: Console, name: str, result: dict[str, Any]) -> None:
     if result["panels"] is not None:
         console.print(_sizes(result["sizes"]))
         if result["quality"]["trade_off"]:
-            console.print(_trade_off(result["quality"]["trade_off"], len(result["sizes"])))
+            console.print(
+                _trade_off(result["quality"]["trade_off"], sum(not size["fold"] for size in result["sizes"]))
+            )
     if result["quality"].get("singularity_curve"):
         console.print(_curve(result["quality"]["singularity_curve"]))
     for note in (*result["mesh"]["repairs"], *result["quality"]["notes"]):
@@ -79,7 +81,8 @@ def _panels(result: dict[str, Any]) -> Rows:
     if result["panels"] is None:
         return
     yield "", str(len(result["panels"]["face"]))
-    yield "sizes", str(len(result["sizes"]))
+    along = sum(size["fold"] for size in result["sizes"])
+    yield "sizes", str(len(result["sizes"]) - along) + (f", and {along} types along folds" if along else "")
     yield "distinct", str(result["quality"]["distinct_panels"])
     yield "overlaps", str(result["quality"]["overlaps"])
     yield "coverage", f"{result['quality']['coverage']:.1%}"
