@@ -63,6 +63,9 @@ DECISIVE = 1e9
 #: Distances from planes / ℓ below this are rounding; Newton's method takes at most so many steps to it.
 FLAT, NEWTON_STEPS = 1e-12, 12
 
+#: Of coordinates, relative to them.
+ROUNDING = 1e-15
+
 #: See ``_flattened``.
 HEADWAY = 0.3
 
@@ -150,7 +153,7 @@ def minimise_watertight(
     problem = _Problem(pattern, length, replace(aims, weights=weights), surface)
     points = pattern.vertices
     curve: list[float] = []
-    if aims.flat and problem.bend(points) >= FLAT:
+    if aims.flat and not problem.flat(points):
         points = points + NUDGE * pattern.edge_length * _nudges(pattern)
     stages, most, enough = FLATNESS, MOST_STEPS, ENOUGH
     if not aims.flat:
@@ -176,13 +179,14 @@ def minimise_watertight(
             if stage == len(stages):
                 break
             flat = _flattened(problem, points, HEADWAY) if stage >= USUAL else points
-            if stage >= USUAL and problem.bend(flat) < FLAT:
+            if stage >= USUAL and problem.flat(flat):
                 points = flat
                 break
-    if aims.flat and problem.bend(points) >= FLAT:
+    if aims.flat and not problem.flat(points):
         progress(0.9, "flattening")
         points = _flattened(problem, points)
-    curve.append(problem.at(points).asked)
+    if aims.flat:
+        curve.append(problem.at(points).asked)
     energy = np.array(curve)
     return points, factor * energy[np.isfinite(energy)]  # Newton's method may end beyond the barrier
 
@@ -231,10 +235,10 @@ def _flattened(problem: _Problem, points: Floats, headway: float = 1.0) -> Float
                 break
             swift = best.planes < WORTH**2 * state.planes
             state = best
-            if not swift or problem.bend(state.points) < FLAT:
+            if not swift or problem.flat(state.points):
                 break
         points = state.points
-        if state is start or problem.bend(points) < FLAT or state.planes > headway * start.planes:
+        if state is start or problem.flat(points) or state.planes > headway * start.planes:
             break
     return points
 
@@ -347,6 +351,11 @@ class _Problem:
             except np.linalg.LinAlgError:
                 return np.inf
 
+    def flat(self, points: Floats) -> bool:
+        """But for rounding, which far from the origin is more."""
+        rounding = ROUNDING * float(np.abs(self._start).max(initial=0.0)) / self._unit
+        return self.bend(points) < max(FLAT, rounding)
+
     def step(self, state: _State, *, planes_only: bool = False) -> Floats:
         """(n, 3) Gauss–Newton step from a state with the derivatives taken last."""
         gradient = np.zeros(state.points.size)
@@ -397,7 +406,8 @@ def _lifted(points: Floats, face: Ints, weight: Floats, surface: Surface) -> tup
         for _ in range(PROJECTIONS):
             mean = np.einsum("nc,ncd->nd", weight, normal)
             lifted = vertex + height[:, None, None] * normal
-            miss = points - np.einsum("nc,ncd->nd", weight, lifted)
+            # Differences of coordinates come first: far from the origin their digits are all there is.
+            miss = np.einsum("nc,ncd->nd", weight, points[:, None] - lifted)
             sides = lifted[:, 1:] - lifted[:, :1]
             more = _solved(np.concatenate([sides, mean[:, None]], axis=1), miss)
             weight = weight + np.concatenate([-more[:, :1] - more[:, 1:2], more[:, :2]], axis=1)
