@@ -35,6 +35,7 @@ from hexwrap_solver.panels.energy.residuals import (
     plane_slopes,
     residuals,
 )
+from hexwrap_solver.panels.polygons import mean_edges
 from hexwrap_solver.panels.types import Weights
 from hexwrap_solver.pattern.types import Pattern
 from hexwrap_solver.surface.types import Surface
@@ -154,7 +155,7 @@ def minimise_watertight(
     points = pattern.vertices
     curve: list[float] = []
     if aims.flat and not problem.flat(points):
-        points = points + NUDGE * pattern.edge_length * _nudges(pattern)
+        points = points + NUDGE * _nudges(pattern)
     stages, most, enough = FLATNESS, MOST_STEPS, ENOUGH
     if not aims.flat:
         stages, most, enough = (0.0,), ONLY_STEPS, ONLY_ENOUGH
@@ -244,8 +245,8 @@ def _flattened(problem: _Problem, points: Floats, headway: float = 1.0) -> Float
 
 
 def _nudges(pattern: Pattern) -> Floats:
-    """(n, 3) along the normals, of order 1, the same for vertices that are alike in their ring: a surface of
-    revolution keeps its symmetry."""
+    """(n, 3) along the normals, of the order of the edges beside them, the same for vertices that are alike
+    in their ring: a surface of revolution keeps its symmetry."""
     faces = pattern.faces
     corner = np.arange(len(faces.values)) - faces.offsets[faces.row]
     kind = pattern.ring[faces.row] * (int(faces.lengths.max()) + 1) + corner
@@ -253,7 +254,9 @@ def _nudges(pattern: Pattern) -> Floats:
     np.minimum.at(least, faces.values.astype(np.int64), kind)
     _, kind = np.unique(least, return_inverse=True)
     size = np.random.default_rng(0).normal(size=int(kind.max()) + 1)
-    return np.asarray(size[kind][:, None] * pattern.normals)
+    n, edge = len(pattern.vertices), mean_edges(pattern.cells)[faces.row]
+    length = np.bincount(faces.values, edge, n) / np.maximum(np.bincount(faces.values, minlength=n), 1)
+    return np.asarray((size[kind] * length)[:, None] * pattern.normals)
 
 
 class _Problem:
@@ -364,7 +367,9 @@ class _Problem:
         parts = len(self._groups) if planes_only else len(self._corners)
         for corner, slope, residual in zip(self._corners[:parts], self._slopes, state.residual, strict=False):
             some = slice(-corner.shape[1] if planes_only else 0, None)
-            share = (residual[:, None, some] @ slope[:, some]).ravel()
+            # Beyond the barrier residuals are ∞ and slopes 0.
+            pull = np.where(np.isfinite(residual), residual, 0.0)
+            share = (pull[:, None, some] @ slope[:, some]).ravel()
             at = 3 * corner[..., None] + np.arange(3)
             gradient += np.bincount(at.ravel(), weights=share, minlength=gradient.size)
         return -self._matrix.solve(gradient).reshape(-1, 3)
