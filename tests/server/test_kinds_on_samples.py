@@ -19,7 +19,7 @@ from hexwrap_solver.pattern.types import Kind, Pattern
 from hexwrap_solver.pipeline import PlainRunner, Solution, solve
 
 #: Samples whose own corners, cones or singularities a kind cannot follow are refused in one of these words.
-REFUSED = ("multiple of", "closes", "singularit", "corner")
+REFUSED = ("multiple of", "close", "singularit", "corner")
 
 QUICK = [("dome", "trihexagonal"), ("cone", "rhombitrihexagonal"), ("ring", "truncated-hexagonal")]
 

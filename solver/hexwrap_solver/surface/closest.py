@@ -141,7 +141,7 @@ class TriangleTree:
     def _distance(self, points: Floats, face: Ints) -> Floats:
         """(k,) distance of each point from a triangle of its own."""
         second, third, height = np.einsum("kij,kj->ik", self._frames[face], points - self.corners[face, 0])
-        distance = np.abs(height)
+        distance: Floats = np.abs(height)
         outer = np.flatnonzero(~((second >= 0) & (third >= 0) & (second + third <= 1)))
         distance[outer] = nearest_in_triangles(points[outer], self.corners[face[outer]])[1]
         return distance
