@@ -425,7 +425,7 @@ def circles_and_lines_are_lifted():
 
 
 def curves_are_features():
-    """A ring wired to Features lies on a line of the pattern; an empty wire is none."""
+    """A ring wired to Features becomes one that the pattern follows at its height; an empty wire is none."""
     angles = [2.0 * math.pi * k / 24 for k in range(25)]
     ring = array([(1.25 * math.cos(a), 1.25 * math.sin(a), 3.0) for a in angles])
     send = done(Features=[None, ring])
@@ -433,7 +433,7 @@ def curves_are_features():
     pattern = world.ask(PORT, "GET", path + "/result?include=pattern")[1]["pattern"]
     (chain,) = pattern["features"]
     assert pattern["along"][0]["straight"] and len(chain) >= 16
-    assert max(abs(pattern["vertices"][v][2] - 3.0) for v in chain) < 1e-9
+    assert max(abs(pattern["vertices"][v][2] - 3.0) for v in chain) < 0.05  # cells are 0.6 high
 
 
 def the_front_can_be_sent():
