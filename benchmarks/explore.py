@@ -67,7 +67,7 @@ def main() -> None:
                 print(found[0], flush=True)
     print(f"The greatest difference: {worst:.2f}")
     if asked.write:
-        text = f"\n{chr(10).join(table)}\n\nThe greatest difference is {worst:.2f} per cent of the area.\n"
+        text = f"\n{chr(10).join(table)}\n"
         before, rest = PAGE.read_text(encoding="utf-8").split(BEGIN)
         PAGE.write_text(f"{before}{BEGIN}{text}{END}{rest.split(END)[1]}", encoding="utf-8")
 
@@ -88,7 +88,7 @@ def row(name: str, surface: Surface, mode: str, pattern: PatternSettings) -> tup
         panels = quantize(fitted, PanelSettings(sizes=sizes)).polygons
         measured = 1 - float(fan_areas(panels).sum()) / cells
         figures.append((100 * seen.foresee(sizes).uncovered, 100 * measured))
-    words = (f"{foreseen:.2f} / {measured:.2f}" for foreseen, measured in figures)
+    words = (f"{abs(foreseen):.2f} / {measured:.2f}" for foreseen, measured in figures)
     line = "| " + " | ".join([name, mode, str(laid.n_cells), *words, f"{seconds:.2f}"]) + " |"
     return line, max(abs(foreseen - measured) for foreseen, measured in figures)
 

@@ -72,5 +72,5 @@ def test_the_curl_example_is_solved() -> None:
     assert not isinstance(request.surface, str)
     solution = run_stages(request.surface, request.wanted, PlainRunner())
     assert solution.panels is not None
-    assert len(solution.panels.class_length) <= 5
+    assert solution.panels.n_sizes <= 5
     assert solution.quality.overlaps == 0

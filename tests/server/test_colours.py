@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -13,10 +16,12 @@ from hexwrap_server.output.colours import (
     gradient,
     linear,
     panel_colours,
+    shapes,
     size_colours,
     to_hex,
 )
 from hexwrap_server.output.text import angle, length, one_line
+from hexwrap_solver.arrays import Ragged
 
 
 def test_the_gradient_goes_through_its_anchors() -> None:
@@ -71,3 +76,22 @@ def test_lengths_have_four_digits(value: float, words: str) -> None:
 
 def test_a_title_is_one_line() -> None:
     assert one_line("a\nb\x00\tc  ü") == "a b c ü"
+
+
+def test_watertight_panels_are_told_apart_by_shape() -> None:
+    """Convex ones cold, others warm, those cut at the boundary of no shape; most corners first."""
+    square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    dart = np.array([[0.0, 0, 0], [1, 0, 0], [0.2, 0.2, 0], [0, 1, 0]])
+    outlines = [square[:3], square, dart, square, square[:3]]
+    polygons = Ragged(np.concatenate(outlines), np.cumsum([0, *map(len, outlines)]))
+    panels: Any = SimpleNamespace(
+        polygons=polygons,
+        normal=np.tile([0.0, 0, 1], (5, 1)),
+        whole=np.array([True, True, True, True, False]),
+    )
+    index, kinds, tints = shapes(panels)
+    assert kinds == [(4, True), (3, True), (4, False)]
+    assert index.tolist() == [1, 0, 2, 0, -1]
+    red, _, blue = from_hex(tints).T
+    assert red[0] < blue[0]
+    assert red[2] > blue[2]

@@ -7,6 +7,7 @@ and edges of the mesh that are at fault.
 # include: wire canvas choices meshes
 
 
+STEPS = 100  # pieces of a curve that is no polyline
 MODES = ["auto", "straight", "angles", "isometric", "isometric optimal"]
 
 
@@ -21,13 +22,29 @@ def part_of_request(text, name):
     return part
 
 
-def request_body(mode, parts, name):
-    """The request but for the geometry. parts: (text, key of the request). Raises Refusal."""
+def feature_lines(curves):
+    """Points along each curve; the corners of a polyline stay corners."""
+    lines = []
+    for curve in curves or []:
+        if curve is None:
+            continue
+        found, drawn = curve.TryGetPolyline()
+        points = list(drawn) if found else [curve.PointAt(t) for t in curve.DivideByCount(STEPS, True)]
+        if not found and curve.IsClosed:
+            points.append(points[0])
+        lines.append([[p.X, p.Y, p.Z] for p in points])
+    return lines
+
+
+def request_body(mode, parts, name, lines=()):
+    """The request but for the geometry. parts: (text, key of the request). lines: features. Raises Refusal."""
     unit = model_unit()
     body = {"name": TEXT(name) if name else "grasshopper", "surface": {"unit": unit} if unit else {}}
     for text, key in parts:
         if text:
             body.update(part_of_request(text, key))
+    if lines:
+        body["surface"]["features"] = {"lines": lines}
     mode = choice(mode, MODES, "Mode")
     if mode == "angles" and "boundary" not in body:
         raise Refusal("Mode is angles, but no angles came: wire the component Boundary Angles to Angles.")
@@ -118,7 +135,7 @@ def request(slot):
     server = "http://%s:%d" % (TEXT(IP).strip() if IP else "127.0.0.1", int(Port or 6789))
     TOKENS[server] = TEXT(Token) if Token else None
     parts = ((Angles, "boundary"), (Pattern, "pattern"), (Panels, "panels"), (Singularities, "singularities"))
-    body = request_body(Mode, parts, Name)
+    body = request_body(Mode, parts, Name, feature_lines(Features))
     key = "%s %d" % (type(Mesh).__name__, Mesh.DataCRC(0))
     wanted = (server, key, json_text(body))
     if slot["wanted"] != wanted:

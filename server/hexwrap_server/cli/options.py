@@ -22,6 +22,7 @@ FLAGS: dict[Path, str] = {
     ("panels", "weights", "angle"): "--weight-angle",
     ("panels", "weights", "edge"): "--weight-edge",
     ("panels", "weights", "surface"): "--weight-surface",
+    ("panels", "fold"): "--at-folds",
     ("surface", "features", "angle"): "--fold",
     ("surface", "features", "lines"): "--feature-lines",
 }

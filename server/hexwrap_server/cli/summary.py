@@ -42,7 +42,9 @@ def print_summary(console: Console, name: str, result: dict[str, Any]) -> None:
     if result["panels"] is not None:
         console.print(_sizes(result["sizes"]))
         if result["quality"]["trade_off"]:
-            console.print(_trade_off(result["quality"]["trade_off"], len(result["sizes"])))
+            console.print(
+                _trade_off(result["quality"]["trade_off"], sum(not size["fold"] for size in result["sizes"]))
+            )
     if result["quality"].get("singularity_curve"):
         console.print(_curve(result["quality"]["singularity_curve"]))
     for note in (*result["mesh"]["repairs"], *result["quality"]["notes"]):
@@ -79,7 +81,8 @@ def _panels(result: dict[str, Any]) -> Rows:
     if result["panels"] is None:
         return
     yield "", str(len(result["panels"]["face"]))
-    yield "sizes", str(len(result["sizes"]))
+    along = sum(size["fold"] for size in result["sizes"])
+    yield "sizes", str(len(result["sizes"]) - along) + (f", and {along} types along folds" if along else "")
     yield "distinct", str(result["quality"]["distinct_panels"])
     yield "overlaps", str(result["quality"]["overlaps"])
     yield "coverage", f"{result['quality']['coverage']:.1%}"
@@ -103,7 +106,10 @@ def _quality(result: dict[str, Any]) -> Rows:
     yield "off the surface", f"at most {_length(found['surface_distance']['max'])}"
     if result["panels"]["mode"] == "watertight":
         yield "moved", f"at most {_length(found['movement'])}"
-        yield "convex", f"{found['convex']:.1%}"
+        yield (
+            "convex",
+            f"{found['convex']:.1%}" + (f" ({left} are not)" if (left := found["not_convex"]) else ""),
+        )
         if found["kink"]["max"] is not None:
             yield "kinks", f"at most {angle(found['kink']['max'])}"
 

@@ -69,6 +69,9 @@ _PANELS = _all(
     center=listed(POINT),
     normal=listed(POINT),
     whole=listed(_TRUTH),
+    bend=listed(nullable(listed(_INDEX, 2))),
+    bend_angle=listed(NUMBER),
+    other_face=listed({"type": "integer", "minimum": -1}),
 )
 _SIZE = _all(
     size=_INDEX,
@@ -76,6 +79,7 @@ _SIZE = _all(
     count=_COUNT,
     sides=_COUNT,
     color=_TEXT | {"pattern": "^#[0-9a-fA-F]{6}$"},
+    fold=_TRUTH,
 )
 _CURVE = _all(
     sizes=_COUNT,

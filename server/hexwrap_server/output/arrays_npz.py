@@ -14,6 +14,7 @@ from hexwrap_server.output.wire import fields
 from hexwrap_solver.arrays import Ragged
 from hexwrap_solver.conformal.net import Net
 from hexwrap_solver.conformal.types import ConformalMap
+from hexwrap_solver.panels.folds import bend_angles, hinges_of
 from hexwrap_solver.pipeline import Solution
 
 Arrays = dict[str, NDArray[np.generic]]
@@ -35,6 +36,8 @@ def result_npz(solution: Solution, meta: Meta) -> bytes:
     if solution.panels is not None:
         names = "face size edge_length limit center normal whole energy polygons"
         arrays |= _named("panels", fields(solution.panels, names))
+        bends = {"bend": hinges_of(solution.panels), "bend_angle": bend_angles(solution.panels)}
+        arrays |= _named("panels", bends)
         sizes = {"edge_length": solution.panels.class_length, "count": solution.panels.class_count}
         arrays |= _named("sizes", sizes)
     if solution.components is not None:

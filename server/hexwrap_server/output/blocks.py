@@ -13,7 +13,10 @@ import numpy as np
 from hexwrap_server.output.colours import UNSIZED, class_colours
 from hexwrap_server.output.layers import size_name
 from hexwrap_solver.arrays import Floats, Ints, Ragged
+from hexwrap_solver.geometry import normalize
 from hexwrap_solver.panels.components import triangulated
+from hexwrap_solver.panels.folds import halves_of_ring, hinges_of
+from hexwrap_solver.panels.polygons import area_vectors
 from hexwrap_solver.panels.types import Components, Panels
 
 #: How far corners of panels of one block may differ, in parts of the edge length.
@@ -35,7 +38,8 @@ class Shape:
 class Blocks:
     """block: (q,) the block of each panel, −1 for a shape of its own. size: (b,) of each block.
     origin: (q, 3); axes: (q, 3, 3) rows x, y, z of each panel's plane. made_from: (b,) the panel drawn as
-    block.
+    block. hinge: (q,) the corner to which each panel is bent from its first one, −1: flat. solid: corners of
+    the bodies, those of the outline and then as many above.
     """
 
     block: Ints
@@ -44,7 +48,8 @@ class Blocks:
     origin: Floats
     axes: Floats
     outline: Ragged
-    thickness: float
+    hinge: Ints
+    solid: Ragged | None
 
     @classmethod
     def of(cls, panels: Panels, components: Components | None = None) -> Blocks:
@@ -54,11 +59,12 @@ class Blocks:
         else:
             outline, origin = components.outline, components.origin
             axes = np.stack([components.x_axis, components.y_axis, components.z_axis], axis=1)
-        row = outline.row
-        arms = np.asarray(outline.values, dtype=np.float64) - origin[row]
-        local = Ragged(np.einsum("pij,pj->pi", axes[row], arms), outline.offsets)
+        local = _seen(outline, origin, axes)
+        solid = None
+        if components is not None and components.solid_vertices is not None:
+            solid = _seen(components.solid_vertices, origin, axes)
         block, size, made_from = _alike(local, panels)
-        return cls(block, size, made_from, origin, axes, local, _thickness(components, origin, axes))
+        return cls(block, size, made_from, origin, axes, local, hinges_of(panels), solid)
 
     @property
     def alone(self) -> Ints:
@@ -69,18 +75,31 @@ class Blocks:
         """The panel in its own plane."""
         base: Floats = np.asarray(self.outline[panel], dtype=np.float64)
         n = len(base)
-        triangles = triangulated(Ragged(base, np.array([0, n])), np.array([[0.0, 0.0, 1.0]]))
-        ring = list(range(n))
-        if self.thickness <= 0:
-            return Shape(base, [ring], triangles, False)
-        points = np.concatenate([base, base + np.array([0.0, 0.0, self.thickness])])
+        parts = halves_of_ring(list(range(n)), int(self.hinge[panel]))
+        triangles = np.concatenate([np.array(part)[_triangles(base[part])] for part in parts])
+        if self.solid is None:
+            return Shape(base, parts, triangles, False)
+        points: Floats = np.asarray(self.solid[panel], dtype=np.float64)
         sides = [[k, (k + 1) % n, (k + 1) % n + n, k + n] for k in range(n)]
-        faces = [ring[::-1], [k + n for k in ring], *sides]
+        faces = [*(part[::-1] for part in parts), *([k + n for k in part] for part in parts), *sides]
         halves = np.array([[[a, b, c], [a, c, d]] for a, b, c, d in sides]).reshape(-1, 3)
         return Shape(points, faces, np.concatenate([triangles[:, ::-1], triangles + n, halves]), True)
 
     def name(self, block: int) -> str:
         return size_name(int(self.size[block]))
+
+
+def _seen(points: Ragged, origin: Floats, axes: Floats) -> Ragged:
+    """Rows of points from each panel's own plane."""
+    row = points.row
+    arms = np.asarray(points.values, dtype=np.float64) - origin[row]
+    return Ragged(np.einsum("pij,pj->pi", axes[row], arms), points.offsets)
+
+
+def _triangles(part: Floats) -> Ints:
+    """(n − 2, 3) of a flat outline (n, 3)."""
+    outline = Ragged(part, np.array([0, len(part)]))
+    return triangulated(outline, normalize(area_vectors(outline)))
 
 
 def frames(panels: Panels) -> Floats:
@@ -116,11 +135,3 @@ def _alike(local: Ragged, panels: Panels) -> tuple[Ints, Ints, Ints]:
         sizes.append(size)
         made_from.append(int(first))
     return block, np.array(sizes, dtype=np.int64), np.array(made_from, dtype=np.int64)
-
-
-def _thickness(components: Components | None, origin: Floats, axes: Floats) -> float:
-    """Of the bodies, which all stand equally high on their outlines."""
-    if components is None or components.solid_vertices is None:
-        return 0.0
-    arms = np.asarray(components.solid_vertices[0], dtype=np.float64) - origin[0]
-    return float(np.ptp(arms @ axes[0, 2]))

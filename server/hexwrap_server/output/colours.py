@@ -71,9 +71,15 @@ def size_colours(n: int) -> list[str]:
 
 
 def class_colours(panels: Panels) -> list[str]:
-    """One colour per size class, and one for all special panels after them."""
+    """One colour per size class; pieces along folds have that of the size nearest to theirs, single ones of
+    them none, and all special panels one."""
     n = panels.n_sizes
-    return size_colours(n) + [SPECIAL] * (len(panels.class_length) - n)
+    regular = size_colours(n)
+    colours = regular + [SPECIAL] * (len(panels.class_length) - n)
+    for k in np.flatnonzero(panels.divided).tolist():
+        near = int(np.argmin(np.abs(panels.class_length[:n] - panels.class_length[k]))) if n else -1
+        colours[k] = UNSIZED if near < 0 or panels.class_count[k] == 1 else regular[near]
+    return colours
 
 
 def shapes(panels: Panels) -> tuple[Ints, list[tuple[int, bool]], list[str]]:

@@ -8,6 +8,7 @@ from hexwrap_server.output.drawing import drawing, encode
 from hexwrap_server.output.layers import size_layers
 from hexwrap_server.output.meta import Meta, panels_of
 from hexwrap_solver.arrays import Floats
+from hexwrap_solver.panels.folds import hinges_of
 from hexwrap_solver.pipeline import Solution
 
 #: Height of the labels in edge lengths.
@@ -22,6 +23,10 @@ def panels_dxf(solution: Solution, meta: Meta) -> bytes:
     layers = {size: layer.name for size, layer in size_layers(panels).items()}
     for points, size in zip(panels.polygons.to_lists(), panels.size.tolist(), strict=True):
         space.add_polyline3d(points, close=True, dxfattribs={"layer": layers[size]})
+    hinges = hinges_of(panels)
+    for row in np.flatnonzero(hinges >= 0).tolist():
+        start, end = np.asarray(panels.polygons[row])[[0, hinges[row]]].tolist()
+        space.add_line(start, end, dxfattribs={"layer": layers[int(panels.size[row])]})
     names = pattern.labels()
     centres = object_coordinates(panels.center, panels.normal).tolist()
     for face, centre, normal, edge in zip(

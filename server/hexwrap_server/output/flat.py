@@ -6,7 +6,7 @@ What is cut lies on layers ``cut-…``, one per size; what is engraved, all of i
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,6 +19,7 @@ from hexwrap_server.output.table import neighbour_labels
 from hexwrap_server.output.text import length, lengths, one_line
 from hexwrap_server.output.units import unit_of
 from hexwrap_solver.arrays import Floats, Ints, Ragged
+from hexwrap_solver.panels.folds import blanks
 from hexwrap_solver.panels.types import Panels
 from hexwrap_solver.pattern.types import Pattern
 from hexwrap_solver.pipeline import Solution
@@ -70,7 +71,8 @@ def flat_dxf(solution: Solution, meta: Meta) -> bytes:
     """Outlines at full size, seen from outside, first edges horizontal, sheets side by side.
 
     Inside each outline stand label, size and an arrow that points up; along each edge the label of the
-    panel across it. Raises SheetError where a panel is larger than the sheet.
+    panel across it. Bent panels are unfolded, with their bend line on a layer of its own. Raises
+    SheetError where a panel is larger than the sheet.
     """
     pattern, panels = panels_of(solution, "flat.dxf")
     outlines = lay_flat(panels)
@@ -78,8 +80,9 @@ def flat_dxf(solution: Solution, meta: Meta) -> bytes:
     names = [labels[face] for face in panels.face.tolist()]
     group = groups(panels, pattern, meta.group)
     places = pack(outlines.extent, panels.size, sheet_size(outlines.extent, meta), names, group)
+    bent = ("bend",) if panels.bends is not None else ()
     document = drawing(
-        panels, meta, "sheets", "engrave-label", "engrave-up", "engrave-neighbours", prefix="cut-"
+        panels, meta, "sheets", "engrave-label", "engrave-up", "engrave-neighbours", *bent, prefix="cut-"
     )
     space = document.modelspace()
     step = 1.1 * places.size[0]
@@ -90,6 +93,9 @@ def flat_dxf(solution: Solution, meta: Meta) -> bytes:
     laid = Ragged(corners, outlines.corners.offsets)
     for points, size in zip(laid.to_lists(), panels.size.tolist(), strict=True):
         space.add_lwpolyline(points, close=True, dxfattribs={"layer": layers[size]})
+    if panels.bends is not None:
+        for start, hinge in zip(laid.offsets[panels.bends.panel], panels.bends.hinge, strict=True):
+            space.add_lwpolyline(corners[[start, start + hinge]].tolist(), dxfattribs={"layer": "bend"})
     _write_inside(space, laid, panels, names, outlines.up)
     _write_along(space, laid, neighbour_labels(pattern, panels))
     return encode(document)
@@ -139,13 +145,15 @@ def _draw_sheets(space: Modelspace, places: Places, group: Ints, step: float, me
 
 
 def lay_flat(panels: Panels) -> Outlines:
-    """The outlines in their planes, seen from outside, with the first edge along x."""
-    polygons = panels.polygons
-    rows, first, axes = polygons.row, polygons.offsets[:-1], frames(panels)[:, :2]
+    """The outlines in their planes, unfolded where they are bent, seen from outside, with the first edge
+    along x."""
+    polygons, normal = blanks(panels)
+    rows, first = polygons.row, polygons.offsets[:-1]
+    axes = frames(replace(panels, polygons=polygons, normal=normal))[:, :2]
     arms = np.asarray(polygons.values, dtype=np.float64) - panels.center[rows]
     flat = np.einsum("kij,kj->ki", axes[rows], arms)
     low = np.minimum.reduceat(flat, first)
-    upward = np.where(np.abs(panels.normal[:, 2]) > LEVEL, 1, 2)
+    upward = np.where(np.abs(normal[:, 2]) > LEVEL, 1, 2)
     up = axes[np.arange(len(axes)), :, upward]
     up /= np.linalg.norm(up, axis=1, keepdims=True)
     return Outlines(Ragged(flat - low[rows], polygons.offsets), np.maximum.reduceat(flat, first) - low, up)

@@ -82,22 +82,27 @@ def _title(axes: Axes, top: float, name: str) -> None:
 
 def _legend(axes: Axes, height: int, panels: Panels, meta: Meta, unit: str) -> None:
     n_sizes = len(panels.class_length)
-    rows = n_sizes if n_sizes <= ROWS else 10
-    cut = int(np.sum(panels.size < 0))
-    top = (height - ROW * (rows + (cut > 0))) / 2
+    shown = n_sizes if n_sizes <= ROWS else panels.n_sizes
+    rows = shown if shown <= ROWS else 10
+    others = [
+        (f"{n_sizes - shown:,} other types", int(np.sum(panels.size >= shown))),
+        ("of no size class", int(np.sum(panels.size < 0))),
+    ]
+    others = [(words, count) for words, count in others if count]
+    top = (height - ROW * (rows + len(others))) / 2
     _title(axes, top - 96, text.one_line(meta.name))
     named = panels.n_sizes
     sizes = {0: "", 1: ", 1 size"}.get(named, f", {named:,} sizes")
     axes.text(0, top - 48, f"{panels.n_panels:,} panels{sizes}", size=17, color=GREY, va="center")
-    if n_sizes <= ROWS:
-        _swatches(axes, top, panels, unit)
+    if shown <= ROWS:
+        _swatches(axes, top, panels, unit, shown)
     else:
         _bar(axes, top, rows * ROW - 20, panels, unit)
-    if cut:
-        y = top + ROW * (rows + 0.5)
+    for k, (words, count) in enumerate(others):
+        y = top + ROW * (rows + k + 0.5)
         _swatch(axes, y, panels, colours.UNSIZED)
-        axes.text(64, y, "of no size class", size=17, color=GREY, va="center")
-        axes.text(WIDTH - 60, y, f"{cut:,}", size=17, color=GREY, va="center", ha="right")
+        axes.text(64, y, words, size=17, color=GREY, va="center")
+        axes.text(WIDTH - 60, y, f"{count:,}", size=17, color=GREY, va="center", ha="right")
 
 
 def _shapes(axes: Axes, height: int, panels: Panels, meta: Meta, unit: str) -> None:
@@ -121,10 +126,10 @@ def _shapes(axes: Axes, height: int, panels: Panels, meta: Meta, unit: str) -> N
         axes.text(WIDTH - 30, y, f"{len(edge):,}", size=15, color=GREY, va="center", ha="right")
 
 
-def _swatches(axes: Axes, top: float, panels: Panels, unit: str) -> None:
-    """One row per size: colour, edge length, how many."""
+def _swatches(axes: Axes, top: float, panels: Panels, unit: str, shown: int) -> None:
+    """One row per size, of so many: colour, edge length, how many."""
     counts, words = panels.class_count.tolist(), text.lengths(panels.class_length.tolist())
-    for i, colour in enumerate(colours.class_colours(panels)):
+    for i, colour in enumerate(colours.class_colours(panels)[:shown]):
         y = top + ROW * (i + 0.5)
         _swatch(axes, y, panels, colour, int(panels.class_sides[i]))
         axes.text(64, y, words[i] + unit, size=17, color=INK, va="center")

@@ -1,10 +1,13 @@
-"""``panels.obj``: every panel as one polygon, grouped by size, each an object named by its label."""
+"""``panels.obj``: every panel as one polygon, or as two where it is bent, grouped by size, each an object
+named by its label.
+"""
 
 from __future__ import annotations
 
 from hexwrap_server.output.layers import size_name
 from hexwrap_server.output.meta import Meta, panels_of
 from hexwrap_server.output.text import one_line
+from hexwrap_solver.panels.folds import halves_of_ring, hinges_of
 from hexwrap_solver.pipeline import Solution
 
 
@@ -18,6 +21,7 @@ def panels_obj(solution: Solution, meta: Meta) -> bytes:
     ]
     labels = pattern.labels()
     starts, ends = (panels.polygons.offsets[:-1] + 1).tolist(), (panels.polygons.offsets[1:] + 1).tolist()
+    hinges = hinges_of(panels).tolist()
     members: dict[int, list[int]] = {}
     for panel, size in enumerate(panels.size.tolist()):
         members.setdefault(size, []).append(panel)
@@ -26,5 +30,7 @@ def panels_obj(solution: Solution, meta: Meta) -> bytes:
         lines.append(f"g {size_name(size)}")
         for panel in members[size]:
             lines.append(f"o {labels[cell[panel]]}")
-            lines.append("f " + " ".join(map(str, range(starts[panel], ends[panel]))))
+            ring = range(starts[panel], ends[panel])
+            for part in halves_of_ring(list(ring), hinges[panel]):
+                lines.append("f " + " ".join(map(str, part)))
     return ("\n".join(lines) + "\n").encode()

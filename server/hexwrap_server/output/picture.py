@@ -10,6 +10,7 @@ from hexwrap_server.output.raster import Polygons
 from hexwrap_server.output.scene import Scene, render
 from hexwrap_server.output.viewpoint import viewpoint
 from hexwrap_solver.arrays import Floats, Ragged
+from hexwrap_solver.panels.folds import parts_of
 from hexwrap_solver.pipeline import Solution
 
 #: The shell behind the joints lies this many edge lengths inside the surface, so that panels,
@@ -28,7 +29,8 @@ def panels_scene(solution: Solution) -> Scene:
     _, panels = panels_of(solution, "panels.png")
     surface = solution.map.surface
     middle = (surface.vertices.max(axis=0) + surface.vertices.min(axis=0)) / 2
-    outline = Ragged(panels.polygons.values - middle, panels.polygons.offsets)
+    parts, owner, _ = parts_of(panels)
+    outline = Ragged(parts.values - middle, parts.offsets)
     sunk = surface.vertices - middle - SINK * _typical(panels.edge_length) * surface.normals
     # A watertight mesh has no joints to look through, and may lie far from the surface.
     faces = surface.faces if panels.mode == "split" else surface.faces[:0]
@@ -39,7 +41,7 @@ def panels_scene(solution: Solution) -> Scene:
         colour = colours.panel_colours(panels.size, colours.class_colours(panels))
     return Scene(
         Polygons.of(outline),
-        colour,
+        colour[owner],
         Polygons.of(Ragged.from_table(sunk[faces])),
         viewpoint(solution.map),
     )

@@ -19,13 +19,14 @@ from hexwrap_server.output.table import columns
 from hexwrap_server.output.text import one_line
 from hexwrap_server.output.units import unit_of
 from hexwrap_solver.arrays import Floats, Ints, Ragged
+from hexwrap_solver.panels.folds import hinges_of
 from hexwrap_solver.panels.types import Components, Panels, Support
 from hexwrap_solver.pipeline import Solution
 
 #: The columns of ``panels.csv`` that every polyline carries as user strings.
 KEYS = (
     "label", "ring", "place", "size", "edge_length", "planarity", "surface_distance",
-    "gap_tangential_mean", "gap_normal_mean", "neighbours",
+    "gap_tangential_mean", "gap_normal_mean", "bend_angle", "neighbours",
 )  # fmt: skip
 LABELS = (60, 64, 70)
 COMPONENTS = (150, 156, 166)
@@ -65,6 +66,13 @@ def panels_3dm(solution: Solution, meta: Meta) -> bytes:
         for key, value in (*zip(known, texts[row], strict=True), *strings):
             attributes.SetUserString(key, value)
         model.Objects.AddPolyline(_closed(points), attributes)
+    hinges = hinges_of(panels)
+    bent = np.flatnonzero(hinges >= 0).tolist()
+    if bent:
+        folds = _layer(model, "bends", LABELS, root)
+        for row in bent:
+            ends = np.asarray(panels.polygons[row])[[0, hinges[row]]].tolist()
+            model.Objects.AddLine(*(rhino3dm.Point3d(*p) for p in ends), _attributes(folds, names[row]))
     labels = _layer(model, "labels", LABELS, root)
     for name, centre in zip(names, panels.center.tolist(), strict=True):
         model.Objects.AddTextDot(name, rhino3dm.Point3d(*centre), _attributes(labels, name))

@@ -8,6 +8,7 @@ from hexwrap_server.output.meta import Meta, panels_of
 from hexwrap_server.output.text import csv_table
 from hexwrap_server.output.units import heading
 from hexwrap_solver.arrays import Floats, Ints
+from hexwrap_solver.panels.folds import bend_angles, places_of
 from hexwrap_solver.panels.types import Panels
 from hexwrap_solver.pattern.types import Pattern
 from hexwrap_solver.pipeline import Solution
@@ -53,19 +54,28 @@ def columns(solution: Solution) -> dict[str, list[object]]:
     for name in ("gap_tangential", "gap_normal", "kink"):
         for what, numbers in _over_edges(getattr(quality, name), pattern, panels.face).items():
             known[f"{name}_{what}"] = _numbers(numbers, n)
+    known["bend_angle"] = ["" if a == 0 else a for a in bend_angles(panels).tolist()]
     known["neighbours"] = [" ".join(names) for names in neighbour_labels(pattern, panels)]
     return known
 
 
 def neighbour_labels(pattern: Pattern, panels: Panels) -> list[list[str]]:
-    """Per panel, the label across each edge of its cell; ``-`` where no panel stands."""
-    has_panel = np.zeros(pattern.n_cells + 1, dtype=bool)  # one more, for index −1
-    has_panel[panels.face] = True
-    names = np.array([*pattern.labels(), "-"], dtype=object)
+    """Per panel, the label across each edge of its cell, or cells; ``-`` where no panel stands."""
+    panel, _ = places_of(pattern, panels.face, panels.bends)
+    labels = np.array([*pattern.labels(), "-"], dtype=object)
+    names = np.append(labels[panels.face], "-")
     across = np.asarray(pattern.neighbours.values)
-    named = np.where(has_panel[across], names[across], "-")
+    named = names[np.where(across >= 0, panel[across], -1)]
     rows = np.split(named, pattern.neighbours.offsets[1:-1])
-    return [rows[cell].tolist() for cell in panels.face.tolist()]
+    found = [rows[cell].tolist() for cell in panels.face.tolist()]
+    if panels.bends is not None:
+        bends = panels.bends
+        for row, other, (one, two) in zip(
+            bends.panel.tolist(), bends.other.tolist(), bends.side.tolist(), strict=True
+        ):  # from the hinge on, around both halves
+            mine, others = found[row], rows[other].tolist()
+            found[row] = [*mine[one + 1 :], *mine[:one], *others[two + 1 :], *others[:two]]
+    return found
 
 
 def _numbers(values: Floats | None, n: int) -> list[object]:

@@ -15,6 +15,7 @@ from hexwrap_solver.arrays import Bools, Floats, Ragged
 from hexwrap_solver.conformal.net import Net
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.domain.apart import apart
+from hexwrap_solver.panels.folds import bend_angles
 from hexwrap_solver.panels.types import Panels
 from hexwrap_solver.pattern.types import Pattern
 from hexwrap_solver.pipeline import Solution
@@ -143,7 +144,21 @@ def panels(solution: Solution) -> dict[str, Any] | None:
         "gap_tangential": _widest(measured.gap_tangential, laid.neighbours, made),
         "gap_normal": _widest(measured.gap_normal, laid.neighbours, made),
         "congruence": measured.congruence,
+        **bent(made),
     }
+
+
+def bent(made: Panels) -> dict[str, Any]:
+    """Of each panel the corners between which it is bent, the angle there, and the cell of its other half."""
+    bends = made.bends
+    corner: list[list[int] | None] = [None] * made.n_panels
+    if bends is not None:
+        for panel, hinge in zip(bends.panel.tolist(), bends.hinge.tolist(), strict=True):
+            corner[panel] = [0, hinge]
+    other = np.full(made.n_panels, -1)
+    if bends is not None:
+        other[bends.panel] = bends.other
+    return {"bend": corner, "bend_angle": bend_angles(made), "other_face": other}
 
 
 def sizes(made: Panels | None) -> list[dict[str, Any]]:
@@ -154,11 +169,12 @@ def sizes(made: Panels | None) -> list[dict[str, Any]]:
         made.class_count.tolist(),
         made.class_sides.tolist(),
         class_colours(made) if len(made.class_length) else [],
+        made.divided.tolist(),
         strict=True,
     )
     return [
-        {"size": i, "edge_length": length, "count": count, "sides": sides, "color": colour}
-        for i, (length, count, sides, colour) in enumerate(listed)
+        {"size": i, "edge_length": length, "count": count, "sides": sides, "color": colour, "fold": fold}
+        for i, (length, count, sides, colour, fold) in enumerate(listed)
     ]
 
 

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import shapely
 
 from hexwrap_solver.arrays import Floats, Ints, Ragged
 from hexwrap_solver.errors import PanelsError
 from hexwrap_solver.geometry import cross_2d, dot, normalize, plane_axes
+from hexwrap_solver.panels.folds import flat_parts, halves_of_ring, hinges_of
 from hexwrap_solver.panels.planar import in_planes, outlines
 from hexwrap_solver.panels.polygons import (
+    area_vectors,
     edge_vectors,
     interior_angles,
     means,
@@ -32,15 +36,17 @@ def make_components(panels: Panels, settings: ComponentSettings) -> Components:
     Trimmed panels too thin for the inset get half of what they have room for.
     """
     outline = _inset(panels, settings.inset) if settings.inset > 0 else panels.polygons
-    z_axis = panels.normal
+    z_axis, parts = panels.normal, Parts.of(panels, outline)
     first = edge_vectors(panels.polygons)[panels.polygons.offsets[:-1]]
     x_axis = normalize(first - dot(first, z_axis)[:, None] * z_axis)
-    solid = _solids(outline, z_axis, settings.thickness) if settings.thickness > 0 else (None, None)
+    solid = _solids(outline, parts, settings.thickness) if settings.thickness > 0 else (None, None)
     return Components(outline, panels.center, x_axis, np.cross(z_axis, x_axis), z_axis, *solid)
 
 
 def _inset(panels: Panels, inset: float) -> Ragged:
     """Outlines moved inwards by the same width on every edge (mitred corners)."""
+    if panels.bends is not None and len(panels.bends.panel):
+        return _inset_parts(panels, inset)
     polygons = panels.polygons
     row, points = polygons.row, np.asarray(polygons.values, dtype=np.float64)
     inward = normalize(np.cross(panels.normal[row], edge_vectors(polygons)))
@@ -63,6 +69,73 @@ def _inset(panels: Panels, inset: float) -> Ragged:
     shrunk = center + factor * (points - center)
     outline = Ragged(np.where((folded > 0)[row, None], moved, shrunk), polygons.offsets)
     return _with_rows(outline, concave, _offset(panels, concave, flat, width[concave]))
+
+
+def _inset_parts(panels: Panels, inset: float) -> Ragged:
+    """Of panels some of which are bent: the flat ones as ever; of the others each half, but not at the hinge,
+    whose ends are where both halves still reach."""
+    hinge = hinges_of(panels)
+    flat = np.flatnonzero(hinge < 0)
+    plain = _inset(panels.part(flat), inset)
+    rows: list[Floats] = [np.zeros((0, 3))] * panels.n_panels
+    for i, row in enumerate(flat.tolist()):
+        rows[row] = np.asarray(plain[i])
+    for row in np.flatnonzero(hinge >= 0).tolist():
+        rows[row] = _inset_bent(np.asarray(panels.polygons[row], dtype=np.float64), int(hinge[row]), inset)
+    offsets = np.cumsum([0, *(len(one) for one in rows)])
+    return Ragged(np.concatenate(rows), offsets)
+
+
+def _inset_bent(corner: Floats, hinge: int, inset: float) -> Floats:
+    """(p, 3) a bent outline moved inwards; half as large about the middle of its hinge where it has no room
+    for that."""
+    a, b = corner[hinge], corner[0]
+    x = normalize((b - a)[None])[0]
+    middle, moved, ends = (a + b) / 2, corner.copy(), []
+    for part in halves_of_ring(list(range(len(corner))), hinge):
+        points = corner[part]
+        count = len(points)
+        normal = normalize(area_vectors(Ragged(points, np.array([0, count]))))[0]
+        edge = normalize(np.roll(points, -1, axis=0) - points)
+        inward = np.cross(normal, edge)
+        width = np.full(count, inset)
+        width[-1] = 0.0  # the hinge, from the last corner to the first
+        u, v, wu, wv = np.roll(inward, 1, axis=0), inward, np.roll(width, 1), width
+        cosine = dot(u, v)
+        sine = np.maximum(1 - cosine**2, 1e-12)
+        even = wu == wv  # edges in line move as one
+        one = np.where(even, wu / (1 + cosine), (wu - cosine * wv) / sine)
+        two = np.where(even, wv / (1 + cosine), (wv - cosine * wu) / sine)
+        shifted = points + one[:, None] * u + two[:, None] * v
+        along = dot(np.roll(shifted, -1, axis=0) - shifted, edge)
+        if (along <= 0).any():
+            return np.asarray(middle + (corner - middle) / 2)
+        moved[part] = shifted
+        ends.append(sorted(((shifted[[0, -1]] - middle) @ x).tolist()))
+    moved[0], moved[hinge] = (middle + t * x for t in (min(e[1] for e in ends), max(e[0] for e in ends)))
+    return moved
+
+
+@dataclass(frozen=True)
+class Parts:
+    """Flat parts of outlines. outline: rows of them, corner: (·,) of all outlines that each of their corners
+    is; row: (parts,) outline; normal: (parts, 3). offset: (·, 3) of all corners of the outlines, to what is
+    1 above all planes that meet there."""
+
+    outline: Ragged
+    corner: Ints
+    row: Ints
+    normal: Floats
+    offset: Floats
+
+    @classmethod
+    def of(cls, panels: Panels, outline: Ragged) -> Parts:
+        parts, corner, row, normal = flat_parts(outline, panels)
+        total = np.zeros_like(outline.values, dtype=np.float64)
+        np.add.at(total, corner, normal[parts.row])
+        count = np.bincount(corner, minlength=len(total))[:, None]
+        # The mitre: n for one plane, (n₁ + n₂) / (1 + n₁·n₂) for two.
+        return cls(parts, corner, row, normal, total * count / dot(total, total)[:, None])
 
 
 def _in_plane(panels: Panels, which: Ints) -> shapely.Geometry:
@@ -124,7 +197,7 @@ def _require_room(panels: Panels, thin: np.ndarray, inset: float, room: Floats) 
         )
 
 
-def _solids(outline: Ragged, normal: Floats, thickness: float) -> tuple[Ragged, Ragged]:
+def _solids(outline: Ragged, parts: Parts, thickness: float) -> tuple[Ragged, Ragged]:
     """Prisms from the outline outwards: n lower corners, then n upper ones; 4n − 4 triangles each."""
     count, offsets = outline.lengths, outline.offsets
     local = np.arange(len(outline.values)) - np.repeat(offsets[:-1], count)
@@ -132,13 +205,15 @@ def _solids(outline: Ragged, normal: Floats, thickness: float) -> tuple[Ragged, 
     at = local + 2 * np.repeat(offsets[:-1], count)
     vertices = np.zeros((2 * len(outline.values), 3))
     vertices[at] = outline.values
-    vertices[at + n] = outline.values + thickness * normal[outline.row]
+    vertices[at + n] = outline.values + thickness * parts.offset
     following = np.where(local + 1 < n, local + 1, 0)
     sides = np.stack([local, following, following + n, local, following + n, local + n], axis=1).reshape(
         -1, 2, 3
     )
-    corners = triangulated(outline, normal)
-    row, inner = outline.row, np.repeat(np.arange(outline.n_rows), count - 2)
+    row, inner = outline.row, np.repeat(parts.row, parts.outline.lengths - 2)
+    first = np.repeat(parts.outline.offsets[:-1], parts.outline.lengths - 2)
+    corners = triangulated(parts.outline, parts.normal)
+    corners = parts.corner[first[:, None] + corners] - offsets[inner][:, None]
     lower, upper = corners[:, ::-1], corners + count[inner][:, None]
     owner = np.concatenate([np.repeat(row, 2), inner, inner])
     triangles = np.concatenate([sides.reshape(-1, 3), lower, upper])

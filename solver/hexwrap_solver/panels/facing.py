@@ -16,7 +16,7 @@ class Facing:
     """Pairs of edges, all arrays (k,): those of two panels that came from the same edge of the pattern.
 
     here, there: half-edges of the pattern, here < there. left, right: their panels. start_left, start_right:
-    the corner of the panel at which its edge starts.
+    the corner of the panel at which its edge starts. mean: (k, 3) unit mean of the normals beside it.
     """
 
     here: Ints
@@ -25,24 +25,19 @@ class Facing:
     right: Ints
     start_left: Ints
     start_right: Ints
+    mean: Floats
 
 
-def facing_edges(edges: HalfEdges, first_corner: Ints, face: Ints) -> Facing:
-    """first_corner: (c,) where each cell's corners start in the pattern. face: (q,) cell of each panel."""
-    panel_of = np.full(len(first_corner), -1, dtype=np.int64)
-    panel_of[face] = np.arange(len(face))
+def facing_edges(edges: HalfEdges, panel: Ints, corner: Ints, normal: Floats) -> Facing:
+    """panel: (c,) of each cell, −1: none. corner: (h,) of its panel at which each half-edge's own begins, −1
+    where it has none. normal: (c, 3) of what lies in the cells."""
     here = edges.pairs()
     there = edges.twin[here]
-    left, right = panel_of[edges.cell[here]], panel_of[edges.cell[there]]
-    both = (left >= 0) & (right >= 0)
+    left, right = panel[edges.cell[here]], panel[edges.cell[there]]
+    both = (left >= 0) & (right >= 0) & (corner[here] >= 0) & (corner[there] >= 0)
     here, there = here[both], there[both]
-    starts = (half - first_corner[edges.cell[half]] for half in (here, there))
-    return Facing(here, there, left[both], right[both], *starts)
-
-
-def mean_normals(facing: Facing, normal: Floats) -> Floats:
-    """(k, 3) unit mean of the two panels' normals (q, 3)."""
-    return normalize(normal[facing.left] + normal[facing.right])
+    mean = normalize(normal[edges.cell[here]] + normal[edges.cell[there]])
+    return Facing(here, there, left[both], right[both], corner[here], corner[there], mean)
 
 
 def edge_ends(polygons: Ragged, panel: Ints, corner: Ints) -> tuple[Floats, Floats]:
@@ -52,15 +47,15 @@ def edge_ends(polygons: Ragged, panel: Ints, corner: Ints) -> tuple[Floats, Floa
     return points[start + corner], points[start + (corner + 1) % count]
 
 
-def widths(polygons: Ragged, facing: Facing, mean: Floats) -> Floats:
-    """(k,) least distance of two facing edges, seen along the mean normals (k, 3); negative where an edge has
+def widths(polygons: Ragged, facing: Facing) -> Floats:
+    """(k,) least distance of two facing edges, seen along the mean normals; negative where an edge has
     crossed the other."""
+    mean = facing.mean
     a, b = edge_ends(polygons, facing.left, facing.start_left)
     c, d = edge_ends(polygons, facing.right, facing.start_right)
     x_axis, y_axis = plane_axes(mean).transpose(1, 0, 2)
-    b, c, d = (dot(end - a, x_axis) + 1j * dot(end - a, y_axis) for end in (b, c, d))
-    a = np.zeros_like(b)
-    ends = [(c, a, b), (d, a, b), (a, c, d), (b, c, d)]
+    o, p, q, r = (dot(end - a, x_axis) + 1j * dot(end - a, y_axis) for end in (a, b, c, d))
+    ends = [(q, o, p), (r, o, p), (o, q, r), (p, q, r)]
     return np.asarray(np.min([_signed_distance(*end) for end in ends], axis=0))
 
 

@@ -9,10 +9,12 @@ import numpy as np
 from hexwrap_solver.arrays import Bools, Floats, Ints, Progress, Ragged, no_progress
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.errors import ConvergenceError, PanelsError
+from hexwrap_solver.geometry import normalize
 from hexwrap_solver.panels import limits
 from hexwrap_solver.panels.best import Bound, jointly_largest
 from hexwrap_solver.panels.energy import NEAREST, functionals, minimise_watertight
 from hexwrap_solver.panels.facing import facing_edges
+from hexwrap_solver.panels.folds import AlongFolds, places_of
 from hexwrap_solver.panels.halfedges import HalfEdges, half_edges
 from hexwrap_solver.panels.planar import crossing_themselves
 from hexwrap_solver.panels.polygons import (
@@ -28,10 +30,10 @@ from hexwrap_solver.panels.polygons import (
     take_rows,
 )
 from hexwrap_solver.panels.poses import fit_poses, target_lengths
-from hexwrap_solver.panels.regular import Poses, outline_areas
+from hexwrap_solver.panels.regular import Poses, bending, corners, outline_areas
 from hexwrap_solver.panels.separation import Separation, separating_planes
 from hexwrap_solver.panels.trimmed import flatten_and_clear, plane_normals
-from hexwrap_solver.panels.types import FittedPanels, PanelSettings, Weights
+from hexwrap_solver.panels.types import Bends, FittedPanels, PanelSettings, Weights
 from hexwrap_solver.pattern.lattice import LATTICES
 from hexwrap_solver.pattern.types import Pattern
 from hexwrap_solver.surface.curvature import saddle_share
@@ -60,6 +62,7 @@ class FitKey:
     joint: float
     method: str
     weights: Weights
+    fold: str
 
     @classmethod
     def of(cls, settings: PanelSettings) -> FitKey:
@@ -70,6 +73,7 @@ class FitKey:
             settings.joint,
             settings.method,
             settings.weights,
+            settings.fold,
         )
 
 
@@ -124,6 +128,12 @@ class _Group:
     def spokes(self) -> Ragged:
         return Ragged.from_table(self.poses.spokes(self.sides))
 
+    @property
+    def bends(self) -> int:
+        """Corners of the panels that are not straight."""
+        outline = corners(self.sides) if self.poses.outline is None else self.poses.outline[0]
+        return bending(outline[:, 0] + 1j * outline[:, 1])
+
     def inscribed(self, planes: Separation) -> tuple[Floats, Floats]:
         return limits.inscribed(self.poses, planes.direction[self.at], planes.offset[self.at])
 
@@ -176,11 +186,15 @@ def _fit_split(
     normal = plane_normals(cells)
     for group in groups:
         normal[group.face] = group.poses.normal
-    planes = separating_planes(pattern, edges, normal, settings.joint)
+    folds = AlongFolds.of(surface, pattern, normal, settings)
+    planes = separating_planes(pattern, edges, folds.normal, folds.joints(edges, settings.joint))
     progress(0.4, "limiting sizes")
-    face = np.concatenate([np.zeros(0, dtype=np.int64), *(group.face for group in kinds)])
-    spokes = _chained([group.spokes for group in kinds])
+    face = np.concatenate([np.zeros(0, dtype=np.int64), *(group.face for group in (*kinds, *folds.kinds))])
+    spokes = _chained([group.spokes for group in (*kinds, *folds.kinds)])
+    kind = np.repeat(np.arange(len(kinds) + len(folds.kinds)), [len(g.face) for g in (*kinds, *folds.kinds)])
     length, center, said = _limits(kinds, planes, edges, settings, progress)
+    pieces = [group.inscribed(planes) for group in folds.kinds]
+    length, center = _together([(length, center), *pieces])
     notes += said
     regular = np.zeros(n, dtype=bool)
     regular[face] = True
@@ -188,31 +202,56 @@ def _fit_split(
     kept[face] = length > 0
     notes += _room_note(np.flatnonzero(regular & ~kept), int(kept.sum()), settings.joint)
     special: Bools = pattern.whole & (pattern.index != 0)
-    parts = [_trimmed(cells, normal, planes, edges, ~regular & ~special)]
+    left = ~regular & ~special & ~folds.taken
+    parts = [_trimmed(cells, folds.normal, planes, edges, left, folds.origin)]
     parts += [group.finished(planes, n) for group in others]
     shapes, shape_center, cut = _joined(parts)
+    dropped = int((left & ~cut).sum())
+    single = folds.joined(pattern, shapes, shape_center, np.flatnonzero(cut))
+    cut = np.zeros(n, dtype=bool)
+    cut[single.face] = True
+    special |= folds.divided
     order = np.argsort(face, kind="stable")
     order = order[(length > 0)[order]]  # the regular panels that are kept, by cell
     made = np.flatnonzero(kept | cut)
     spare = _spare(kinds, planes, settings)
+    if spare is not None:
+        spare = _together([spare, *pieces])
+    bends = folds.bends(made, kept, single)
+    whole_normal = folds.normal.copy()
+    if bends is not None:
+        own = made[bends.panel]
+        whole_normal[own] = normalize(folds.normal[own] + folds.normal[bends.other])
     return FittedPanels(
         mode="split",
         face=made,
         regular=kept[made],
         spokes=take_rows(spokes, order)[0],
-        shapes=shapes,
-        center=_merge(kept, center[order], cut, shape_center)[made],
-        normal=normal[made],
-        limit=_merge(kept, length[order], cut, mean_edges(shapes))[made],
+        shapes=single.shapes,
+        center=_merge(kept, center[order], cut, single.center)[made],
+        normal=whole_normal[made],
+        limit=_merge(kept, length[order], cut, mean_edges(single.shapes))[made],
         whole=pattern.whole[made],
-        cell_area=fan_areas(cells)[made],
+        cell_area=_areas(fan_areas(cells), made, bends),
         energy=energy,
-        notes=notes + _joint_note(settings) + _dropped_note(int((~regular & ~cut).sum()), settings.joint),
-        spare_limit=spare and _merge(kept, spare[0][order], cut, mean_edges(shapes))[made],
-        spare_center=spare and _merge(kept, spare[1][order], cut, shape_center)[made],
-        facing=facing_edges(edges, pattern.faces.offsets[:-1], made),
-        special=special[made],
+        notes=notes + _joint_note(settings) + _dropped_note(dropped, settings.joint),
+        spare_limit=spare and _merge(kept, spare[0][order], cut, mean_edges(single.shapes))[made],
+        spare_center=spare and _merge(kept, spare[1][order], cut, single.center)[made],
+        facing=facing_edges(edges, *places_of(pattern, made, bends), folds.normal),
+        special=special[made] & ~kept[made],
+        kind=kind[order],
+        sides=np.array([group.bends for group in (*kinds, *folds.kinds)], dtype=np.int64),
+        pieces=len(kinds),
+        bends=bends,
     )
+
+
+def _areas(area: Floats, made: Ints, bends: Bends | None) -> Floats:
+    """(q,) of the cells of each panel, (c,) of the cells given."""
+    own = area[made]
+    if bends is not None:
+        own[bends.panel] += area[bends.other]
+    return own
 
 
 def _chained(tables: list[Ragged]) -> Ragged:
@@ -251,7 +290,7 @@ def _fit_watertight(
         *(STUCK_NOTE if stuck else ()),
         *(_bent_note(shapes) if aims.flat else ()),
         *collapsed_note(shapes),
-        *_crossing_note(crossing_themselves(shapes, center, normal)),
+        *_crossing_note(crossing_themselves(shapes, center, normal), pattern, surface),
         *_convex_note(shapes, normal, pattern, surface),
         *(_pulled_note if energies else _far_note)(away, settings.weights),
     )
@@ -287,19 +326,22 @@ def _convex_note(shapes: Ragged, normal: Floats, pattern: Pattern, surface: Surf
     count = int(np.sum(~convex(shapes, interior_angles(shapes, normal))))
     if not count:
         return ()
+    better = _better(pattern, surface)
+    return (f"Watertight panels that are not convex: {count} of {shapes.n_rows}; {better}.",)
+
+
+def _better(pattern: Pattern, surface: Surface) -> str:
+    """The pattern whose panels stay convex."""
     # Where three panels meet at each node, flat convex ones follow no saddle (Li, Liu and Wang 2015).
     saddle = saddle_share(surface)
-    best = "trihexagonal" if saddle > 0 else "hex"
-    if pattern.kind == best:
-        better = "smaller cells leave fewer"
-    elif saddle > 0:
-        better = (
+    if pattern.kind == ("trihexagonal" if saddle > 0 else "hex"):
+        return "smaller cells leave fewer"
+    if saddle > 0:
+        return (
             f"{max(saddle, 0.01):.0%} of the surface is curved like a saddle, which flat convex panels follow"
             " with kind trihexagonal"
         )
-    else:
-        better = "on this surface, which is nowhere curved like a saddle, ask for kind hex"
-    return (f"Watertight panels that are not convex: {count} of {shapes.n_rows}; {better}.",)
+    return "on this surface, which is nowhere curved like a saddle, ask for kind hex"
 
 
 def collapsed_note(shapes: Ragged) -> tuple[str, ...]:
@@ -315,13 +357,13 @@ def collapsed_note(shapes: Ragged) -> tuple[str, ...]:
     )
 
 
-def _crossing_note(crossing: Bools) -> tuple[str, ...]:
+def _crossing_note(crossing: Bools, pattern: Pattern, surface: Surface) -> tuple[str, ...]:
     count = int(crossing.sum())
     if not count:
         return ()
     return (
-        f"Watertight panels whose outline crosses itself: {count}; ask for another pattern, for smaller"
-        " cells, or for split panels, which cannot.",
+        f"Watertight panels whose outline crosses itself: {count} of {len(crossing)};"
+        f" {_better(pattern, surface)}; split panels cannot cross.",
     )
 
 
@@ -419,12 +461,13 @@ def _joint_note(settings: PanelSettings) -> tuple[str, ...]:
 
 
 def _trimmed(
-    cells: Ragged, normal: Floats, planes: Separation, edges: HalfEdges, chosen: Bools
+    cells: Ragged, normal: Floats, planes: Separation, edges: HalfEdges, chosen: Bools, origin: Floats
 ) -> tuple[Ragged, Floats, Bools]:
-    """Flat polygons for the chosen cells, their centres, and which cells (of all) keep a panel."""
+    """Flat polygons for the chosen cells, their centres, and which cells (of all) keep a panel. origin: (c,
+    3) points of the planes."""
     shapes, at = take_rows(cells, np.flatnonzero(chosen))
     flat, center, size = flatten_and_clear(
-        shapes, normal[chosen], planes.direction[at], planes.offset[at], edges.across[at]
+        shapes, normal[chosen], planes.direction[at], planes.offset[at], edges.across[at], origin[chosen]
     )
     enough = size >= LEAST_TRIMMED
     kept = np.zeros(len(chosen), dtype=bool)

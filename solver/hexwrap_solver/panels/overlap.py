@@ -71,8 +71,8 @@ def _lie_apart(
     points = np.ascontiguousarray(polygons.values.T)
     origin = points[:, polygons.offsets[first]]
     own, other = (
-        sum((points[d][at] - origin[d]) * axis[d] for d in range(3))
-        for at in (_corners(polygons, which) for which in (first, second))
+        np.einsum("dck,dk->ck", points[:, _corners(polygons, which)] - origin[:, None], axis)
+        for which in (first, second)
     )
     return np.asarray((other.min(axis=0) >= own.max(axis=0) - slack) & flat.any(axis=1))
 

@@ -12,6 +12,7 @@ from hexwrap_solver.geometry import dot
 from hexwrap_solver.panels.congruence import congruence_classes
 from hexwrap_solver.panels.facing import Facing, edge_ends, facing_edges
 from hexwrap_solver.panels.fewest import SLACK
+from hexwrap_solver.panels.folds import parts_by_cell
 from hexwrap_solver.panels.gaps import gaps
 from hexwrap_solver.panels.halfedges import HalfEdges, half_edges
 from hexwrap_solver.panels.overlap import overlapping_pairs
@@ -21,6 +22,7 @@ from hexwrap_solver.panels.polygons import (
     edge_lengths,
     fan_areas,
     interior_angles,
+    mean_edges,
     row_maxima,
     row_sums,
 )
@@ -50,29 +52,38 @@ def measure(
     progress(0.1, "measuring panels")
     polygons, cell_area = panels.polygons, float(fan_areas(pattern.cells).sum())
     edges = half_edges(pattern)
-    facing = facing_edges(edges, pattern.faces.offsets[:-1], panels.face)
-    between = gaps(facing, panels, len(edges.cell))
+    parts, owner = parts_by_cell(panels)
+    facing = _facing(pattern, edges, parts)
+    between = gaps(facing, parts, len(edges.cell))
     angle = interior_angles(polygons, panels.normal)
+    part_angle = interior_angles(parts.polygons, parts.normal)
     row, count, edge = polygons.row, polygons.lengths, edge_lengths(polygons)
     mean = row_sums(edge, polygons.offsets) / count
     ideal = _ideal_angles(pattern, panels, angle, (np.pi * (count - 2) / count)[row])
     progress(0.5, "distances to the surface")
-    away = _surface_distances(cmap.surface, pattern, panels)
+    away = _surface_distances(cmap.surface, pattern, parts)
+
+    def worst(measured: Floats) -> Floats:
+        """(q,) of the parts of each panel."""
+        return np.asarray(np.maximum.reduceat(measured, np.flatnonzero(np.diff(owner, prepend=-1))))
+
+    bent = row_maxima(np.abs(best_plane_distances(parts.polygons)), parts.polygons.offsets)
+    hollow = ~convex(parts.polygons, part_angle)
     progress(0.9, "looking for overlaps")
     return replace(
         quality,
-        planarity=row_maxima(np.abs(best_plane_distances(polygons)), polygons.offsets) / mean,
+        planarity=worst(bent) / mean,
         edge_deviation=row_maxima(np.abs(edge - mean[row]), polygons.offsets) / mean,
         angle_deviation=row_maxima(np.abs(angle - ideal), polygons.offsets),
-        surface_distance=away,
+        surface_distance=worst(away),
         gap_tangential=between.tangential,
         gap_normal=between.normal,
         kink=between.kink,
-        gaps_over=_count_wide(edges, panels, between.tangential),
-        convex=convex(polygons, angle),
+        gaps_over=_count_wide(edges, parts, between.tangential),
+        convex=~worst(hollow.astype(np.float64)).astype(bool),
         congruence=congruence_classes(polygons, angle),
-        overlaps=_count_overlaps(facing, panels, mean),
-        coverage=float(fan_areas(polygons).sum()) / cell_area,
+        overlaps=_count_overlaps(facing, parts, mean_edges(parts.polygons)),
+        coverage=float(fan_areas(parts.polygons).sum()) / cell_area,
         movement=_movement(pattern, panels),
         notes=quality.notes + _bare_note(pattern, cell_area / float(area.sum())),
     )
@@ -103,6 +114,16 @@ def _surface_distances(surface: Surface, pattern: Pattern, panels: Panels) -> Fl
     corner = np.minimum(corner, pattern.faces.lengths[panels.face][polygons.row] - 1)
     beside = pattern.triangle[pattern.faces.values[start[polygons.row] + corner].astype(np.int64)]
     return tree.farthest(points, row, n, np.concatenate([beside, tree.centroids.query(panels.center)[1]]))
+
+
+def _facing(pattern: Pattern, edges: HalfEdges, panels: Panels) -> Facing:
+    """Of flat panels, corners in step with those of their cells."""
+    panel = np.full(pattern.n_cells, -1, dtype=np.int64)
+    panel[panels.face] = np.arange(panels.n_panels)
+    normal = np.zeros((pattern.n_cells, 3))
+    normal[panels.face] = panels.normal
+    corner = np.arange(len(edges.cell)) - pattern.faces.offsets[edges.cell]
+    return facing_edges(edges, panel, corner, normal)
 
 
 def _count_wide(edges: HalfEdges, panels: Panels, gap: Floats) -> int | None:

@@ -9,9 +9,8 @@ import numpy as np
 
 from hexwrap_solver.arrays import Floats, Ints, Ragged
 from hexwrap_solver.errors import PanelsError
-from hexwrap_solver.panels.facing import mean_normals, widths
+from hexwrap_solver.panels.facing import widths
 from hexwrap_solver.panels.fewest import SLACK, Fewest, Joints, fewest_lengths
-from hexwrap_solver.panels.polygons import edge_vectors, row_sums, take_rows
 from hexwrap_solver.panels.regular import outline_areas
 from hexwrap_solver.panels.sizes import (
     ALIKE,
@@ -93,11 +92,12 @@ def quantize(fitted: FittedPanels, settings: PanelSettings, curve: TradeOff | No
         lengths = [_chosen(fitted, limit, settings.sizes, settings, smallest) for limit in limits]
         pick = min(range(len(lengths)), key=lambda k: _loss(fitted, lengths[k], smallest, settings))
     fitted, length = choices[pick], lengths[pick]
-    sides = fitted.spokes.lengths
+    kind = _kinds(fitted)
     lengths_used, which = np.unique(length, return_inverse=True)
     classes, member, class_count = np.unique(
-        which - sides * len(lengths_used), return_inverse=True, return_counts=True
+        which + kind * len(lengths_used), return_inverse=True, return_counts=True
     )
+    class_kind = classes // max(len(lengths_used), 1)
     class_length = lengths_used[classes % max(len(lengths_used), 1)]
     edge_length = fitted.limit.copy()
     edge_length[regular] = length
@@ -119,7 +119,7 @@ def quantize(fitted: FittedPanels, settings: PanelSettings, curve: TradeOff | No
         whole=fitted.whole,
         class_length=np.concatenate([class_length, edge_length[alone]]),
         class_count=np.concatenate([class_count, np.ones(len(alone), dtype=np.int64)]).astype(np.int64),
-        class_sides=np.concatenate([_true_sides(fitted, member), polygons.lengths[alone]]).astype(np.int64),
+        class_sides=np.concatenate([_sides(fitted)[class_kind], polygons.lengths[alone]]).astype(np.int64),
         trade_off=curve or trade_off(fitted, settings),
         energy=fitted.energy,
         notes=(
@@ -130,7 +130,8 @@ def quantize(fitted: FittedPanels, settings: PanelSettings, curve: TradeOff | No
         ),
         outside=outside,
         max_gap=settings.max_gap,
-        n_special=len(alone),
+        n_special=len(alone) + int((class_kind >= fitted.pieces).sum()),
+        bends=fitted.bends,
     )
 
 
@@ -149,10 +150,10 @@ def _limits(fitted: FittedPanels, settings: PanelSettings) -> tuple[list[FittedP
 
 def _by_kind(fitted: FittedPanels, limit: Floats, choose: Callable[[Floats], Floats]) -> Floats:
     """(r,) chosen for the panels of each number of sides by themselves."""
-    sides = fitted.spokes.lengths
+    kinds = _kinds(fitted)
     chosen = np.zeros_like(limit)
-    for kind in np.unique(sides):
-        chosen[sides == kind] = choose(limit[sides == kind])
+    for kind in np.unique(kinds):
+        chosen[kinds == kind] = choose(limit[kinds == kind])
     return chosen
 
 
@@ -164,15 +165,14 @@ def _chosen(
     return _by_kind(fitted, limit, lambda own: choose_lengths(own, classes, cost, increment, smallest))
 
 
-def _true_sides(fitted: FittedPanels, member: Ints) -> Ints:
-    """(s,) sides of the panels of each class; edges in line with each other are one side."""
-    one = np.unique(member, return_index=True)[1]
-    spokes = take_rows(fitted.spokes, one)[0]
-    ahead = edge_vectors(spokes)
-    back = np.empty_like(ahead)
-    back[spokes.next()] = -ahead
-    bends = np.linalg.norm(np.cross(ahead, back), axis=1) > 1e-6
-    return np.asarray(row_sums(bends.astype(float), spokes.offsets), dtype=np.int64)
+def _kinds(fitted: FittedPanels) -> Ints:
+    """(r,) of the regular panels."""
+    return np.zeros(len(fitted.spokes.lengths), dtype=np.int64) if fitted.kind is None else fitted.kind
+
+
+def _sides(fitted: FittedPanels) -> Ints:
+    """(kinds,) corners of each that are not straight."""
+    return np.zeros(0, dtype=np.int64) if fitted.sides is None else fitted.sides
 
 
 def _fewest(fitted: FittedPanels, limit: Floats, settings: PanelSettings) -> tuple[Floats, tuple[str, ...]]:
@@ -192,24 +192,24 @@ def _fewest(fitted: FittedPanels, limit: Floats, settings: PanelSettings) -> tup
         highest[order] = level(floor_to(own[order], settings.increment))
         return highest
 
-    sides = fitted.spokes.lengths
+    kind = _kinds(fitted)
     joints = _joints(fitted)
-    found = fewest_lengths(_by_kind(fitted, limit, leveled), joints, settings.max_gap, sides)
+    found = fewest_lengths(_by_kind(fitted, limit, leveled), joints, settings.max_gap, kind)
     said = _wide_note(fitted, found, settings.max_gap)
     length, bound = found.length, np.where(found.over, np.inf, settings.max_gap * (1 + SLACK))
-    few = _classes(sides, length)
+    few = _classes(kind, length)
     for classes in range(1, min(few, TRADE_OFF_CLASSES) + 1):
         covering = _chosen(fitted, limit, classes, settings)
-        if _classes(sides, covering) > few:
+        if _classes(kind, covering) > few:
             break
         if (joints.width(covering) <= bound).all():
             return covering, said
     return length, said
 
 
-def _classes(sides: Ints, length: Floats) -> int:
+def _classes(kind: Ints, length: Floats) -> int:
     """How many different panels there are."""
-    return len(np.unique(np.stack([sides, length]), axis=1).T)
+    return len(np.unique(np.stack([kind, length]), axis=1).T)
 
 
 def _joints(fitted: FittedPanels) -> Joints:
@@ -218,11 +218,10 @@ def _joints(fitted: FittedPanels) -> Joints:
     assert facing is not None
     position = np.full(len(regular), -1, dtype=np.int64)
     position[regular] = np.arange(int(regular.sum()))
-    mean = mean_normals(facing, fitted.normal)
     return Joints(
         position[facing.left],
         position[facing.right],
-        lambda length: widths(_polygons(fitted, length), facing, mean),
+        lambda length: widths(_polygons(fitted, length), facing),
         _inradius(fitted),
     )
 
@@ -290,12 +289,12 @@ def _polygons(fitted: FittedPanels, length: Floats) -> Ragged:
 def _curve(fitted: FittedPanels, allowed: Floats, settings: PanelSettings) -> Floats:
     """(k, 4) for 1…k classes of each kind: uncovered part, worst gap, mean and greatest width of the
     joints."""
-    sides, area, inradius = fitted.spokes.lengths, outline_areas(fitted.spokes), _inradius(fitted)
+    kind_of, area, inradius = _kinds(fitted), outline_areas(fitted.spokes), _inradius(fitted)
     cell_area = float(fitted.cell_area[fitted.regular].sum())
     free_length = _free_length(fitted)
     kinds = []
-    for kind in np.unique(sides):
-        own = np.flatnonzero(sides == kind)
+    for kind in np.unique(kind_of):
+        own = np.flatnonzero(kind_of == kind)
         own = own[np.argsort(allowed[own], kind="stable")]
         made, floored = partition(allowed[own], TRADE_OFF_CLASSES, settings.size_cost, settings.increment)
         kinds.append((own, made.start, floored))
@@ -341,14 +340,14 @@ def _size_notes(fitted: FittedPanels, settings: PanelSettings, limit: Floats, le
     if not isinstance(settings.sizes, int) or not len(length):
         return []
     notes = []
-    sides = fitted.spokes.lengths
-    for kind in np.unique(sides):
-        own = sides == kind
+    kinds, sides = _kinds(fitted), _sides(fitted)
+    for kind in np.unique(kinds[kinds < fitted.pieces]).tolist():
+        own = kinds == kind
         different = len(np.unique(level(np.sort(floor_to(limit[own], settings.increment)))))
         used = len(np.unique(length[own]))
         if used >= min(settings.sizes, different):
             continue
-        of = "" if own.all() else f" of panels with {kind} sides"
+        of = "" if fitted.pieces < 2 else f" of panels with {sides[kind]} sides"
         notes.append(
             f"Of the {settings.sizes} sizes{of} allowed {used} {'is' if used == 1 else 'are'} used: with "
             f"more, some would differ by less than {ALIKE:.1%}, to cover no more than {ALIKE_AREA:.1%} of "

@@ -8,11 +8,11 @@ circumradius is then (σ₁ + σ₂)/2. (An orthogonal Procrustes problem with s
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hexwrap_solver.arrays import Floats, Ragged
+from hexwrap_solver.arrays import Complexes, Floats, Ragged
 from hexwrap_solver.geometry import dot, normalize
 
 
@@ -48,6 +48,12 @@ def outline_areas(spokes: Ragged) -> Floats:
     if not spokes.n_rows:
         return np.zeros(0)
     return np.asarray(np.linalg.norm(np.add.reduceat(cross, spokes.offsets[:-1]), axis=1))
+
+
+def bending(outline: Complexes) -> int:
+    """Corners of an outline (p,) that are not straight."""
+    ahead = np.roll(outline, -1) - outline
+    return int((abs((np.roll(ahead, 1).conj() * ahead).imag) > 1e-6).sum())
 
 
 def corners(p: int) -> Floats:
@@ -97,11 +103,17 @@ def nearest_copy(points: Floats, outline: Floats, normal: Floats | None = None) 
     return Poses(points.mean(axis=1), x_axis, y_axis, length, np.stack(starts)[best])
 
 
+def copies(points: Floats, outline: Floats, normal: Floats | None = None) -> Poses:
+    """The same for a polygon each, outline (q, p, 2) with mean 0, corners in order."""
+    return replace(_copy(points, outline, normal), center=points.mean(axis=1), outline=outline)
+
+
 def _copy(points: Floats, outline: Floats, normal: Floats | None) -> Poses:
-    """With the corners in order: the axes are the polar factor of Σ p_i q_iᵀ."""
+    """With the corners in order: the axes are the polar factor of Σ p_i q_iᵀ. outline: (p, 2) or (q, p, 2).
+    The centres are 0."""
     centred = points - points.mean(axis=1, keepdims=True)
-    moment = np.einsum("qid,ie->qde", centred, outline)
-    squares = float((outline**2).sum())
+    moment = np.einsum("qid,qie->qde", centred, np.broadcast_to(outline, (*points.shape[:2], 2)))
+    squares = (outline**2).sum(axis=(-2, -1))
     if normal is not None:
         moment -= normal[:, :, None] * np.einsum("qd,qde->qe", normal, moment)[:, None]
         a, b = moment[..., 0], moment[..., 1]

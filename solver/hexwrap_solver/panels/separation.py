@@ -29,15 +29,17 @@ class Separation:
     offset: Floats
 
 
-def separating_planes(pattern: Pattern, edges: HalfEdges, normal: Floats, joint: float) -> Separation:
+def separating_planes(
+    pattern: Pattern, edges: HalfEdges, normal: Floats, joint: Floats | float
+) -> Separation:
     """normal: (cells, 3) unit normals of the panels' planes.
 
-    joint: between neighbours a slab of this width is left open. Where there is no neighbour the
-    plane contains the cell's own normal, and the panel may reach the edge.
+    joint: between neighbours a slab of this width is left open, (h,) or everywhere the same. Where there is
+    no neighbour the plane contains the cell's own normal, and the panel may reach the edge.
     """
     inner = edges.twin >= 0
     mean = normal[edges.cell] + np.where(inner[:, None], normal[edges.across], 0.0)
     a, b = pattern.vertices[edges.start], pattern.vertices[edges.end]
     direction = normalize(np.cross(b - a, mean))
     middle = dot(direction, (a + b) / 2)
-    return Separation(direction, middle - np.where(inner, joint / 2, 0.0))
+    return Separation(direction, middle - np.where(inner, np.asarray(joint) / 2, 0.0))

@@ -35,16 +35,22 @@ def plane_normals(polygons: Ragged) -> Floats:
 
 
 def flatten_and_clear(
-    polygons: Ragged, normal: Floats, direction: Floats, offset: Floats, across: Ints
+    polygons: Ragged,
+    normal: Floats,
+    direction: Floats,
+    offset: Floats,
+    across: Ints,
+    origin: Floats | None = None,
 ) -> tuple[Ragged, Floats, Floats]:
     """Lays polygons in their planes, each as large as its separating planes let it be.
 
     normal: (q, 3). direction, offset: per corner, the plane of the edge that begins there; across: the cell
-    beyond it, or −1, where nothing binds. Corners and edges stay in step with those of the cell. Returns the
+    beyond it, or −1, where nothing binds. origin: (q, 3) points of the planes, the means of the corners
+    unless given. Corners and edges stay in step with those of the cell. Returns the
     polygons, their mean points (q, 3) and how much of its size each has kept (q,): the root of the ratio of
     areas, 0 where no room was left.
     """
-    flat = _Outlines.of(polygons, normal, direction, offset, across)
+    flat = _Outlines.of(polygons, normal, direction, offset, across, origin)
     mitred, inner = _mitred(flat), across >= 0
     wedge, multiple = _wedges(mitred)
     best = _clipped(mitred, inner & ~multiple)
@@ -80,9 +86,15 @@ class _Outlines:
 
     @classmethod
     def of(
-        cls, polygons: Ragged, normal: Floats, direction: Floats, offset: Floats, across: Ints
+        cls,
+        polygons: Ragged,
+        normal: Floats,
+        direction: Floats,
+        offset: Floats,
+        across: Ints,
+        origin: Floats | None,
     ) -> _Outlines:
-        row, origin = polygons.row, means(polygons)
+        row, origin = polygons.row, means(polygons) if origin is None else origin
         axes = plane_axes(normal)
         corner = in_planes(polygons, origin, axes)
         side = np.einsum("hed,hd->he", axes[row], direction)

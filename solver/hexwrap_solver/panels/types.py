@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Literal
+
+import numpy as np
 
 from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged
 from hexwrap_solver.errors import SettingError
@@ -80,6 +82,10 @@ class PanelSettings:
         float,
         Setting("edge lengths are rounded down to its multiples; 0: not", ge=0, unit="length", rare=True),
     ] = 0.0
+    fold: Annotated[
+        Literal["halves", "folded"],
+        Setting("cells that a fold divides: two flat halves each, or one bent panel", rare=True),
+    ] = "halves"
     components: Annotated[ComponentSettings | None, Setting("what each panel is built from", rare=True)] = (
         None
     )
@@ -108,6 +114,22 @@ class TradeOff:
 
 
 @dataclass(frozen=True)
+class Bends:
+    """Panels of two flat halves that a hinge joins, all arrays (b,).
+
+    panel: rows of the panels, ascending. The hinge runs from the panel's corner 0 to its corner ``hinge``:
+    the corners from one to the other are those of the half in the panel's own cell, the others, with both
+    again, those of the half in the cell ``other``. side: (b, 2) the corner of each cell at which its side
+    along the fold begins.
+    """
+
+    panel: Ints
+    other: Ints
+    hinge: Ints
+    side: Ints
+
+
+@dataclass(frozen=True)
 class FittedPanels:
     """Panels before their lengths are chosen: everything that does not depend on the size classes.
 
@@ -117,8 +139,11 @@ class FittedPanels:
     order. center, normal: (q, 3). limit: (q,) greatest edge length (mean edge of the others). whole: (q,).
     cell_area: (q,) of the panels' cells. energy, notes: as in ``Panels``. spare_limit, spare_center: another
     choice of limit and center without overlap, which few classes may suit better. facing: edges of
-    neighbouring panels, None for watertight ones. special: (q,) those in ``shapes`` that are regular polygons
-    with another number of sides, around a singularity.
+    neighbouring panels, None for watertight ones. special: (q,) those in ``shapes`` that are types of their
+    own: regular polygons with another number of sides, around a singularity, and pieces along folds. kind:
+    (r,) number of the regular panels' kind, which size classes keep apart, those of the pattern's cells
+    before those of pieces along folds; sides: (kinds,) corners of each that are not straight; pieces: first
+    kind of pieces. bends: None where no panel is bent.
     """
 
     mode: Literal["split", "watertight"]
@@ -137,6 +162,10 @@ class FittedPanels:
     spare_center: Floats | None = None
     facing: Facing | None = None
     special: Bools | None = None
+    kind: Ints | None = None
+    sides: Ints | None = None
+    pieces: int = 0
+    bends: Bends | None = None
 
 
 @dataclass(frozen=True)
@@ -147,11 +176,11 @@ class Panels:
     cell of the pattern. size: (q,) class, −1 for panels without one (trimmed cells). edge_length: (q,) ℓ_P
     (the mean edge for polygons that are not equilateral). limit: (q,) largest length allowed before
     quantization. center, normal: (q, 3). whole: (q,). class_length, class_count, class_sides: (s,) the size
-    classes, ascending for each kind of cell, the kind with most sides first, and after them the regular
-    panels with another number of sides (around singularities), a class each; n_special of those. trade_off:
-    None where sizes make no sense. energy: (steps,) value of the weighted energy, None for split panels of
-    method ``exact``. outside: panels whose limit lies below the allowed ``edge_range``. max_gap: widest joint
-    wanted.
+    classes, ascending for each kind of cell, the kind with most sides first; after them, n_special, those of
+    pieces along folds and what is a type of its own, around singularities or along folds. bends: panels of
+    two halves, None where there are none. trade_off: None where sizes make no sense. energy: (steps,) value
+    of the weighted energy, None for split panels of method ``exact``. outside: panels whose limit lies below
+    the allowed ``edge_range``. max_gap: widest joint wanted.
     """
 
     mode: Literal["split", "watertight"]
@@ -172,6 +201,7 @@ class Panels:
     outside: Ints | None = None
     max_gap: float | None = None
     n_special: int = 0
+    bends: Bends | None = None
 
     @property
     def n_panels(self) -> int:
@@ -181,6 +211,22 @@ class Panels:
     def n_sizes(self) -> int:
         """The classes but those of special panels."""
         return len(self.class_length) - self.n_special
+
+    def part(self, rows: Ints) -> Panels:
+        """Some of the panels, none of them bent; their classes are kept."""
+        count = self.polygons.lengths[rows]
+        offsets = np.concatenate([[0], np.cumsum(count)]).astype(np.int64)
+        at = np.repeat(self.polygons.offsets[rows] - offsets[:-1], count) + np.arange(int(offsets[-1]))
+        fields = ("face", "size", "edge_length", "limit", "center", "normal", "whole")
+        taken = {name: getattr(self, name)[rows] for name in fields}
+        return replace(self, polygons=Ragged(self.polygons.values[at], offsets), bends=None, **taken)
+
+    @property
+    def divided(self) -> Bools:
+        """(s,) the classes of pieces along folds."""
+        pieces = np.arange(len(self.class_length)) >= self.n_sizes
+        pieces[self.size[self.whole & (self.size >= 0)]] = False
+        return pieces
 
 
 @dataclass(frozen=True)

@@ -33,6 +33,7 @@ from hexwrap_solver.pattern.lay.edges import PatternEdges, find_edges
 from hexwrap_solver.pattern.lay.labels import azimuth, first_on_net, places, rows_from, turns_around, winding
 from hexwrap_solver.pattern.lay.layout import Layout
 from hexwrap_solver.pattern.lay.nodes import Nodes, find_nodes
+from hexwrap_solver.pattern.pieces import fold_pieces
 from hexwrap_solver.pattern.place.choose import Placing
 from hexwrap_solver.pattern.place.placement import Placement, anchor_vertex, edge_angle
 from hexwrap_solver.pattern.place.rotation import with_rotation
@@ -255,6 +256,7 @@ def _finish(
     ring = rows_from(neighbours, first)
     ring = ring // layout.lattice.counted  # a row of triangles: those that stand and those that hang
     features = on_features(cmap, placing, placement, cut.seams, cells, corner, whole)
+    beside = layout.lattice.carry(cells.isometry, place[corner])
     return Pattern(
         kind=settings.kind,
         vertices=vertices,
@@ -281,6 +283,7 @@ def _finish(
             *_trim_notes(cut, narrow, folded, int(np.count_nonzero(~keep)) - narrow - folded),
         ),
         features=features,
+        pieces=fold_pieces(layout.lattice, features, cells, corner, beside, whole) if features else None,
     )
 
 

@@ -86,6 +86,22 @@ class PatternFeature:
 
 
 @dataclass(frozen=True)
+class FoldPieces:
+    """Cells that features cut.
+
+    cell: (k,) ascending. side: (k,) the corner of the cell at which its side along the fold begins. mate:
+    (k,) which of the pieces, across that side, makes a whole cell with it, −1 where there is none. outline:
+    rows (k,) of corners (·, 2) in the lattice, edge 1, from that one on, with the side along the fold on the
+    first axis about 0.
+    """
+
+    cell: Ints
+    side: Ints
+    mate: Ints
+    outline: Ragged
+
+
+@dataclass(frozen=True)
 class Pattern:
     """A mesh of cells with shared vertices that closes around the surface.
 
@@ -100,7 +116,8 @@ class Pattern:
     loop 0 and place in the row; on nets around is the greatest number of cells in one.
     rotation: angle actually taken, radians, from the boundary direction (or the horizontal axis on cones).
     edge_length: mean edge length on the surface. distortion: worst singular-value ratio − 1 of the stretch
-    that ``align`` and features needed, 0 where none. features: what became of those of the surface.
+    that ``align`` and features needed, 0 where none. features: what became of those of the surface. pieces:
+    cells cut along them, None where there are none.
     """
 
     kind: Kind
@@ -124,6 +141,7 @@ class Pattern:
     distortion: float
     notes: tuple[str, ...] = ()
     features: tuple[PatternFeature, ...] = ()
+    pieces: FoldPieces | None = None
 
     @property
     def n_cells(self) -> int:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -19,9 +19,9 @@ from hexwrap_solver.conformal.energy import Corners, corner_angles, opposite_len
 from hexwrap_solver.conformal.layout import FaceTree, develop
 from hexwrap_solver.errors import ConvergenceError
 from hexwrap_solver.linalg.factor import Factorisation
+from hexwrap_solver.linalg.integers import nearest_integers
 from hexwrap_solver.singularities.cut import Branches, branches
 from hexwrap_solver.singularities.drag import Grip, dragged, grips
-from hexwrap_solver.singularities.integers import nearest_integers
 from hexwrap_solver.singularities.linear import targets, vertex_areas
 from hexwrap_solver.singularities.solvable import solvable
 from hexwrap_solver.singularities.types import End
@@ -35,7 +35,7 @@ DIPOLE, STRETCH, TURN, SCALE = 0.15, 0.002, 0.1, 0.02
 #: accepted.
 STRIDE, STEPS, DONE, ACCEPTED = 0.6, 40, 1e-11, 1e-9
 #: A step beyond which there is no map is halved at most so often.
-HALVINGS = 5
+HALVINGS = 2
 #: Differences for the Jacobian, in units, to each of which the map is linear.
 DIFFERENCE = 1e-3
 #: Residual of the angle sums that will do on the way, radians per cell that is left to close.
@@ -359,7 +359,6 @@ class Closing:
         self.order = round(2 * np.pi / chart.quantum)
         self.zeta = complex(np.exp(1j * chart.quantum))
         self.base = chart.at(np.zeros(chart.unknowns)).holonomy
-        self.aim = np.zeros((len(chart.cones), 2))  # where singularities go at first, cells
         s = len(chart.cones) - 1
         loops = [-1] * s + [-2 if self.line is None or not on else -3 for on in on_line]
         kind = np.array(loops, dtype=np.int64)
@@ -482,30 +481,39 @@ class Closing:
                 step = step / 2
         return step, self.chart.at(x + step[:-2], enough)
 
+    @cached_property
+    def _linear(self) -> tuple[complex, Floats, Floats]:
+        """Place of the lattice, wanted values of the equations there, and their slopes."""
+        changed = self.chart.small_steps(DIFFERENCE)
+        goal = self.start(changed)
+        wanted = np.concatenate([goal.image.real, goal.image.imag, goal.depth])
+        return goal.factor, wanted, self._slopes(changed, goal.factor)
+
+    @cached_property
+    def moves(self) -> Floats:
+        """(s, 2) cells, by which the singularities would have to move if the map were linear in them."""
+        factor, wanted, slopes = self._linear
+        step = np.linalg.lstsq(slopes, wanted - self._values(self.base, factor), rcond=1e-9)[0]
+        return np.asarray(step[: 2 * len(self.chart.cones)].reshape(-1, 2), dtype=np.float64)
+
     @property
-    def aims(self) -> Floats:
-        """(s, 3) where the singularities would come to stand, as far as that was known at first."""
+    def places(self) -> Floats:
+        """(s, 3) where they would come to stand then."""
         chart = self.chart
-        return np.asarray(
-            dragged(chart.surface, chart.hold, chart.cell * self.aim).vertices[chart.cones], dtype=np.float64
-        )
+        moved = dragged(chart.surface, chart.hold, chart.cell * self.moves)
+        return np.asarray(moved.vertices[chart.cones], dtype=np.float64)
 
     def solve(self, progress: Progress = no_progress) -> Closed:
         """Raises ConvergenceError where it does not close."""
         chart = self.chart
-        changed = chart.small_steps(DIFFERENCE)
-        goal = self.start(changed)
-        wanted = np.concatenate([goal.image.real, goal.image.imag, goal.depth])
-        factor, x, seen = goal.factor, np.zeros(chart.unknowns), None
-        slopes = self._slopes(changed, factor)
+        factor, wanted, slopes = self._linear
+        x, seen = np.zeros(chart.unknowns), None
         off = wanted - self._values(self.base, factor)
         best, steps, s = float(np.abs(off).max(initial=0.0)), 0, 2 * len(chart.cones)
         for _ in range(STEPS):
             if best <= DONE:
                 break
             d: Floats = np.linalg.lstsq(slopes, off, rcond=1e-9)[0].astype(np.float64)
-            if not steps:
-                self.aim = d[:s].reshape(-1, 2)
             stride = float(np.hypot(d[0:s:2], d[1:s:2]).max())
             d *= min(1.0, STRIDE / max(stride, 1e-300))
             d, new_seen = self._stepped(x, d, ROUGH * best)

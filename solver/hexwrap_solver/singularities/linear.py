@@ -31,6 +31,8 @@ PATCHES = 1200
 SOLVED, FEWEST = 1.5e7, 400
 #: Right-hand sides solved at a time.
 BLOCK = 128
+#: What the area of filled openings counts.
+NOTHING = 1e-6
 
 
 @dataclass(frozen=True)
@@ -104,6 +106,14 @@ def vertex_areas(surface: Surface) -> Floats:
     return np.asarray(np.bincount(surface.faces.ravel(), third, len(surface.vertices)))
 
 
+def _wall_areas(surface: Surface) -> Floats:
+    """The same, but next to nothing where openings were filled, which are cut out again."""
+    if surface.patch is None:
+        return vertex_areas(surface)
+    third = np.repeat(np.where(surface.patch, NOTHING, 1.0) * surface.areas / 3, 3)
+    return np.asarray(np.bincount(surface.faces.ravel(), third, len(surface.vertices)))
+
+
 def targets(
     surface: Surface,
     ends: tuple[str, ...],
@@ -169,7 +179,7 @@ class Responses:
         self.loops = reference_loops(surface, rules)
         self.rest = turns * (2 - len(rules.ends)) - sum(self.loops)
         none = np.zeros(0, dtype=np.int64)
-        area = vertex_areas(surface)
+        area = _wall_areas(surface)
         background = self.rest * rules.quantum if not self.free else 0.0
         wanted = targets(surface, rules.ends, self.loops, rules.quantum, none, none, background, rules.angles)
         self.energy = energy = Energy(surface, wanted)
@@ -203,7 +213,7 @@ class Responses:
         few = int(np.clip(SOLVED / len(self.surface.vertices), FEWEST, len(self.middle)))
         middle = self.middle
         if few < len(middle):
-            _, middle = _patches(self.surface, vertex_areas(self.surface), few)
+            _, middle = _patches(self.surface, _wall_areas(self.surface), few)
         return _seats(self.surface, middle, self.rules)
 
     def near(self, vertices: Ints, radius: float, spacing: float) -> Ints:

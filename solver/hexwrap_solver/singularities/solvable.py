@@ -20,7 +20,7 @@ from hexwrap_solver.errors import ConvergenceError
 from hexwrap_solver.surface.types import Surface
 
 #: Rounds of splitting, and how many times the vertices there may be in the end, and so many more.
-ROUNDS, MOST, MOST_MORE = 20, 3, 2000
+ROUNDS, MOST, MOST_MORE = 12, 2, 2000
 
 
 def solvable(surface: Surface, wanted: Callable[[Surface], Targets]) -> tuple[Energy, Surface, Minimum]:

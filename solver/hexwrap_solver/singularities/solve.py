@@ -45,9 +45,12 @@ FREE, ASKED = 0.05, 0.015
 #: Where the least moves that close are longer than this, in cells, singularities are seated anew, so many
 #: times.
 FAR, AGAIN = 0.6, 2
-#: Where those chosen do not close, so many other numbers of singularities are tried, and then cells smaller
-#: by these factors.
+#: Where those chosen do not close, so many other numbers of singularities are tried, and then those chosen
+#: with cells smaller by these factors.
 OTHERS, FINER = 1, (1, 2)
+#: Closing is not tried anew once it was tried on meshes of so many vertices together; those on which it fails
+#: count so many times more.
+WORK, HARD = 100_000, 2
 #: Creases whose surroundings are more than this part of the surface are no lines to keep away from.
 FACETED = 0.5
 #: Sums of listed angles this near to a multiple of the quantum are one, radians.
@@ -285,12 +288,15 @@ def first_that_closes(surface: Surface, frame: Frame, placing: Placing, progress
     """With other singularities, and smaller cells where no size is asked for, if those chosen do not close:
     the smaller the cells, the less they have to move. Raises ConvergenceError, that of the first."""
     failed: ConvergenceError | None = None
+    work = Work(WORK)
     for part in FINER[:1] if frame.sized or not placing.proposals[0].count else FINER:
         smaller = replace(frame, width=frame.width / part)
-        for chosen in (placing.chosen, *placing.others[:OTHERS]):
+        for chosen in (placing.chosen, *(placing.others[:OTHERS] if part == 1 else ())):
             taken = replace(placing, chosen=chosen)
+            if failed is not None and work.left <= 0:
+                raise failed
             try:
-                chart, found = closed_at(surface, smaller, taken.proposal, progress)
+                chart, found = closed_at(surface, smaller, taken.proposal, progress, work)
             except ConvergenceError as error:
                 failed = failed or error
                 continue
@@ -316,51 +322,50 @@ def _changes(frame: Frame, placing: Placing, chosen: int, part: int) -> Iterator
         )
 
 
-def closed_at(surface: Surface, frame: Frame, proposal: Proposal, progress: Progress) -> tuple[Chart, Closed]:
-    """Seated anew at the nearest vertices where the first moves would be too long."""
+@dataclass
+class Work:
+    """left: vertices of the meshes on which closing may still be tried."""
+
+    left: int
+
+
+def closed_at(
+    surface: Surface, frame: Frame, proposal: Proposal, progress: Progress, work: Work
+) -> tuple[Chart, Closed]:
+    """Seated anew at the nearest vertices where the first moves would be too long, or the mesh does not allow
+    them."""
     failed: ConvergenceError | None = None
     vertex, index = _ordered(proposal)
     finer = refined(surface, surface.vertices[vertex], frame.width)
     slope = _slope if frame.turn is not None else None
-    best: tuple[Chart, Closed] | None = None
-    for _ in range(AGAIN + 1):
-        chart = Chart(
-            finer,
-            vertex,
-            index,
-            proposal.loops,
-            frame.rules.ends,
-            frame.lattice.quantum,
-            frame.width,
-            slope,
-            frame.rules.angles,
-        )
-        closing, finer = (
-            Closing(chart, frame.width, frame.line, frame.free_scale, frame.aligned),
-            chart.surface,
-        )
+    quantum, ends, angles = frame.lattice.quantum, frame.rules.ends, frame.rules.angles
+    for again in range(AGAIN + 1):
         try:
-            found = closing.solve(progress)
-            best, places = (chart, found), found.seen.surface.vertices[vertex]
-            if found.moves.max() <= FAR:
-                break
+            chart = Chart(finer, vertex, index, proposal.loops, ends, quantum, frame.width, slope, angles)
+            closing = Closing(chart, frame.width, frame.line, frame.free_scale, frame.aligned)
         except ConvergenceError as error:
-            if best is not None:
-                break
-            failed, places = failed or error, closing.aims
-            finer = refined(finer, places, frame.width)
-        seats = _nearest_inside(finer, places)
-        if (
-            (seats == vertex).all()
-            or len(np.unique(seats)) < len(seats)
-            or np.isin(seats, finer.boundary).any()
-        ):
+            work.left -= HARD * len(finer.vertices)
+            raise failed or error from None
+        finer = chart.surface
+        work.left -= len(finer.vertices)
+        last = again == AGAIN or work.left <= 0
+        if last or np.linalg.norm(closing.moves, axis=1).max() <= FAR:
+            try:
+                return chart, closing.solve(progress)
+            except ConvergenceError as error:
+                failed = failed or error
+                work.left -= HARD * len(finer.vertices)
+                if last or work.left <= 0:
+                    break
+                finer = refined(finer, closing.places, frame.width)
+        seats = _nearest_inside(finer, closing.places)
+        if len({*seats.tolist()} - {*finer.boundary.tolist()}) < len(seats) or (seats == vertex).all():
+            if failed is None:
+                return chart, closing.solve(progress)
             break
         vertex = seats
-    if best is None:
-        assert failed is not None
-        raise failed
-    return best
+    assert failed is not None
+    raise failed
 
 
 def _slope(surface: Surface) -> Floats:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -78,14 +79,14 @@ class TriangleTree:
             highs.append(np.maximum(highs[-1][:, ::2], highs[-1][:, 1::2]))
         return cls(corners, KDTree(centroid), order, lows[::-1], highs[::-1])
 
-    def nearest(self, points: Floats, near: Ints | None = None) -> Nearest:
-        """points: (k, 3), finite. near: (k,) a triangle believed to be near each point, to begin with.
+    def nearest(self, points: Floats) -> Nearest:
+        """points: (k, 3), finite.
 
         Of a point beyond FAR sizes of the mesh the nearest point is exact to 1/FAR of the mesh's size; a
         distance that no number can hold is given as the largest number.
         """
-        far, moved = self._moved_near(points)
-        found = self._nearest_of_all(moved, near)
+        far, near = self._moved_near(points)
+        found = self._nearest_of_all(near)
         gap = points[far] - np.einsum("kc,kcd->kd", found.barycentric[far], self.corners[found.face[far]])
         found.distance[far] = _length(gap)
         return found
@@ -98,14 +99,52 @@ class TriangleTree:
         """
         if near is None:
             near = np.asarray(self.centroids.query(points)[1])
-        bound = nearest_in_triangles(points, self.corners[near])[1]
+        bound = self._distance(points, near)
         greatest = np.zeros(rows)
         order = np.lexsort((-bound, row))
         first = order[np.diff(row[order], prepend=-1) > 0]
-        greatest[row[first]] = self.nearest(points[first], near[first]).distance
+        greatest[row[first]] = self._least_distance(points[first], near[first], bound[first])
         rest = np.setdiff1d(np.flatnonzero(bound > greatest[row]), first, assume_unique=True)
-        np.maximum.at(greatest, row[rest], self.nearest(points[rest], near[rest]).distance)
+        np.maximum.at(greatest, row[rest], self._least_distance(points[rest], near[rest], bound[rest]))
         return greatest
+
+    def _least_distance(self, points: Floats, near: Ints, bound: Floats) -> Floats:
+        """(k,) distances from the mesh. bound: from the triangles near (k,); where these are not near, the
+        search begins elsewhere."""
+        corners = self.corners[near]
+        close = bound <= np.abs(corners[:, 1] - corners[:, 0]).max(axis=1)
+        some, least = points[close], bound.copy()
+        scale = np.maximum(np.abs(some).max(axis=1, initial=0.0), np.abs(self.corners).max())
+        reach = bound[close] * (1 + 1e-9) + ROUNDINGS * np.finfo(float).eps * scale
+        found = self._within(some, reach) if len(some) else None
+        if found is None:
+            close[:] = False
+        else:
+            point, leaf = found
+            there = least[close]
+            np.minimum.at(there, point, self._distance(some[point], self.order[leaf]))
+            least[close] = there
+        least[~close] = self.nearest(points[~close]).distance
+        return least
+
+    @cached_property
+    def _frames(self) -> Floats:
+        """(m, 3, 3) what carries an offset from the first corner of a triangle to the barycentric coordinates
+        of the other two and the height above it; not numbers where it has no area."""
+        ab, ac = self.corners[:, 1] - self.corners[:, 0], self.corners[:, 2] - self.corners[:, 0]
+        normal = np.cross(ab, ac)
+        square = dot(normal, normal)[:, None]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            rows = np.cross(ac, normal) / square, np.cross(normal, ab) / square, normal / np.sqrt(square)
+        return np.stack(rows, axis=1)
+
+    def _distance(self, points: Floats, face: Ints) -> Floats:
+        """(k,) distance of each point from a triangle of its own."""
+        second, third, height = np.einsum("kij,kj->ik", self._frames[face], points - self.corners[face, 0])
+        distance: Floats = np.abs(height)
+        outer = np.flatnonzero(~((second >= 0) & (third >= 0) & (second + third <= 1)))
+        distance[outer] = nearest_in_triangles(points[outer], self.corners[face[outer]])[1]
+        return distance
 
     def _moved_near(self, points: Floats) -> tuple[Ints, Floats]:
         """Which points are too far away to search for them as they are, and all points, those moved."""
@@ -119,40 +158,26 @@ class TriangleTree:
         near[far] = middle + limit * direction / np.linalg.norm(direction, axis=1)[:, None]
         return far, near
 
-    def _nearest_of_all(self, points: Floats, near: Ints | None) -> Nearest:
+    def _nearest_of_all(self, points: Floats) -> Nearest:
         face = np.zeros(len(points), dtype=np.int64)
         barycentric = np.zeros((len(points), 3))
         distance = np.zeros(len(points))
-        along_curve = np.arange(len(points))
-        if self._together(len(points)) > 1:
-            along_curve = np.argsort(_morton(points), kind="stable")
+        along_curve = np.argsort(_morton(points), kind="stable") if len(points) else face
         for i in range(0, len(points), CHUNK):
             part = along_curve[i : i + CHUNK]
-            face[part], barycentric[part], distance[part] = self._nearest(
-                points[part], None if near is None else near[part]
-            )
+            face[part], barycentric[part], distance[part] = self._nearest(points[part])
         return Nearest(face, barycentric, distance)
 
-    def _nearest(self, points: Floats, near: Ints | None = None) -> tuple[Ints, Floats, Floats]:
-        """The triangle with the nearest centroid bounds the search of the others, or one that is believed to
-        be near, where it is: as near as it is large."""
-        first, bound = np.zeros(len(points), dtype=np.int64), np.full(len(points), np.inf)
-        if near is not None:
-            corners = self.corners[near]
-            first, bound = near.copy(), nearest_in_triangles(points, corners)[1]
-            bound[bound > np.abs(corners[:, 1] - corners[:, 0]).max(axis=1)] = np.inf
-        lost = np.flatnonzero(np.isinf(bound))
-        if len(lost):
-            first[lost] = self.centroids.query(points[lost])[1]
-            bound[lost] = nearest_in_triangles(points[lost], self.corners[first[lost]])[1]
+    def _nearest(self, points: Floats) -> tuple[Ints, Floats, Floats]:
+        """The triangle with the nearest centroid bounds the search of the others."""
+        first = np.asarray(self.centroids.query(points)[1])
+        bound = nearest_in_triangles(points, self.corners[first])[1]
         # Rounding, of the distance as of the boxes, must not prune the guess itself.
         reach = bound * (1 + 1e-9) + ROUNDINGS * np.finfo(float).eps * np.abs(points).max(axis=1)
         reach += np.finfo(float).tiny
         found = self._within(points, reach)
         if found is None:
-            halves = (
-                self._nearest(points[half], first[half]) for half in np.array_split(np.arange(len(points)), 2)
-            )
+            halves = (self._nearest(half) for half in np.array_split(points, 2))
             face, barycentric, distance = (np.concatenate(parts) for parts in zip(*halves, strict=True))
             return face, barycentric, distance
         point, leaf = found
@@ -167,17 +192,13 @@ class TriangleTree:
         best = best[np.diff(point[best], prepend=-1) > 0]
         return face[best], barycentric[best], distance[best]
 
-    def _together(self, points: int) -> int:
-        """How many of so many points descend the tree as one."""
-        return min(LARGEST_GROUP, 1 + points // len(self.order))
-
     def _within(self, points: Floats, reach: Floats) -> tuple[Ints, Ints] | None:
         """All pairs (point, leaf) whose box comes within reach of the point; None where several points have
         too many.
 
         Points that are neighbours along the curve descend the tree together, in one box.
         """
-        together = self._together(len(points))
+        together = min(LARGEST_GROUP, 1 + len(points) // len(self.order))
         start = np.arange(0, len(points), together)
         place = np.ascontiguousarray(points.T)
         low = np.minimum.reduceat(place - reach, start, axis=1)

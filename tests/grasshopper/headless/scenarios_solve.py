@@ -424,6 +424,18 @@ def circles_and_lines_are_lifted():
     assert loop.IsClosed and len(piece.points) == 41
 
 
+def curves_are_features():
+    """A ring wired to Features becomes one that the pattern follows at its height; an empty wire is none."""
+    angles = [2.0 * math.pi * k / 24 for k in range(25)]
+    ring = array([(1.25 * math.cos(a), 1.25 * math.sin(a), 3.0) for a in angles])
+    send = done(Features=[None, ring])
+    path = send.Job[send.Job.index("/v1/") :]
+    pattern = world.ask(PORT, "GET", path + "/result?include=pattern")[1]["pattern"]
+    (chain,) = pattern["features"]
+    assert pattern["along"][0]["straight"] and len(chain) >= 16
+    assert max(abs(pattern["vertices"][v][2] - 3.0) for v in chain) < 0.05  # cells are 0.6 high
+
+
 def the_front_can_be_sent():
     send = done(Pattern=None)
     explore = Component("Explore").set(Job=send.Job, MaxSizes=2, Variants=3, Run=True)
@@ -639,6 +651,7 @@ world.run([
     domain_with_corners,
     curves_are_lifted_across_the_cut,
     circles_and_lines_are_lifted,
+    curves_are_features,
     the_front_can_be_sent,
     circles_sent_as_surfaces_are_refused,
     umlauts_reach_the_server,

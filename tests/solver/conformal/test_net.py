@@ -12,6 +12,7 @@ from hexwrap_solver.conformal.cut import cut_open
 from hexwrap_solver.conformal.robust import solve_with_flips
 from hexwrap_solver.conformal.types import BoundaryAngle, BoundaryCondition, Cones, LoopCondition
 from hexwrap_solver.errors import BoundaryError, GaussBonnetError, SettingError, SingularitiesError
+from hexwrap_solver.surface.types import Surface
 from tests.solver.conformal.annuli import bump
 from tests.solver.conformal.nets import CENTRES, HEX, SPHERE, check, disk, flat, holed, sent, spread_points
 
@@ -81,6 +82,32 @@ def test_a_disk_with_a_cone_converges_to_a_power(k: int) -> None:
         )
     assert errors[2] < errors[1] / 2 < errors[0] / 4
     assert errors[2] < 0.01
+
+
+def test_a_disk_converges_to_the_square() -> None:
+    """Schwarz–Christoffel: f′ = (1 − z⁴)^(−1/2), whose corners are those of a square."""
+    errors = []
+    for rings in (8, 16, 32):
+        z, faces = disk(rings)
+        surface = sent(flat(z), faces)
+        at = surface.vertices @ [1, 1j, 0]
+        corner = [int(abs(at - 1j**k).argmin()) for k in range(4)]
+        corners = tuple(BoundaryAngle(np.pi / 2, int(surface.input_vertex[v])) for v in corner)
+        found = conformal_map(surface, BoundaryCondition("angles", corners, quantum="quad"))
+        check(found)
+        inside = np.abs(at) < 0.8
+        off = found.log_scale[inside] + np.log(abs(1 - at[inside] ** 4)) / 2
+        errors.append(float(np.abs(off - off.mean()).max()))
+        side = abs(np.diff(found.corners().ravel()[_corner(surface, corner)]))
+        np.testing.assert_allclose(side, np.mean(side), rtol=1e-6)
+    assert errors[2] < errors[1] / 2 < errors[0] / 4
+    assert errors[2] < 2e-3
+    assert side[0] == pytest.approx(1.8540746773, abs=2e-3)  # Γ(1/4)² / 4√π
+
+
+def _corner(surface: Surface, vertices: list[int]) -> list[int]:
+    """A corner 3·face + c at each vertex."""
+    return [int(np.flatnonzero(surface.faces.ravel() == v)[0]) for v in vertices]
 
 
 def test_a_flat_rectangle_maps_to_itself() -> None:

@@ -274,7 +274,7 @@ def first_that_closes(monkeypatch, sized, fewest, failing):
     """The map that is made where so many attempts fail, and those attempts: width and number."""
     asked = []
 
-    def close(surface, frame, proposal, progress):
+    def close(surface, frame, proposal, progress, work):
         asked.append((frame.width, proposal.count))
         if len(asked) <= failing:
             raise ConvergenceError(f"Reason {len(asked)}.")

@@ -134,7 +134,7 @@ def _triangles(points: Floats, triangles: Floats) -> tuple[Floats, Floats, Float
     normal = _area_vectors(spokes)
     normal /= np.maximum(np.linalg.norm(normal, axis=1), np.finfo(float).tiny)[:, None]
     a, b, c = (triangles[:, k] for k in range(3))
-    return normal, (c - b) @ points, (a - b) @ points
+    return normal, (c - b) @ spokes, (a - b) @ spokes  # far from the origin, too
 
 
 def _best_planes(points: Floats) -> tuple[Floats, Floats]:

@@ -35,12 +35,13 @@ from hexwrap_solver.panels.energy.residuals import (
     plane_slopes,
     residuals,
 )
+from hexwrap_solver.panels.polygons import mean_edges
 from hexwrap_solver.panels.types import Weights
 from hexwrap_solver.pattern.types import Pattern
 from hexwrap_solver.surface.types import Surface
 
 #: Weights of the plane distances, stage by stage; the surface weighs 1.
-FLATNESS = (1e2, 1e4, 1e6, 1e8)
+FLATNESS: tuple[float, ...] = (1e2, 1e4, 1e6, 1e8)
 
 #: After so many stages Newton's method is tried; the others follow only where it makes no headway.
 USUAL = 3
@@ -62,6 +63,9 @@ DECISIVE = 1e9
 
 #: Distances from planes / ℓ below this are rounding; Newton's method takes at most so many steps to it.
 FLAT, NEWTON_STEPS = 1e-12, 12
+
+#: Of coordinates, relative to them.
+ROUNDING = 1e-15
 
 #: See ``_flattened``.
 HEADWAY = 0.3
@@ -150,8 +154,8 @@ def minimise_watertight(
     problem = _Problem(pattern, length, replace(aims, weights=weights), surface)
     points = pattern.vertices
     curve: list[float] = []
-    if aims.flat and problem.bend(points) >= FLAT:
-        points = points + NUDGE * pattern.edge_length * _nudges(pattern)
+    if aims.flat and not problem.flat(points):
+        points = points + NUDGE * _nudges(pattern)
     stages, most, enough = FLATNESS, MOST_STEPS, ENOUGH
     if not aims.flat:
         stages, most, enough = (0.0,), ONLY_STEPS, ONLY_ENOUGH
@@ -176,13 +180,14 @@ def minimise_watertight(
             if stage == len(stages):
                 break
             flat = _flattened(problem, points, HEADWAY) if stage >= USUAL else points
-            if stage >= USUAL and problem.bend(flat) < FLAT:
+            if stage >= USUAL and problem.flat(flat):
                 points = flat
                 break
-    if aims.flat and problem.bend(points) >= FLAT:
+    if aims.flat and not problem.flat(points):
         progress(0.9, "flattening")
         points = _flattened(problem, points)
-    curve.append(problem.at(points).asked)
+    if aims.flat:
+        curve.append(problem.at(points).asked)
     energy = np.array(curve)
     return points, factor * energy[np.isfinite(energy)]  # Newton's method may end beyond the barrier
 
@@ -231,17 +236,17 @@ def _flattened(problem: _Problem, points: Floats, headway: float = 1.0) -> Float
                 break
             swift = best.planes < WORTH**2 * state.planes
             state = best
-            if not swift or problem.bend(state.points) < FLAT:
+            if not swift or problem.flat(state.points):
                 break
         points = state.points
-        if state is start or problem.bend(points) < FLAT or state.planes > headway * start.planes:
+        if state is start or problem.flat(points) or state.planes > headway * start.planes:
             break
     return points
 
 
 def _nudges(pattern: Pattern) -> Floats:
-    """(n, 3) along the normals, of order 1, the same for vertices that are alike in their ring: a surface of
-    revolution keeps its symmetry."""
+    """(n, 3) along the normals, of the order of the edges beside them, the same for vertices that are alike
+    in their ring: a surface of revolution keeps its symmetry."""
     faces = pattern.faces
     corner = np.arange(len(faces.values)) - faces.offsets[faces.row]
     kind = pattern.ring[faces.row] * (int(faces.lengths.max()) + 1) + corner
@@ -249,7 +254,9 @@ def _nudges(pattern: Pattern) -> Floats:
     np.minimum.at(least, faces.values.astype(np.int64), kind)
     _, kind = np.unique(least, return_inverse=True)
     size = np.random.default_rng(0).normal(size=int(kind.max()) + 1)
-    return np.asarray(size[kind][:, None] * pattern.normals)
+    n, edge = len(pattern.vertices), mean_edges(pattern.cells)[faces.row]
+    length = np.bincount(faces.values, edge, n) / np.maximum(np.bincount(faces.values, minlength=n), 1)
+    return np.asarray((size[kind] * length)[:, None] * pattern.normals)
 
 
 class _Problem:
@@ -347,6 +354,11 @@ class _Problem:
             except np.linalg.LinAlgError:
                 return np.inf
 
+    def flat(self, points: Floats) -> bool:
+        """But for rounding, which far from the origin is more."""
+        rounding = ROUNDING * float(np.abs(self._start).max(initial=0.0)) / self._unit
+        return self.bend(points) < max(FLAT, rounding)
+
     def step(self, state: _State, *, planes_only: bool = False) -> Floats:
         """(n, 3) Gauss–Newton step from a state with the derivatives taken last."""
         gradient = np.zeros(state.points.size)
@@ -355,7 +367,9 @@ class _Problem:
         parts = len(self._groups) if planes_only else len(self._corners)
         for corner, slope, residual in zip(self._corners[:parts], self._slopes, state.residual, strict=False):
             some = slice(-corner.shape[1] if planes_only else 0, None)
-            share = (residual[:, None, some] @ slope[:, some]).ravel()
+            # Beyond the barrier residuals are ∞ and slopes 0.
+            pull = np.where(np.isfinite(residual), residual, 0.0)
+            share = (pull[:, None, some] @ slope[:, some]).ravel()
             at = 3 * corner[..., None] + np.arange(3)
             gradient += np.bincount(at.ravel(), weights=share, minlength=gradient.size)
         return -self._matrix.solve(gradient).reshape(-1, 3)
@@ -397,7 +411,8 @@ def _lifted(points: Floats, face: Ints, weight: Floats, surface: Surface) -> tup
         for _ in range(PROJECTIONS):
             mean = np.einsum("nc,ncd->nd", weight, normal)
             lifted = vertex + height[:, None, None] * normal
-            miss = points - np.einsum("nc,ncd->nd", weight, lifted)
+            # Differences of coordinates come first: far from the origin their digits are all there is.
+            miss = np.einsum("nc,ncd->nd", weight, points[:, None] - lifted)
             sides = lifted[:, 1:] - lifted[:, :1]
             more = _solved(np.concatenate([sides, mean[:, None]], axis=1), miss)
             weight = weight + np.concatenate([-more[:, :1] - more[:, 1:2], more[:, :2]], axis=1)
@@ -414,7 +429,7 @@ def _solved(rows: Floats, right: Floats) -> Floats:
     across = [np.cross(b, c), np.cross(c, a), np.cross(a, b)]
     volume = np.einsum("nd,nd->n", a, across[0])
     parts = np.stack([np.einsum("nd,nd->n", right, one) for one in across], axis=1)
-    return np.divide(parts, volume[:, None], out=np.zeros_like(parts), where=volume[:, None] != 0)
+    return np.asarray(np.divide(parts, volume[:, None], out=np.zeros_like(parts), where=volume[:, None] != 0))
 
 
 def _square(residual: Floats) -> float:

@@ -14,6 +14,7 @@ from hexwrap_solver.pattern.place.glued import Glued
 from hexwrap_solver.pattern.place.placement import Placement, anchor_vertex, edge_angle, main_loops
 from hexwrap_solver.pattern.place.size import ASKED, edges_around, wanted_edge, width_per_cell
 from hexwrap_solver.pattern.types import PatternSettings
+from hexwrap_solver.surface.topology import half_edges
 
 #: A translation g shorter than this part of the circumference is none.
 NO_SHIFT = 1e-9
@@ -25,7 +26,7 @@ def boundary_direction(cmap: ConformalMap, lattice: Lattice, anchor: int) -> com
     """Unit direction along the boundary, meaningful up to the rotations of the pattern, which g respects.
 
     The mean of (boundary edge)^fold over the boundary; where that cancels (round boundaries, none), the
-    direction around the apex, or the middle, at the anchor.
+    direction around the apex, or the middle, at the anchor; on nets that are glued, of the boundary there.
     """
     corners, faces = cmap.corners(), cmap.surface.faces
     on_ends = np.zeros(len(cmap.surface.vertices), dtype=bool)
@@ -36,11 +37,34 @@ def boundary_direction(cmap: ConformalMap, lattice: Lattice, anchor: int) -> com
     mean = complex((length * (edges / length) ** lattice.fold).sum() / max(length.sum(), 1e-300))
     if abs(mean) > 0.05:
         return complex(np.exp(1j * np.angle(mean) / lattice.fold))
-    stands = (
-        corners.ravel()[np.flatnonzero(faces.ravel() == anchor)[0]] if cmap.kind == "net" else cmap.uv[anchor]
-    )
+    if cmap.kind == "net":
+        if np.any(cmap.net.crossing):
+            return _direction_at(cmap, lattice, anchor)
+        stands = complex(corners.ravel()[np.flatnonzero(faces.ravel() == anchor)[0]])
+    else:
+        stands = complex(cmap.uv[anchor])
     around = 1j * (stands - _middle(cmap))
     return complex(around / abs(around))
+
+
+def _direction_at(cmap: ConformalMap, lattice: Lattice, vertex: int) -> complex:
+    """Unit direction of the boundary at a vertex of it; of the edge to the greatest of its neighbours (x, y,
+    z) at one inside. A net has no middle that would not depend on how it was cut."""
+    surface, corners = cmap.surface, cmap.corners()
+    tail, head = half_edges(surface.faces)
+    edge = (np.roll(corners, -1, axis=1) - corners).ravel()
+    met = np.flatnonzero((tail == vertex) | (head == vertex))
+    rim = met[surface.twin[met] < 0]
+    if not len(rim):
+        unit = 1e-7 * float(np.ptp(surface.vertices, axis=0).max())
+        other = np.where(tail[met] == vertex, head[met], tail[met])
+        x, y, z = np.rint(surface.vertices[other] / unit).T
+        rim = met[np.lexsort((z, y, x))[-1:]]
+    mean = complex(((edge[rim] / abs(edge[rim])) ** lattice.fold).sum())
+    if abs(mean) < 0.05:  # two sides that meet half-way between directions
+        leaving = edge[rim[np.argmax(tail[rim] == vertex)]]
+        mean = complex((leaving / abs(leaving)) ** lattice.fold)
+    return complex(np.exp(1j * np.angle(mean) / lattice.fold))
 
 
 def _middle(cmap: ConformalMap) -> complex:

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hexwrap_solver.singularities.integers import nearest_integers
+from hexwrap_solver.linalg.integers import nearest_integers
 
 
 @settings(deadline=None, max_examples=40)
