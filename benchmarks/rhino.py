@@ -1,10 +1,11 @@
 """What becomes of Rhino files: solved, without a surface, to be chosen, refused, late, crashed, or wrong.
 
     python -m benchmarks.rhino FOLDER ... [--only surface] [--seconds 90] [--out table.json] [--pictures DIR]
+    python -m benchmarks.rhino --write table.json ...
 
 Takes every .3dm in the folders through the pipeline with default settings, each in a process of its own with
 bounded time and memory; results are judged by ``tests/contract.py``. Seconds are processor time. With
-``--pictures`` the panels of what is solved are drawn.
+``--pictures`` the panels of what is solved are drawn; ``--write`` puts tables into docs/results.md.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import resource
 import sys
 import time
 import traceback
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -29,17 +31,25 @@ from hexwrap_server.output.writers import Meta, write
 from hexwrap_solver.errors import HexwrapError
 
 NO_SURFACE = "holds no mesh, surface"
+PAGE = Path(__file__).parent.parent / "docs" / "results.md"
+BEGIN, END = "<!-- Rhino files: made by their benchmark -->", "<!-- end of Rhino files -->"
+#: Letters of what is told that stand in the table.
+TOLD = 110
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("places", nargs="+", type=Path)
+    parser.add_argument("places", nargs="*", type=Path)
+    parser.add_argument("--write", nargs="+", type=Path)
     parser.add_argument("--only", choices=["surface", "all"], default="all")
     parser.add_argument("--seconds", type=int, default=90)
     parser.add_argument("--gigabytes", type=float, default=4)
     parser.add_argument("--out", type=Path)
     parser.add_argument("--pictures", type=Path)
     options = parser.parse_args()
+    if options.write:
+        write_page([row for table in options.write for row in json.loads(table.read_text())])
+        return
     files = sorted(
         file
         for place in options.places
@@ -55,6 +65,31 @@ def main() -> None:
     print(", ".join(f"{count} {verdict}" for verdict, count in sorted(counts.items())))
     if options.out:
         options.out.write_text(json.dumps(rows, indent=1, ensure_ascii=False))
+
+
+def write_page(rows: list[dict[str, Any]]) -> None:
+    lines = ["| file | | panels | covered | loops | s | told |", "|---|---|---|---|---|---|---|"]
+    for row in rows:
+        covered = f"{100 * row['covered']:.0f} %" if "covered" in row else ""
+        told = row["told"].partition(" | ")[2] if row["verdict"] == "solved" else row["told"]
+        told = (told[:TOLD].rpartition(" ")[0] + " …" if len(told) > TOLD else told).replace("|", "/")
+        name = row["file"].removesuffix(".3dm").replace("__", "/").rpartition("/")[2]
+        cells = (
+            name,
+            row["verdict"],
+            row.get("panels", ""),
+            covered,
+            row.get("loops", ""),
+            row["seconds"],
+            told,
+        )
+        lines.append("| " + " | ".join(map(str, cells)) + " |")
+    counts = Counter(row["verdict"] for row in rows)
+    total = ", ".join(f"{count} {verdict}" for verdict, count in counts.most_common())
+    before, _, rest = PAGE.read_text().partition(BEGIN)
+    _, _, after = rest.partition(END)
+    text = "\n".join([BEGIN, "", f"{len(rows)} files: {total}.", "", *lines, ""])
+    PAGE.write_text(before + text + END + after)
 
 
 def apart(file: Path, options: argparse.Namespace) -> dict[str, Any]:

@@ -117,6 +117,8 @@ def browser() -> Iterator[object]:
 def opened(browser, server: Server, path: str = "/") -> Iterator[Page]:
     """A page that must ask nobody else and must not complain, except where the test says so."""
     page = browser.new_page(viewport={"width": 1280, "height": 720})
+    page.context.set_default_timeout(MOMENT)
+    page.context.set_default_navigation_timeout(MOMENT)
     page.complaints, page.strangers = [], []
     page.on("console", lambda m: page.complaints.append(m.text) if m.type == "error" else None)
     page.on("pageerror", lambda e: page.complaints.append(str(e)))
@@ -282,7 +284,7 @@ def test_a_variant_is_taken_from_the_front(browser, server: Server) -> None:
     with opened(browser, server) as page:
         page.locator(f"#jobs [data-job='{job['id']}']").click()
         spots = page.locator("svg.front .variant")
-        spots.first.wait_for(timeout=MOMENT)
+        spots.first.wait_for()
         measured = [i for i, one in enumerate(found["variants"]) if one["measured"]]
         assert sorted(int(spot.get_attribute("data-variant")) for spot in spots.all()) == measured
         slider = page.locator("[data-limit='types']")
@@ -419,7 +421,7 @@ def test_faults_are_shown_in_red_where_they_are(browser, server: Server, tmp_pat
     path.write_text(torus())
     with opened(browser, server) as page:
         page.set_input_files("#file", str(path))
-        page.wait_for_function("() => document.documentElement.dataset.shown === 'faults'", timeout=MOMENT)
+        page.wait_for_function("() => document.documentElement.dataset.shown === 'faults'")
         assert "handle" in page.locator("#banner").inner_text()
         red = page.evaluate(
             """() => {
@@ -543,7 +545,7 @@ def test_cancel_stops_the_job(browser, server: Server, tmp_path: Path) -> None:
     path.write_text(tube(900, 300))
     with opened(browser, server) as page:
         page.set_input_files("#file", str(path))
-        page.wait_for_selector("#cancel:not([hidden])", timeout=MOMENT)
+        page.wait_for_selector("#cancel:not([hidden])")
         page.click("#cancel")
         page.wait_for_selector("#cancel", state="hidden")
 
@@ -559,9 +561,9 @@ def test_the_page_outlives_a_restart_of_the_server(browser, server: Server) -> N
         page.select_option("#sample", "tower")
         before = shown(page)
         server.stop()
-        page.wait_for_selector("#banner:not([hidden])", timeout=MOMENT)
+        page.wait_for_selector("#banner:not([hidden])")
         server.start()
-        page.wait_for_selector("#banner", state="hidden", timeout=MOMENT)
+        page.wait_for_selector("#banner", state="hidden")
         page.fill("[name='panels.sizes']", "4")
         job = shown(page, before)
         assert len(fetched(server, f"/v1/jobs/{job}/result?include=sizes")["sizes"]) == 4

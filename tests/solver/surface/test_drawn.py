@@ -169,3 +169,40 @@ def test_folds_along_given_lines_are_left_out() -> None:
     assert sum(len(f.vertices) for f in left) < sum(len(f.vertices) for f in every)
     with pytest.raises(SettingError, match="without"):
         FeatureSettings(without=(((0.0, 0.0, 0.0),),))
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_lines_along_edges_become_these_edges(seed: int) -> None:
+    """Whatever the way, with points between or vertices left out on straight lines, and rounded."""
+    rng = np.random.default_rng(seed)
+    surface = (tube, lambda: prism(edge=4.0))[seed % 2]()
+    pairs, _ = edges(surface.faces, len(surface.vertices))
+    both = np.concatenate([pairs, pairs[:, ::-1]])
+    inside = ~np.isin(both, surface.boundary).any(axis=1)
+    way = [int(both[inside][0, 0])]
+    for _ in range(30):
+        ahead = [v for v in both[inside][both[inside][:, 0] == way[-1], 1].tolist() if v not in way]
+        if not ahead:
+            break
+        way.append(int(rng.choice(ahead)))
+    line = surface.vertices[way]
+    if seed % 4 > 1:
+        middle = (line[1:] + line[:-1]) / 2
+        line = np.insert(line, np.arange(1, len(line)), middle, axis=0)
+    line = np.round(line, 5)
+    drawn = with_lines(surface, [line])
+    assert drawn.features[0].vertices.tolist() == way
+    assert (drawn.vertices == surface.vertices).all()
+    assert (drawn.faces == surface.faces).all()
+
+
+@pytest.mark.parametrize("step", [1, 4, 8])
+def test_rings_on_a_coarse_waist_keep_their_height(step: int) -> None:
+    t, z = np.arange(24) / 24 * 2 * np.pi, np.linspace(0, 6, 11)[:, None]
+    radius = 2 + 0.75 * np.cos(2 * np.pi * z / 6)
+    rings = np.stack([radius * np.cos(t), radius * np.sin(t), z + 0 * t], axis=2)
+    surface = surface_from_mesh(grid(rings), SurfaceSettings(caps="keep"))
+    drawn = with_lines(surface, [rings[5][[*range(0, 24, step), 0]]])
+    (feature,) = drawn.features
+    assert feature.closed
+    assert abs(drawn.vertices[feature.vertices, 2] - 3).max() < 1e-9

@@ -41,7 +41,7 @@ from hexwrap_solver.pattern.types import Pattern
 from hexwrap_solver.surface.types import Surface
 
 #: Weights of the plane distances, stage by stage; the surface weighs 1.
-FLATNESS = (1e2, 1e4, 1e6, 1e8)
+FLATNESS: tuple[float, ...] = (1e2, 1e4, 1e6, 1e8)
 
 #: After so many stages Newton's method is tried; the others follow only where it makes no headway.
 USUAL = 3
@@ -429,7 +429,7 @@ def _solved(rows: Floats, right: Floats) -> Floats:
     across = [np.cross(b, c), np.cross(c, a), np.cross(a, b)]
     volume = np.einsum("nd,nd->n", a, across[0])
     parts = np.stack([np.einsum("nd,nd->n", right, one) for one in across], axis=1)
-    return np.divide(parts, volume[:, None], out=np.zeros_like(parts), where=volume[:, None] != 0)
+    return np.asarray(np.divide(parts, volume[:, None], out=np.zeros_like(parts), where=volume[:, None] != 0))
 
 
 def _square(residual: Floats) -> float:
