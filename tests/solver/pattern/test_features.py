@@ -123,3 +123,13 @@ def test_edges_through_a_vertex_of_a_fold_are_found_once() -> None:
     assert euler(pattern) == 0
     assert fan_areas(pattern.cells).sum() == pytest.approx(120 * 60, rel=1e-9)
     assert not any("touch themselves" in note for note in pattern.notes)
+
+
+def test_a_number_that_suits_the_folds_better_is_told_and_the_one_asked_for_kept() -> None:
+    settings = PatternSettings("hex", around=60, rotation="vertex", boundary="trim")
+    pattern = lay_pattern(solved("box"), settings)
+    assert pattern.around == 60
+    (note,) = (note for note in pattern.notes if "would fit the folds better" in note)
+    better = lay_pattern(solved("box"), replace(settings, around=int(note.split()[0])))
+    assert better.distortion < 0.5 * pattern.distortion
+    assert not any("would fit the folds better" in note for note in better.notes)
