@@ -140,3 +140,13 @@ def test_no_distortion_is_told_that_is_none() -> None:
     assert cost_of(float("inf"), 0.5) == cost_of(2e9) == "fold the layout over"
     assert cost_of(0.7, 0.5) == "distort cells by 0.70, more than 0.5"
     assert cost_of(1234.5) == "distort cells by more than 100"
+
+
+def test_a_number_that_suits_the_folds_better_is_told_and_the_one_asked_for_kept() -> None:
+    settings = PatternSettings("hex", around=60, rotation="vertex", boundary="trim")
+    pattern = lay_pattern(solved("box"), settings)
+    assert pattern.around == 60
+    (note,) = (note for note in pattern.notes if "would fit the folds better" in note)
+    better = lay_pattern(solved("box"), replace(settings, around=int(note.split()[0])))
+    assert better.distortion < 0.5 * pattern.distortion
+    assert not any("would fit the folds better" in note for note in better.notes)

@@ -32,12 +32,13 @@ from hexwrap_solver.pattern.place.placement import (
     quantized,
 )
 from hexwrap_solver.pattern.place.sides import has_corners, is_polygon
-from hexwrap_solver.pattern.place.size import FREE, mean_stretch, wanted_edge
+from hexwrap_solver.pattern.place.size import FREE, mean_stretch, size_spread, wanted_edge
 from hexwrap_solver.pattern.types import PatternSettings
 
 #: Features are made straight where that costs no more than this at all but one triangle of a hundred, as
-#: predicted, and than that at the worst; above FINE, numbers of cells around further off are tried, too.
-P99, MOST_PREDICTED, MOST_DISTORTED, FINE = 0.99, 0.15, 1.5, 0.02
+#: predicted, and than that at the worst; above FINE, a number of cells around at which they cost less than
+#: half as much is told.
+P99, MOST_PREDICTED, MOST_DISTORTED, FINE = 0.99, 0.15, 1.5, 0.005
 #: Features are given up, the costliest first, in so many rounds.
 MOST_GIVEN_UP = 8
 #: So many, the longest, are tried: each is an unknown of its own in every round.
@@ -138,17 +139,13 @@ class Placing:
                 return None, sentences
             straightening = self._straightened(tuple(chains))
             ratio, _ = predicted(straightening, settings)
-            spread = None
-            if np.quantile(ratio, P99) > FINE:
-                wider, _ = predicted(straightening, settings, FREE)
-                if np.quantile(wider, P99) < 0.5 * np.quantile(ratio, P99):
-                    ratio, spread = wider, FREE
             if np.quantile(ratio, P99) <= MOST_PREDICTED:
-                placed = place_by_sides(straightening, settings, spread)
+                placed = place_by_sides(straightening, settings)
                 if placed.distortion <= MOST_DISTORTED:
                     assert straightening.features is not None
                     return replace(placed, straight=straightening.features.straight), [
                         *sentences,
+                        *self._number_notes(straightening, settings, ratio, placed.around),
                         *(
                             self._third_note(c)
                             for c in chains
@@ -161,6 +158,22 @@ class Placing:
             ]
             chains = left
         return None, sentences
+
+    def _number_notes(
+        self, straightening: Straightening, settings: PatternSettings, ratio: Floats, around: int
+    ) -> list[str]:
+        """Which number of cells around would suit the features better than the size asked for."""
+        own = float(np.quantile(ratio, P99))
+        if own <= FINE or size_spread(settings) >= FREE:
+            return []
+        free, number = predicted(straightening, settings, FREE)
+        other = float(np.quantile(free, P99))
+        if number == around or other > 0.5 * own:
+            return []
+        return [
+            f"{number} cells around, instead of {around}, would fit the folds better: a distortion of about "
+            f"{other:.2g} instead of {own:.2g}."
+        ]
 
     def _wide_note(self, chain: Chain) -> str:
         cells = chain.width / self.cell
