@@ -13,6 +13,10 @@ from pathlib import Path
 import pytest
 
 from grasshopper import archive, components
+from hexwrap_server import samples
+from hexwrap_server.input.requests import SentSurface
+from hexwrap_server.input.schemas import parse_request
+from hexwrap_server.jobs.work import take_in
 from tests.server.patience import PATIENCE, until
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -32,15 +36,73 @@ def unpacked(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for form in components.FORMS:
         (folder / form.name).mkdir()
         for path in (DIST / form.name).glob("*.ghuser"):
-            unpack(path, form, folder / form.name)
+            inner = archive.inflate(archive.inflate(path.read_bytes())["Object"])
+            unpack(inner, path.stem.removeprefix("hexwrap-"), form, folder / form.name)
+        for path in (DIST / form.name).glob("*.gh"):
+            unpack_network(path, form, folder / form.name / path.stem.removeprefix("hexwrap-"))
     return folder
 
 
-def unpack(path: Path, form: components.Form, folder: Path) -> None:
-    inner = archive.inflate(archive.inflate(path.read_bytes())["Object"])
+def unpack_network(path: Path, form: components.Form, folder: Path) -> None:
+    """The components of a definition; in ``network.json`` what stands on the canvas, and its wires."""
+    folder.mkdir()
+    things = []
+    for chunk in archive.inflate(path.read_bytes()).find("Definition", "DefinitionObjects").chunks:
+        box, name = chunk.find("Container"), chunk["Name"]
+        if name == "Group":
+            continue
+        thing = {"name": name, "nickname": box["NickName"], "id": str(box["InstanceGuid"])}
+        if components.code_of(box) is not None:
+            thing["script"] = name.removeprefix("hexwrap ").replace(" ", "")
+            unpack(box, thing["script"], form, folder)
+            box = box.find("ParameterData")
+        ends = [c for c in box.chunks if c.name in ("InputParam", "param_input")]
+        starts = [c for c in box.chunks if c.name == "OutputParam"]
+        thing["wires"] = {c["Name"]: sources(c) for c in ends} if ends else {"": sources(box)}
+        thing["starts"] = {str(c["InstanceGuid"]): c["Name"] for c in starts} or {thing["id"]: ""}
+        thing["items"] = held(name, box)
+        things.append(thing)
+    (folder / "network.json").write_text(json.dumps(things), encoding="utf-8")
+
+
+def sources(chunk: archive.Chunk) -> list[str]:
+    return [str(item.value) for item in chunk.items if item.name == "Source"]
+
+
+def held(name: str, box: archive.Chunk) -> list[object]:
+    """What an object hands on that nothing is wired to, as it is when the file is opened."""
+    if name == "Panel":
+        whole = box.find("PanelProperties")["Multiline"]
+        return [box["UserText"]] if whole else box["UserText"].split("\n")
+    if name == "Number Slider":
+        return [box.find("Slider")["Value"]]
+    if name == "Value List":
+        entries = [c for c in box.chunks if c.name == "ListItem"]
+        return [c["Expression"].strip('"') for c in entries if c["Selected"]]
+    if name == "Boolean Toggle":
+        return [box["ToggleValue"]]
+    return [False] if name == "Button" else []
+
+
+@pytest.fixture(scope="session")
+def sample_meshes(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the meshes of samples, as Rhino would make them."""
+    folder = tmp_path_factory.mktemp("meshes")
+    for name in ("entrance", "dome"):
+        asked = samples.load(name)
+        if "mesh" in asked["surface"]:
+            asked["surface"]["mesh"] = {"max_edge": 0.7}
+        request = parse_request(asked, 10**6, 10**6)
+        assert isinstance(request.surface, SentSurface)
+        surface = take_in(request.surface, request.wanted.surface)
+        rows = {"vertices": surface.vertices.tolist(), "faces": surface.faces.tolist()}
+        (folder / f"{name}.json").write_text(json.dumps(rows), encoding="ascii")
+    return folder
+
+
+def unpack(inner: archive.Chunk, name: str, form: components.Form, folder: Path) -> None:
     data = inner.find("ParameterData")
     inputs = [c for c in data.chunks if c.name == "InputParam"]
-    name = path.stem.removeprefix("hexwrap-")
     code = components.code_of(inner)
     assert code is not None
     (folder / f"{name}.py").write_text(code, encoding="ascii")

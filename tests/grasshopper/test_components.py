@@ -4,6 +4,7 @@ The scenarios themselves stand in ``headless/scenarios_*.py``, which both interp
 """
 
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
@@ -16,6 +17,15 @@ def test_settings(run_scenarios: Runner) -> None:
 
 def test_against_a_live_server(run_scenarios: Runner, server_port: int) -> None:
     run_scenarios("scenarios_solve", {"HEXWRAP_PORT": str(server_port)})
+
+
+@pytest.mark.parametrize(
+    "run_scenarios", ["cpython", pytest.param("jython", marks=pytest.mark.long)], indirect=True
+)
+def test_examples_as_wired(run_scenarios: Runner, server_port: int, sample_meshes: Path) -> None:
+    run_scenarios(
+        "scenarios_examples", {"HEXWRAP_PORT": str(server_port), "HEXWRAP_MESHES": str(sample_meshes)}
+    )
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,5 @@
-"""From where a picture is taken, so that towers, facades, entrances and flat rings show themselves."""
+"""From where a picture is taken, so that towers, facades, entrances, flat rings and
+singularities show themselves."""
 
 from __future__ import annotations
 
@@ -11,8 +12,10 @@ from hexwrap_solver.conformal.types import ConformalMap
 AZIMUTH = -58.0
 #: Degrees above the horizon of a very slender and of a flat model.
 LOW, HIGH = 13.0, 52.0
-#: How far beside an entrance, in degrees, the viewer stands.
+#: How far beside what is shown, in degrees, the viewer stands.
 ASIDE = 24.0
+#: Degrees between the directions in which one looks for singularities.
+STEP = 5.0
 #: A boundary angle this far from π, radians, is a corner made on purpose.
 CORNER = np.pi / 6
 #: Above this length of the mean unit normal the surface has a front (a dome, a ring), not only an outside.
@@ -30,11 +33,20 @@ def viewpoint(cmap: ConformalMap) -> Floats:
         azimuth = np.arctan2(entrance[1], entrance[0]) + np.radians(ASIDE)
     elif flat > FRONT:
         azimuth = np.arctan2(front[1], front[0]) + np.radians(ASIDE)
+    elif len(cmap.cones):
+        azimuth = _facing(cmap.surface.normals[cmap.cones.vertex]) + np.radians(ASIDE)
     if front[2] < -FRONT:
         elevation = -elevation
     return np.array(
         [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]
     )
+
+
+def _facing(normals: Floats) -> float:
+    """Azimuth from where most of them are seen, and as steeply as can be, radians."""
+    azimuth = np.radians(np.arange(AZIMUTH, AZIMUTH + 360, STEP))
+    towards = np.stack([np.cos(azimuth), np.sin(azimuth)])
+    return float(azimuth[np.argmax(np.maximum(normals[:, :2] @ towards, 0).sum(axis=0))])
 
 
 def corners(cmap: ConformalMap) -> list[tuple[int, float]]:

@@ -8,6 +8,8 @@ the line and the normal crosses an opposite edge, which gets a vertex there:
         v  x → q       →        v──x        inserted before, and for lines that cross each other too. Where x
          ╲ |                     ╲ |        lies near a corner, that corner is taken, and moved to x where it
            b                       b        is free to: no triangle gets much narrower.
+
+A point that is a vertex already is taken as it is: a line drawn along edges becomes these edges.
 """
 
 from __future__ import annotations
@@ -32,6 +34,9 @@ FAR = 0.02
 #: Vertices nearer to a line than this part of the least height of the triangles around them are moved onto
 #: it; those that may not be moved are taken for it below the second one.
 NEAR, TOUCHING = 0.25, 0.05
+#: A point of a line nearer to a vertex than this part of the size, and than this part of the least height of
+#: the triangles around it, is that vertex: coordinates come rounded, and to the tolerance of a model.
+ON_VERTEX, OF_HEIGHT = 1e-5, 0.01
 #: A point at which a line turns by more than this gets a vertex, radians.
 TURN = np.deg2rad(20.0)
 #: A point is in a triangle if it is away from the line through it by less than this part of the way across.
@@ -61,7 +66,7 @@ def with_lines(surface: Surface, lines: Sequence[Line]) -> Surface:
     mesh = _Mesh(surface)
     chains = []
     for i, line in enumerate(lines):
-        chains.append(_followed(mesh, _on_surface(surface, line, i, size), SAME * size))
+        chains.append(_followed(mesh, _on_surface(surface, line, i, size), size))
     return _built(surface, mesh, chains)
 
 
@@ -104,7 +109,8 @@ def _on_surface(surface: Surface, line: Line, number: int, size: float) -> _Line
         )
     corner = surface.faces[near.face]
     points = np.einsum("kc,kcd->kd", near.barycentric, surface.vertices[corner])
-    normal = normalize(face_normals(surface.vertices, corner))
+    # Smooth ones: at an edge, those of one of its faces would lead the line off to the other side.
+    normal = normalize(np.einsum("kc,kcd->kd", near.barycentric, surface.normals[corner]))
     return _Line(number, index, points[index], near.face[index], normal[index])
 
 
@@ -173,11 +179,23 @@ class _Mesh:
         free = v not in self.fixed
         if apart > (NEAR if free else TOUCHING) * self.height(v):
             return False
-        if free and apart > 0:
+        if free and apart > SAME * self.height(v):  # not by mere rounding
             self.moved.append(v)
             self._put_at(v, point)
         self.fixed.add(v)
         return True
+
+    def vertex_at(self, point: Floats, v: int, within: float) -> int | None:
+        """The vertex that a point is, of v and those around it."""
+        _, others = self.fan(v)
+        around = np.append(others, v)
+        apart = np.linalg.norm(self.place[around] - point, axis=1)
+        k = int(np.argmin(apart))
+        u = int(around[k])
+        if apart[k] > within or apart[k] > OF_HEIGHT * self.height(u):
+            return None
+        self.fixed.add(u)
+        return u
 
     def _put_at(self, v: int, point: Floats) -> None:
         if v >= len(self.place):
@@ -269,9 +287,9 @@ class _Mesh:
         return sorted({g for part in parts for v in self.corners(part) for g in self.star(v)})
 
 
-def _followed(mesh: _Mesh, line: _Line, same: float) -> list[int]:
-    """The vertices of a line, in order. same: points nearer to each other are one. Raises DrawnLineError."""
-    points, number = line.point.copy(), line.number
+def _followed(mesh: _Mesh, line: _Line, size: float) -> list[int]:
+    """The vertices of a line, in order. size: of the surface. Raises DrawnLineError."""
+    points, number, same = line.point.copy(), line.number, SAME * size
     step = np.diff(points, axis=0)
     turn = np.concatenate([[np.pi], angles_between(step[:-1], step[1:]), [np.pi]])
     v = mesh.put(points[0], mesh.near(int(line.face[0])))
@@ -296,6 +314,11 @@ def _followed(mesh: _Mesh, line: _Line, same: float) -> list[int]:
             p = mesh.at(v)
             ahead = goal - p
             if float(ahead @ ahead) <= same**2:
+                break
+            met = mesh.vertex_at(goal, v, ON_VERTEX * size)
+            if met is not None:
+                v = met
+                _append(chain, v)
                 break
             crossing = _crossing(mesh, v, ahead, axis)
             if crossing is None:

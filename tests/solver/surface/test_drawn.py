@@ -7,14 +7,14 @@ from functools import cache
 import numpy as np
 import pytest
 
-from hexwrap_solver.arrays import Floats
+from hexwrap_solver.arrays import Floats, Ragged
 from hexwrap_solver.errors import SettingError
 from hexwrap_solver.geometry import face_areas, face_normals, normalize
 from hexwrap_solver.surface import surface_from_mesh, surface_from_nurbs
 from hexwrap_solver.surface.drawn import with_lines
 from hexwrap_solver.surface.errors import DrawnLineError
 from hexwrap_solver.surface.topology import boundary_loops, edges, twins
-from hexwrap_solver.surface.types import FeatureSettings, MeshSettings, Surface, SurfaceSettings
+from hexwrap_solver.surface.types import FeatureSettings, MeshSettings, SentMesh, Surface, SurfaceSettings
 from tests.solver.pattern.folded import grid, prism
 from tests.solver.surface.nurbs_shapes import cylinder
 
@@ -152,3 +152,57 @@ def test_settings_refuse_short_lines_and_too_many_points(
 ) -> None:
     with pytest.raises(SettingError, match="points"):
         FeatureSettings(lines=lines)
+
+
+def test_folds_along_given_lines_are_left_out() -> None:
+    surface = prism()
+    box = SentMesh(surface.vertices, Ragged(surface.faces.ravel(), np.arange(0, surface.faces.size + 1, 3)))
+    every = surface_from_mesh(box).features
+    gone, kept = every[0], every[1:]
+    line = surface.vertices[gone.vertices]
+    away = tuple(map(tuple, line[[0, -1]].tolist()))
+    left = surface_from_mesh(box, SurfaceSettings(features=FeatureSettings(without=(away,)))).features
+    assert [f.vertices.tolist() for f in left] == [f.vertices.tolist() for f in kept]
+    half = tuple(map(tuple, [line[0].tolist(), line[[0, -1]].mean(axis=0).tolist()]))
+    left = surface_from_mesh(box, SurfaceSettings(features=FeatureSettings(without=(half,)))).features
+    assert len(left) == len(every)
+    assert sum(len(f.vertices) for f in left) < sum(len(f.vertices) for f in every)
+    with pytest.raises(SettingError, match="without"):
+        FeatureSettings(without=(((0.0, 0.0, 0.0),),))
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_lines_along_edges_become_these_edges(seed: int) -> None:
+    """Whatever the way, with points between or vertices left out on straight lines, and rounded."""
+    rng = np.random.default_rng(seed)
+    surface = (tube, lambda: prism(edge=4.0))[seed % 2]()
+    pairs, _ = edges(surface.faces, len(surface.vertices))
+    both = np.concatenate([pairs, pairs[:, ::-1]])
+    inside = ~np.isin(both, surface.boundary).any(axis=1)
+    way = [int(both[inside][0, 0])]
+    for _ in range(30):
+        ahead = [v for v in both[inside][both[inside][:, 0] == way[-1], 1].tolist() if v not in way]
+        if not ahead:
+            break
+        way.append(int(rng.choice(ahead)))
+    line = surface.vertices[way]
+    if seed % 4 > 1:
+        middle = (line[1:] + line[:-1]) / 2
+        line = np.insert(line, np.arange(1, len(line)), middle, axis=0)
+    line = np.round(line, 5)
+    drawn = with_lines(surface, [line])
+    assert drawn.features[0].vertices.tolist() == way
+    assert (drawn.vertices == surface.vertices).all()
+    assert (drawn.faces == surface.faces).all()
+
+
+@pytest.mark.parametrize("step", [1, 4, 8])
+def test_rings_on_a_coarse_waist_keep_their_height(step: int) -> None:
+    t, z = np.arange(24) / 24 * 2 * np.pi, np.linspace(0, 6, 11)[:, None]
+    radius = 2 + 0.75 * np.cos(2 * np.pi * z / 6)
+    rings = np.stack([radius * np.cos(t), radius * np.sin(t), z + 0 * t], axis=2)
+    surface = surface_from_mesh(grid(rings), SurfaceSettings(caps="keep"))
+    drawn = with_lines(surface, [rings[5][[*range(0, 24, step), 0]]])
+    (feature,) = drawn.features
+    assert feature.closed
+    assert abs(drawn.vertices[feature.vertices, 2] - 3).max() < 1e-9
