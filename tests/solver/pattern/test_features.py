@@ -13,8 +13,10 @@ from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap
 from hexwrap_solver.panels.polygons import best_plane_distances, fan_areas
 from hexwrap_solver.pattern import lay_pattern
 from hexwrap_solver.pattern.lattice import LATTICES
+from hexwrap_solver.pattern.place import choose
 from hexwrap_solver.pattern.place.choose import Placing
 from hexwrap_solver.pattern.place.deform import distortion_of
+from hexwrap_solver.pattern.place.placement import cost_of
 from hexwrap_solver.pattern.types import Kind, Pattern, PatternSettings
 from hexwrap_solver.surface.drawn import with_lines
 from tests.solver.pattern.folded import ELL, RECTANGLE, plan, prism
@@ -148,6 +150,21 @@ def test_no_cell_crosses_a_fold_of_any_prism(seed: int, kind: Kind) -> None:
     assert off.min(axis=1).max() < 1e-9
     assert euler(pattern) == 0  # shared nodes: else there would be gaps
     assert fan_areas(pattern.cells).sum() == pytest.approx(40 * float(width.sum()), rel=5e-3)
+
+
+def test_no_more_folds_than_a_bound_are_tried(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(choose, "MOST_FOLLOWED", 4)
+    cmap = conformal_map(prism(ELL), BoundaryCondition(mode="straight"))
+    pattern = lay_pattern(cmap, PatternSettings(edge_length=3.0))
+    assert len(cmap.surface.features) == 6
+    assert sum(feature.straight for feature in pattern.features) <= 4
+    assert any("Of 6 folds only the 4 longest" in note for note in pattern.notes)
+
+
+def test_no_distortion_is_told_that_is_none() -> None:
+    assert cost_of(float("inf"), 0.5) == cost_of(2e9) == "fold the layout over"
+    assert cost_of(0.7, 0.5) == "distort cells by 0.70, more than 0.5"
+    assert cost_of(1234.5) == "distort cells by more than 100"
 
 
 def test_a_number_that_suits_the_folds_better_is_told_and_the_one_asked_for_kept() -> None:

@@ -25,6 +25,7 @@ from hexwrap_solver.pattern.place.placement import (
     Placement,
     check_phase,
     cone_index_of,
+    cost_of,
     edge_angle,
     is_disk,
     is_straight,
@@ -40,6 +41,8 @@ from hexwrap_solver.pattern.types import PatternSettings
 P99, MOST_PREDICTED, MOST_DISTORTED, FINE = 0.99, 0.15, 1.5, 0.005
 #: Features are given up, the costliest first, in so many rounds.
 MOST_GIVEN_UP = 8
+#: So many, the longest, are tried: each is an unknown of its own in every round.
+MOST_FOLLOWED = 64
 #: More are not named one by one.
 MOST_NAMED = 4
 
@@ -105,8 +108,7 @@ class Placing:
         """Features in the domain, those that the pattern is cut along."""
         if self.cmap.kind == "net":
             return []
-        chains = chains_of(self.cmap, self.cmap.surface.features)
-        return [chain for chain in chains if chain.feature in self.features]
+        return chains_of(self.cmap, self.cmap.surface.features, self.features)
 
     def _along_features(self, settings: PatternSettings) -> tuple[Placement | None, list[str]]:
         """With lattice lines on as many features as bearable deformations allow, None if on none; and why not
@@ -122,7 +124,16 @@ class Placing:
                 "On this domain no line of the pattern follows a fold: cells are cut where it falls."
             ]
         chains = narrow(self.chains, self.cmap)
-        sentences = [self._wide_note(chain) for chain in self.chains if chain not in chains]
+        straight = {chain.feature for chain in chains}
+        sentences = [self._wide_note(chain) for chain in self.chains if chain.feature not in straight]
+        if len(chains) > MOST_FOLLOWED:
+            sentences.insert(
+                0,
+                f"Of {len(chains)} folds only the {MOST_FOLLOWED} longest were tried for lines of the "
+                "pattern: at the others cells are cut where they fall.",
+            )
+            chains = sorted(chains, key=lambda chain: -chain.length)[:MOST_FOLLOWED]
+            chains.sort(key=lambda chain: chain.feature)
         for _ in range(MOST_GIVEN_UP):
             if not chains:
                 return None, sentences
@@ -190,8 +201,8 @@ class Placing:
             else ""
         )
         return (
-            f"To lay a line of the pattern along the fold {self._ends(chain)} would distort cells there by "
-            f"about {worst:.2f}{law}: cells are cut where it falls."
+            f"To lay a line of the pattern along the fold {self._ends(chain)} would {cost_of(worst)} "
+            f"there{law}: cells are cut where it falls."
         )
 
     def _ends(self, chain: Chain) -> str:
@@ -266,12 +277,9 @@ class Placing:
         tried = place_by_sides(self._straightening, settings)
         if tried.distortion <= BEARABLE:
             return tried
-        cost = f"distort cells by {tried.distortion:.2f}, more than {BEARABLE:g}"
-        if not np.isfinite(tried.distortion):
-            cost = "fold the layout over"
         sentence = (
-            f"To align loop {' and loop '.join(map(str, loops))} at this size would {cost}: smaller cells, "
-            "or corners elsewhere, fit better."
+            f"To align loop {' and loop '.join(map(str, loops))} at this size would "
+            f"{cost_of(tried.distortion, BEARABLE)}: smaller cells, or corners elsewhere, fit better."
         )
         turned = abs(np.rad2deg(turn_between_loops(cmap, lattice, loops)))
         if turned > 1:
