@@ -12,6 +12,8 @@ import numpy as np
 
 #: More significant digits no length is written with.
 MOST_DIGITS = 17
+#: Lengths that differ by no more, relative to them, are one.
+ROUNDING = 1e-9
 
 
 def one_line(text: str) -> str:
@@ -32,10 +34,14 @@ def length(value: float) -> str:
 
 
 def lengths(values: list[float]) -> list[str]:
-    """Different lengths, ascending, each as ``length`` writes it, or with the digits that tell it apart."""
+    """Lengths, each as ``length`` writes it, or with the digits that tell it apart from those beside it. Those
+    that differ by rounding are written alike: panels of other shapes along folds, or with other sides."""
     words = [length(value) for value in values]
     for digits in range(5, MOST_DIGITS + 1):
-        same = [a == b for a, b in pairwise(words)]
+        same = [
+            a == b and abs(x - y) > ROUNDING * abs(x)
+            for (a, x), (b, y) in pairwise(zip(words, values, strict=True))
+        ]
         alike = [a or b for a, b in zip([False, *same], [*same, False], strict=True)]
         if not any(same):
             break
