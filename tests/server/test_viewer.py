@@ -333,6 +333,51 @@ def test_singularities_are_chosen_on_their_curve_and_dragged(browser, server: Se
         assert page.complaints == []
 
 
+def test_features_are_removed_by_a_click_and_drawn(browser, server: Server) -> None:
+    def pixel(page: Page, point: list[float]) -> tuple[float, float]:
+        box = page.locator("#view3d canvas").bounding_box()
+        at = page.evaluate(f"p => {{ {INSIDE} return space.project(p) }}", point)
+        return box["x"] + at["x"], box["y"] + at["y"]
+
+    with opened(browser, server) as page:
+        page.select_option("#sample", "box")
+        job = shown(page)
+        assert len(fetched(server, f"/v1/jobs/{job}/result?include=mesh")["mesh"]["features"]) == 4
+        hidden = pixel(page, [0, 20, 25])  # behind the building
+        page.mouse.move(*hidden)
+        page.wait_for_timeout(100)
+        assert page.locator("#view3d.over-feature").count() == 0
+        page.mouse.move(*pixel(page, [30, 0, 25]))
+        page.wait_for_selector("#view3d.over-feature")
+        with page.expect_request("**/v1/jobs") as sent:
+            page.mouse.click(*pixel(page, [30, 0, 25]))
+        (left_out,) = sent.value.post_data_json["surface"]["features"]["without"]
+        assert sorted(left_out) == [[30, 0, 0], [30, 0, 60]]
+        job = shown(page, job)
+        result = fetched(server, f"/v1/jobs/{job}/result?include=mesh,pattern")
+        points, lines = np.array(result["mesh"]["vertices"]), result["mesh"]["features"]
+        assert sorted(points[line[0], :2].tolist() for line in lines) == [[0, 0], [0, 20], [30, 20]]
+        assert len(result["pattern"]["features"]) == 3
+
+        page.click("#draw-line")
+        page.mouse.click(*pixel(page, [8, 0, 30]))
+        page.keyboard.press("Escape")
+        page.click("#draw-line")
+        ends = [[8, 0, 30], [22, 0, 30]]
+        page.mouse.click(*pixel(page, ends[0]))
+        with page.expect_request("**/v1/jobs") as sent:
+            page.mouse.dblclick(*pixel(page, ends[1]))
+        asked = sent.value.post_data_json["surface"]["features"]
+        np.testing.assert_allclose(asked["lines"], [ends], atol=1e-3)
+        assert asked["without"] == [left_out]
+        job = shown(page, job)
+        assert len(fetched(server, f"/v1/jobs/{job}/result?include=mesh")["mesh"]["features"]) == 4
+        with page.expect_request("**/v1/jobs") as sent:
+            page.mouse.click(*pixel(page, [15, 0, 30]))
+        assert sent.value.post_data_json["surface"]["features"] == asked | {"lines": []}
+        assert page.complaints == []
+
+
 def test_a_dropped_file_is_solved(browser, server: Server, tmp_path: Path) -> None:
     path = tmp_path / "tube.obj"
     path.write_text(tube())

@@ -25,6 +25,7 @@ FLAGS: dict[Path, str] = {
     ("panels", "fold"): "--at-folds",
     ("surface", "features", "angle"): "--fold",
     ("surface", "features", "lines"): "--feature-lines",
+    ("surface", "features", "without"): "--without-features",
 }
 #: Settings of which a request gives one.
 SIZES: tuple[Path, Path] = (("pattern", "around"), ("pattern", "edge_length"))

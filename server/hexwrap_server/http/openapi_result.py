@@ -27,6 +27,7 @@ _MESH = _all(
     input_vertex=listed({"type": "integer", "minimum": -1}),
     vertex_of_input=listed({"type": "integer", "minimum": -1}),
     loops=listed(listed(_INDEX)),
+    features=listed(listed(_INDEX)),
     repairs=listed(_TEXT),
 )
 _MAP = _all(

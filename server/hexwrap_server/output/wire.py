@@ -43,7 +43,8 @@ def part(solution: Solution, name: str, timings: dict[str, float]) -> Any:
     match name:
         case "mesh":
             names = "vertices faces input_vertex vertex_of_input loops repairs"
-            return fields(solution.map.surface, names)
+            surface = solution.map.surface
+            return fields(surface, names) | {"features": [line.vertices for line in surface.features]}
         case "unit":
             return solution.map.surface.unit
         case "map":

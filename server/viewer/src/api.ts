@@ -74,7 +74,7 @@ export interface SingularityCurve {
 }
 
 export interface Result {
-  mesh: { vertices: Vec3[]; faces: number[][]; input_vertex: number[]; vertex_of_input: number[]; loops: number[][]; repairs: string[] };
+  mesh: { vertices: Vec3[]; faces: number[][]; input_vertex: number[]; vertex_of_input: number[]; loops: number[][]; repairs: string[]; features: number[][] };
   map: {
     kind: string;
     /** The six that follow describe cylinders and cones; they are null on nets, whose corners say it all. */

@@ -3,6 +3,7 @@ import * as THREE from "three";
 import { MapControls } from "three/examples/jsm/controls/MapControls.js";
 import type { Result, Vec2 } from "./api";
 import { cellCorners, faceCorners } from "./colors";
+import { FeatureLines } from "./features";
 import { pack, PolygonLayer } from "./polygons";
 
 const CORNER_TOLERANCE = 1e-3;
@@ -14,6 +15,7 @@ export class DomainView {
   private readonly scene = new THREE.Scene();
   private readonly marks = new THREE.Group();
   private layer: PolygonLayer | null = null;
+  private features: FeatureLines | null = null;
   private panelOfPolygon: number[] = [];
   private polygonOfPanel = new Map<number, number>();
   private box = new THREE.Box2(new THREE.Vector2(-1, -1), new THREE.Vector2(1, 1));
@@ -53,6 +55,7 @@ export class DomainView {
   clear(): void {
     this.layer?.dispose();
     this.layer = null;
+    this.features = null;
     this.marks.clear();
     this.polygonOfPanel.clear();
     this.invalidate();
@@ -78,6 +81,8 @@ export class DomainView {
       });
     }
     this.drawBoundary(result, (face) => corners(face).map(local), local);
+    this.features = FeatureLines.inDomain(result.mesh, (face) => corners(face).map(local));
+    this.marks.add(this.features.group);
     if (!keepView) this.fit();
     this.invalidate();
   }
@@ -153,6 +158,20 @@ export class DomainView {
 
   hover(panel: number | null): void {
     this.layer?.hover(panel === null ? null : this.polygonOfPanel.get(panel) ?? null);
+    this.invalidate();
+  }
+
+  pickFeature(x: number, y: number): number | null {
+    return this.features?.pick(this.camera, x, y, this.element.clientWidth, this.element.clientHeight) ?? null;
+  }
+
+  hoverFeature(i: number | null): void {
+    this.features?.hover(i);
+    this.invalidate();
+  }
+
+  showFeatures(visible: boolean): void {
+    if (this.features) this.features.group.visible = visible;
     this.invalidate();
   }
 

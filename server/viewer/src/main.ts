@@ -5,7 +5,8 @@ import { flatOutline, histogram, singularityCurve, tradeOff } from "./charts";
 import { colour, MODES, number, RAMP_CSS, type Legend, type Mode } from "./colors";
 import { DomainView } from "./domain";
 import { Explorer } from "./explore";
-import { element, Form, type Json, type Schema, type Settings } from "./form";
+import { LineDrawing, without, type Features } from "./features";
+import { complete, element, Form, type Json, type Schema, type Settings } from "./form";
 import { View3D } from "./view3d";
 
 const $ = <T extends HTMLElement = HTMLElement>(id: string) => document.getElementById(id) as T;
@@ -192,6 +193,7 @@ function forget(): void {
   state.selected = null;
   shownSurface = null;
   delete document.documentElement.dataset.shown;
+  drawing.cancel();
   space.clear();
   domain.clear();
   drawResult();
@@ -225,6 +227,8 @@ async function cancel(): Promise<void> {
 }
 
 function present(job: Job, result: Result, keepView: boolean): void {
+  markFeature(null);
+  shownFeatures = featuresOf(state.request?.surface as Json);
   state.result = result;
   state.selected = null;
   shownSurface = state.surface;
@@ -233,6 +237,8 @@ function present(job: Job, result: Result, keepView: boolean): void {
   note([...(result.mesh.repairs ?? []), ...(result.quality?.notes ?? [])].join(" "));
   space.show(result, keepView);
   domain.show(result, keepView);
+  toggles();
+  if (drawing.on) drawing.start(); // what was begun stood on what is gone
   drawResult();
   document.documentElement.dataset.shown = job.id;
 }
@@ -377,6 +383,7 @@ async function drawJobs(): Promise<void> {
 
 function drawForm(): void {
   form.draw();
+  $("restore-features").hidden = !askedFeatures().without.length;
   const select = $<HTMLSelectElement>("angle-value");
   const chosen = select.value;
   select.replaceChildren(...choices(String(form.get("pattern.kind"))).map(({ value, label }) => element("option", { value: String(value) }, label)));
@@ -495,6 +502,48 @@ function chooseSizes(k: number): void {
   drawForm();
   void solve();
 }
+
+// ---------------------------------------------------------------- features: lines that the pattern follows
+
+/** What a request asks for, defaults filled in. */
+const featuresOf = (surface: Json) =>
+  (complete(description, { surface: { ...(surface as Settings), features: (surface as Settings | null)?.features ?? {} } }).surface as Settings).features as unknown as Features;
+const askedFeatures = () => featuresOf(form.settings.surface);
+/** What the shown result was asked for with. */
+let shownFeatures: Features | null = null;
+
+function setFeatures(wanted: Features): Promise<void> {
+  form.set("surface.features", wanted as unknown as Json);
+  form.adopt(form.settings);
+  drawForm();
+  return solve();
+}
+
+/** While a newer result is on its way, what is on the screen is no longer what is asked for. */
+function removeFeature(i: number): void {
+  const { result, job } = state;
+  const busy = job?.status === "queued" || job?.status === "running";
+  if (result && shownFeatures && !busy) void setFeatures(without(shownFeatures, result, i));
+}
+
+/** A line that cannot be followed is taken back; why, stands in the banner. */
+async function addLine(line: Vec3[]): Promise<void> {
+  const before = askedFeatures();
+  await setFeatures({ ...before, lines: [...before.lines, line] });
+  if (state.job?.status !== "failed") return;
+  form.set("surface.features", before as unknown as Json);
+  drawForm();
+}
+
+const drawing = new LineDrawing((points, on) => {
+  space.showSketch(points);
+  $("view3d").classList.toggle("drawing", on);
+  $("draw-line").setAttribute("aria-pressed", String(on));
+  $("hint").hidden = !on;
+  $("hint").textContent = points.length > 1
+    ? "Double click or Enter: done. Click the first point: closed. Escape: cancel."
+    : "Click points on the surface. Escape: cancel.";
+}, (line) => void addLine(line));
 
 function drawQuality(): void {
   const { result } = state;
@@ -617,11 +666,15 @@ function pointer(view: HTMLElement, pick: (x: number, y: number) => number | nul
     cancelAnimationFrame(pending);
     pending = requestAnimationFrame(() => hover(pick(x, y)));
   });
-  canvas.addEventListener("pointerleave", () => hover(null));
+  canvas.addEventListener("pointerleave", () => {
+    hover(null);
+    markFeature(null);
+  });
 }
 
 function clickInSpace(x: number, y: number): void {
   const { result } = state;
+  if (drawing.on) return drawing.add(space.pointAt(x, y), x, y);
   if (byAngles() && result) {
     const v = space.pickBoundary(x, y);
     if (v !== null) {
@@ -634,12 +687,48 @@ function clickInSpace(x: number, y: number): void {
       return anglesChanged();
     }
   }
+  const feature = space.pickFeature(x, y);
+  if (feature !== null) return removeFeature(feature);
   select(space.pick(x, y));
 }
 
-pointer($("view3d"), (x, y) => space.pick(x, y), clickInSpace);
+function clickInDomain(x: number, y: number): void {
+  const feature = domain.pickFeature(x, y);
+  if (feature !== null) removeFeature(feature);
+  else select(domain.pick(x, y));
+}
+
+/** The panel under the pointer, unless it is over a feature: that is marked then, in both views. */
+function overFeature(view: View3D | DomainView, x: number, y: number): number | null {
+  const feature = drawing.on ? null : view.pickFeature(x, y);
+  markFeature(feature);
+  return feature === null ? view.pick(x, y) : null;
+}
+
+let marked: number | null = null;
+function markFeature(i: number | null): void {
+  if (i === marked) return;
+  marked = i;
+  for (const view of [space, domain]) {
+    view.hoverFeature(i);
+    view.element.classList.toggle("over-feature", i !== null);
+    view.element.title = i === null ? "" : "Click to take this line out of the pattern";
+  }
+}
+
+pointer($("view3d"), (x, y) => overFeature(space, x, y), clickInSpace);
 space.onDrag = moveSingularity;
-pointer($("domain"), (x, y) => domain.pick(x, y), (x, y) => select(domain.pick(x, y)));
+pointer($("domain"), (x, y) => overFeature(domain, x, y), clickInDomain);
+$("view3d").querySelector("canvas")!.addEventListener("dblclick", () => drawing.on && drawing.finish());
+$("draw-line").addEventListener("click", () => {
+  if (drawing.on) drawing.cancel();
+  else if (state.result) {
+    drawing.start();
+    $("view3d").querySelector("canvas")!.focus(); // Enter ends the line
+  }
+  else note("Choose a sample or drop a file first.", true);
+});
+$("restore-features").addEventListener("click", () => void setFeatures({ ...askedFeatures(), without: [] }));
 
 page.addEventListener("submit", (event) => {
   event.preventDefault();
@@ -695,9 +784,10 @@ $<HTMLSelectElement>("mode").addEventListener("change", (event) => {
 });
 const toggles = () => {
   const on = (name: string) => $<HTMLInputElement>(`t-${name}`).checked;
-  space.toggle({ edges: on("edges"), labels: on("labels"), normals: on("normals"), supports: on("supports"), mesh: on("mesh") });
+  space.toggle({ edges: on("edges"), labels: on("labels"), normals: on("normals"), supports: on("supports"), mesh: on("mesh"), features: on("features") });
+  domain.showFeatures(on("features"));
 };
-for (const name of ["edges", "labels", "normals", "supports", "mesh"]) $(`t-${name}`).addEventListener("change", toggles);
+for (const name of ["edges", "labels", "normals", "supports", "mesh", "features"]) $(`t-${name}`).addEventListener("change", toggles);
 $("fit").addEventListener("click", () => {
   space.fit();
   domain.fit();
@@ -715,8 +805,10 @@ document.addEventListener("keydown", (event) => {
   if (event.key === "f" || event.key === "F") {
     space.fit();
     domain.fit();
-  } else if (event.key === "Escape") {
-    if (!$("cancel").hidden) void cancel();
+  } else if (drawing.on && event.key === "Enter" && !(event.target as HTMLElement).matches("button, summary, a")) drawing.finish();
+  else if (event.key === "Escape") {
+    if (drawing.on) drawing.cancel();
+    else if (!$("cancel").hidden) void cancel();
     else select(null);
   } else if (count && (event.key === "]" || event.key === "["))
     select(((state.selected ?? -1) + (event.key === "]" ? 1 : -1) + count) % count);

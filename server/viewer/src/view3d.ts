@@ -2,6 +2,7 @@
 import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import type { Problem, Result, Vec3 } from "./api";
+import { FeatureLines } from "./features";
 import { pack, PolygonLayer } from "./polygons";
 
 export interface Toggles {
@@ -10,6 +11,7 @@ export interface Toggles {
   normals: boolean;
   supports: boolean;
   mesh: boolean;
+  features: boolean;
 }
 
 const MAX_LABELS = 120;
@@ -30,10 +32,15 @@ export class View3D {
   private boundary: THREE.Points | null = null;
   private cones: THREE.Points | null = null;
   private solid: THREE.Mesh | null = null;
+  /** Of the result, for rays: made into a solid when the first one is sent. */
+  private sheet: Result["mesh"] | null = null;
+  /** Creases and drawn lines, and the line that is being drawn. */
+  private features: FeatureLines | null = null;
+  private sketch: THREE.Object3D | null = null;
   /** Called when singularity i was dragged to another point of the surface. */
   onDrag: ((i: number, to: Vec3) => void) | null = null;
   private labelText: { text: string[]; centers: Vec3[]; normals: Vec3[] } | null = null;
-  private shown: Toggles = { edges: true, labels: false, normals: false, supports: false, mesh: false };
+  private shown: Toggles = { edges: true, labels: false, normals: false, supports: false, mesh: false, features: true };
   private box = new THREE.Box3(new THREE.Vector3(-1, -1, -1), new THREE.Vector3(1, 1, 1));
   private origin = new THREE.Vector3();
   private dirty = true;
@@ -129,6 +136,7 @@ export class View3D {
     this.layer = null;
     for (const child of [...this.content.children]) dispose(child);
     this.mesh = this.normals = this.supports = this.boundary = this.cones = this.solid = null;
+    this.sheet = this.features = this.sketch = null;
     this.labelText = null;
     this.invalidate();
   }
@@ -151,7 +159,11 @@ export class View3D {
       this.supports = this.stripObject(support.strips);
       this.content.add(this.supports);
     }
+    this.sheet = result.mesh;
     this.showCones(result);
+    const { vertices, features } = result.mesh;
+    this.features = new FeatureLines(features.map((line) => line.map((v) => this.local(vertices[v]))));
+    this.content.add(this.features.group);
     this.toggle(this.shown);
     if (!keepView) this.fit();
   }
@@ -162,19 +174,57 @@ export class View3D {
     if (!map.cones.length) return;
     this.cones = this.dots(map.cones.map(({ vertex }) => mesh.vertices[vertex]), 0x6a3fa0, 11);
     this.content.add(this.cones);
-    const geometry = new THREE.BufferGeometry();
-    geometry.setAttribute("position", new THREE.Float32BufferAttribute(mesh.vertices.flatMap((v) => this.local(v)), 3));
-    geometry.setIndex(mesh.faces.flat());
-    this.solid = new THREE.Mesh(geometry, new THREE.MeshBasicMaterial({ side: THREE.DoubleSide })); // for rays only
   }
 
   /** Where a ray through a pixel first meets the surface, in drawn coordinates. */
   private surfaceAt(x: number, y: number): THREE.Vector3 | null {
-    if (!this.solid) return null;
+    if (!this.sheet) return null;
+    if (!this.solid) {
+      const geometry = new THREE.BufferGeometry();
+      geometry.setAttribute("position", new THREE.Float32BufferAttribute(this.sheet.vertices.flatMap((v) => this.local(v)), 3));
+      geometry.setIndex(this.sheet.faces.flat());
+      this.solid = new THREE.Mesh(geometry, new THREE.MeshBasicMaterial({ side: THREE.DoubleSide })); // for rays only
+    }
     const { clientWidth: w, clientHeight: h } = this.element;
     const ray = new THREE.Raycaster();
     ray.setFromCamera(new THREE.Vector2((2 * x) / w - 1, 1 - (2 * y) / h), this.camera);
     return ray.intersectObject(this.solid)[0]?.point ?? null;
+  }
+
+  /** Where a ray through a pixel first meets the surface. */
+  pointAt(x: number, y: number): Vec3 | null {
+    const met = this.surfaceAt(x, y);
+    return met && [met.x + this.origin.x, met.y + this.origin.y, met.z + this.origin.z];
+  }
+
+  /** The feature under a pixel, unless the surface hides it. */
+  pickFeature(x: number, y: number): number | null {
+    const { clientWidth: w, clientHeight: h } = this.element;
+    return this.features?.pick(this.camera, x, y, w, h, (p) => this.isHidden(p)) ?? null;
+  }
+
+  hoverFeature(i: number | null): void {
+    this.features?.hover(i);
+    this.invalidate();
+  }
+
+  /** The line that is being drawn. */
+  showSketch(points: Vec3[]): void {
+    if (this.sketch) dispose(this.sketch);
+    this.sketch = null;
+    if (points.length) {
+      const lines = new FeatureLines([points.map((p) => this.local(p))], true);
+      lines.group.add(this.dots(points, 0xd6249f, 9));
+      this.content.add((this.sketch = lines.group));
+    }
+    this.invalidate();
+  }
+
+  /** Whether the surface stands before a point of it, with some room for the edge that the point may lie on. */
+  private isHidden(p: THREE.Vector3): boolean {
+    const { clientWidth: w, clientHeight: h } = this.element;
+    const seen = this.surfaceAt(...this.screen(p.clone(), w, h));
+    return seen !== null && seen.distanceTo(this.camera.position) < 0.98 * p.distanceTo(this.camera.position);
   }
 
   /** The singularity within 12 pixels of (x, y), not behind the surface, or null. */
@@ -185,8 +235,7 @@ export class View3D {
     const p = new THREE.Vector3();
     for (let i = 0; i < position.count; i++) {
       p.fromBufferAttribute(position, i);
-      const seen = this.surfaceAt(...this.screen(p.clone(), w, h));
-      const hidden = seen && seen.distanceTo(this.camera.position) < 0.98 * p.distanceTo(this.camera.position);
+      const hidden = this.isHidden(p);
       const [px, py] = this.screen(p, w, h);
       if (!hidden && Math.hypot(px - x, py - y) < 12) return i;
     }
@@ -336,6 +385,7 @@ export class View3D {
     if (this.layer) this.layer.edges.visible = shown.edges;
     if (this.normals) this.normals.visible = shown.normals;
     if (this.supports) this.supports.visible = shown.supports;
+    if (this.features) this.features.group.visible = shown.features;
     if (this.mesh) this.mesh.visible = shown.mesh || !this.layer;
     this.invalidate();
   }

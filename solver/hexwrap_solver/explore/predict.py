@@ -4,8 +4,9 @@ The cell that would stand at a point has an edge in proportion to e^−u, so tha
 the cells are known, and how many there are of each. Their largest regular panels are smaller for one reason
 that the map tells: where u has a gradient, the cell is no regular polygon. To first order the map carries the
 polygon P around 0 by z + a z²/2, where |a| is the gradient of u; its edges turn, and the largest regular
-polygon between them is shorter by ``FLOOR``·|a|·ℓ of its edge ℓ. With these lengths the exact programme over
-the size classes (``partition_by_area``) says how much is left uncovered.
+polygon between them is shorter by a part of |a|·ℓ of its edge ℓ (``floor``). With these lengths the exact
+programme over the size classes (``partition_by_area``), of each kind of cell by itself, says how much is left
+uncovered.
 """
 
 from __future__ import annotations
@@ -23,16 +24,14 @@ from hexwrap_solver.pattern.lattice import LATTICES, Lattice
 from hexwrap_solver.pattern.lay.nodes import lattice_points_in_triangles
 from hexwrap_solver.pattern.place.choose import Placing
 from hexwrap_solver.pattern.place.rotation import with_rotation
-from hexwrap_solver.pattern.types import PatternSettings
+from hexwrap_solver.pattern.types import Kind, PatternSettings
 
-#: By sides. The linear programme for the polygon inside, at first order in a = |a|·e^iθ, has the value
-#: 1 − |a|·ℓ·c·max_k cos(θ − θ_k), the θ_k being spread evenly: c = 1/2 for hexagons (6 directions) and for
-#: squares (4), 1/3 for triangles (6). The mean over θ of the greatest cosine is (m/π)·sin(π/m).
-FLOOR = {
-    sides: c * m / np.pi * np.sin(np.pi / m) for sides, c, m in ((6, 1 / 2, 6), (4, 1 / 2, 4), (3, 1 / 3, 6))
-}
 #: Half a row of cells, in edges, where every other cell of a row stands half a cell higher.
-ROW = {6: 3**0.5 / 4, 4: 0.0, 3: 0.0}
+ROW: dict[Kind, float] = {"hex": 3**0.5 / 4}
+#: Cells stand on either side of a line of other patterns; those nearer to it are cut by it in two.
+HALVED = 0.25
+#: Directions of the gradient over which the floor is averaged.
+DIRECTIONS = 360
 #: Cells that a boundary cuts, per cell of area that is left of them: those whose middle is nearer to it than
 #: they reach, on either side, of which half the area is inside.
 TRIMMED = 2.0
@@ -62,14 +61,15 @@ class Foreseen:
 class Outlook:
     """The cells that a map and a placed lattice lead to.
 
-    sides: of a regular cell. size: (c,) edge of a regular polygon as large as each whole cell, model units;
+    sides: (c,) of each whole cell; size: (c,) edge of a polygon of its kind as large as it, model units;
     limit: (c,) edge of its largest panel without a joint. Whole cells are those whose middle is as far from
     the boundary as they reach, on the average over all directions (perimeter/2π); along a loop that is a line
     of the pattern, half a row. special: cells with another number of sides, and trimmed: cut at the boundary;
     rest: the area of both, which their panels are taken to cover.
     """
 
-    sides: int
+    lattice: Lattice
+    sides: Ints
     size: Floats
     limit: Floats
     special: int = 0
@@ -78,29 +78,36 @@ class Outlook:
 
     def foresee(self, sizes: int | None, joint: float = 0.0) -> Foreseen:
         """With so many size classes (None: a length for each panel) and joints at least so wide."""
-        limit = np.maximum(self.limit - joint * np.tan(np.pi / self.sides), 0.0)
-        unit = self.sides / (4 * np.tan(np.pi / self.sides))
-        limit = limit[limit > 0]
         others = self.special + self.trimmed
-        if not len(limit):
+        types = panels = 0
+        area = perimeter = cells = 0.0
+        for sides, outline in self.lattice.centred.items():
+            of_kind, unit = self.sides == sides, _area(outline)
+            limit = self.limit[of_kind] - joint / (2 * _inradius(outline))
+            cells += unit * float((self.size[of_kind] ** 2).sum())
+            limit = limit[limit > 0]
+            if not len(limit):
+                continue
+            length, count = _levels(limit)
+            if sizes is not None:
+                made = partition_by_area(length, sizes, count)
+                start = made.start[-1]
+                types -= len(length) - len(start)
+                length = np.repeat(length[start], np.diff(np.append(start, len(length))))
+            types, panels = types + len(length), panels + len(limit)
+            area += unit * float(count @ length**2)
+            perimeter += sides * float(count @ length)
+        if not panels:
             return Foreseen(1.0, 0, 0, 0.0, 0.0)
-        length, count = _levels(limit)
-        used = len(length)
-        if sizes is not None:
-            made = partition_by_area(length, sizes, count)
-            start = made.start[-1]
-            length = np.repeat(length[start], np.diff(np.append(start, len(length))))
-            used = len(start)
-        area = unit * float(count @ length**2) + self.rest
-        cells = unit * float(self.size @ self.size) + self.rest
         # a piece of a cell is as compact as the cell, more or less
-        around = float(np.sqrt(others * self.rest / unit)) * self.sides
+        largest = self.lattice.sides
+        around = float(np.sqrt(others * self.rest / _area(self.lattice.centred[largest]))) * largest
         return Foreseen(
-            1 - area / cells,
-            len(limit) + others,
-            used + others,
-            area,
-            self.sides * float(count @ length) + around,
+            1 - (area + self.rest) / (cells + self.rest),
+            panels + others,
+            types + others,
+            area + self.rest,
+            perimeter + around,
         )
 
 
@@ -121,45 +128,74 @@ def outlook(cmap: ConformalMap, settings: PatternSettings, progress: Progress = 
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
     n = len(surface.vertices)
     around: Floats = np.bincount(surface.faces.ravel(), np.repeat(cells, 3) / 3, n).astype(np.float64)
-    unit = lattice.sides / (4 * np.tan(np.pi / lattice.sides))
+    unit = lattice.cell_area / lattice.edge**2
     size: Floats = np.exp(-(cmap.log_scale - cmap.log_scale.mean()))
     size *= np.sqrt(area.sum() / (unit * float(around @ size**2)))
     slope: Floats = np.bincount(surface.faces.ravel(), np.repeat(area * _slope(cmap, area), 3)).astype(float)
     slope = slope / np.maximum(np.bincount(surface.faces.ravel(), np.repeat(area, 3)), 1e-300)
-    shorter = np.minimum(FLOOR[lattice.sides] * slope * size, 1.0)
-    face, weight = _middles(lattice, placement.glued.corners(surface.faces, placement.place))
-    here, shorter, middle = (
+    face, weight, sides = _middles(lattice, placement.glued.corners(surface.faces, placement.place))
+    here, slope, middle = (
         np.einsum("kc,kc...->k...", weight, values[surface.faces[face]])
-        for values in (np.log(size), shorter, surface.vertices)
+        for values in (np.log(size), slope, surface.vertices)
     )
     size = np.exp(here)
-    reach: Floats = np.asarray(lattice.sides / (2 * np.pi) * size)
+    unit_area, lost = np.zeros(lattice.sides + 1), np.zeros(lattice.sides + 1)
+    for kind, outline in lattice.centred.items():
+        unit_area[kind], lost[kind] = _area(outline), floor(outline)
+    reach: Floats = np.asarray(sides / (2 * np.pi) * size)
     regular, alone = np.ones(len(face), dtype=bool), len(cmap.cones)
     if alone:
         regular = cKDTree(surface.vertices[cmap.cones.vertex]).query(middle)[0] > reach
     whole = regular.copy()
     for i, loop in enumerate(surface.loops):
-        least: Floats = ROW[lattice.sides] * size if i in placing.loops else reach
+        least: Floats = ROW.get(lattice.kind, HALVED) * size if i in placing.loops else reach
         whole &= _distance(middle, surface.vertices[loop]) > least
     beside, cut = ~regular, 0
     if settings.boundary == "trim":
         beside, cut = ~whole, round(TRIMMED * float((regular & ~whole).sum()))
-    rest = unit * float((size[beside] ** 2).sum())
-    size, shorter = size[whole], shorter[whole]
-    return Outlook(lattice.sides, size, size * (1 - shorter), alone, cut, rest)
+    rest = float((unit_area[sides] * size**2)[beside].sum())
+    shorter = np.minimum(lost[sides] * slope * size, 1.0)
+    size, shorter, sides = size[whole], shorter[whole], sides[whole]
+    return Outlook(lattice, sides, size, size * (1 - shorter), alone, cut, rest)
 
 
-def _middles(lattice: Lattice, corners: Complexes) -> tuple[Ints, Floats]:
-    """Where the middles of cells lie: (k,) triangles and (k, 3) barycentric coordinates. corners: (m, 3) in
-    the plane of the lattice."""
+def floor(outline: Complexes) -> float:
+    """By how much the largest polygon of the same shape in the image of a cell, (p,) corners around 0, under
+    z + a z²/2 is shorter, to first order, divided by |a| and averaged over the directions of a.
+
+    An edge with normal n turns by Im(a n) times its distance from 0, and lowers that by its distance times
+    t·|Im(a n)|, t its farther end's distance from the foot. How far its middle moves, a shift of the polygon
+    makes up for. Of edges in opposite pairs the worst counts; three give way to each other.
+    """
+    edge = np.roll(outline, -1) - outline
+    along = edge / abs(edge)
+    end = np.maximum(abs((along.conj() * outline).real), abs((along.conj() * np.roll(outline, -1)).real))
+    turn = np.exp(2j * np.pi * np.arange(DIRECTIONS) / DIRECTIONS)
+    lost = end * abs((turn[:, None] * -1j * along).imag)
+    return float((lost.mean(axis=1) if len(outline) == 3 else lost.max(axis=1)).mean())
+
+
+def _area(outline: Complexes) -> float:
+    return 0.5 * float((outline.conj() * np.roll(outline, -1)).imag.sum())
+
+
+def _inradius(outline: Complexes) -> float:
+    """Least distance of its edges from 0."""
+    edge = np.roll(outline, -1) - outline
+    return float(((-1j * edge / abs(edge)).conj() * outline).real.min())
+
+
+def _middles(lattice: Lattice, corners: Complexes) -> tuple[Ints, Floats, Ints]:
+    """Where the middles of cells lie: (k,) triangles, (k, 3) barycentric coordinates, and (k,) corners of
+    the cells. corners: (m, 3) in the plane of the lattice."""
     period = complex(lattice.position(lattice.basis[0]))
     found = []
-    for middle in lattice.middles + ASIDE * period:
+    for middle, sides in zip(lattice.middles + ASIDE * period, lattice.sides_around_middles, strict=True):
         face, point = lattice_points_in_triangles(lattice.coordinates((corners - middle) / period), ROUNDING)
         place = middle + period * np.asarray(lattice.position(point))
-        found.append((face, barycentric(corners[face], place)))
-    face, weight = (np.concatenate(parts) for parts in zip(*found, strict=True))
-    return face, weight
+        found.append((face, barycentric(corners[face], place), np.full(len(face), sides)))
+    face, weight, corner = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    return face, weight, corner
 
 
 def _distance(points: Floats, rim: Floats) -> Floats:

@@ -232,13 +232,18 @@ class Lattice:
             found.setdefault(len(outline), self.stand(np.array(outline)) / self.edge)
         return found
 
+    @cached_property
+    def centred(self) -> dict[int, Complexes]:
+        """The same around 0."""
+        return {p: outline - outline.mean() for p, outline in self.outlines.items()}
+
     def uneven_outline(self, sides: int) -> Floats | None:
         """(sides, 2) corners, about their mean, of a cell that is no regular polygon; else None."""
         outline = self.outlines[sides]
         edge = np.roll(outline, -1) - outline
         if np.ptp((np.roll(edge, -1) / edge).real) < 1e-9:
             return None
-        about = outline - outline.mean()
+        about = self.centred[sides]
         return np.stack([about.real, about.imag], axis=1)
 
     def cell(self, start: Ints, step: Ints) -> list[Ints]:
@@ -261,12 +266,22 @@ class Lattice:
         return max(self.outlines)
 
     @cached_property
+    def _cells(self) -> list[Complexes]:
+        """The corners of all cells up to translations."""
+        every = [self.stand(np.array(self.cell(start, step))) for start, step in self._every_edge]
+        middles = np.array([cell.mean() for cell in every]) / complex(self.position(self.basis[0]))
+        _, first = np.unique(np.rint(self.coordinates(middles) % 1 * 1e6) % 1e6, axis=0, return_index=True)
+        return [every[i] for i in first]
+
+    @cached_property
     def middles(self) -> Complexes:
         """(k,) the middles of all cells up to translations."""
-        every = [self.stand(np.array(self.cell(start, step))).mean() for start, step in self._every_edge]
-        along = self.coordinates(np.array(every) / complex(self.position(self.basis[0])))
-        _, first = np.unique(np.rint(along % 1 * 1e6) % 1e6, axis=0, return_index=True)
-        return np.asarray(np.array(every)[first])
+        return np.array([cell.mean() for cell in self._cells])
+
+    @cached_property
+    def sides_around_middles(self) -> Ints:
+        """(k,) corners of those cells."""
+        return np.array([len(cell) for cell in self._cells])
 
     @cached_property
     def cell_area(self) -> float:

@@ -11,11 +11,14 @@ from scipy.sparse.csgraph import connected_components
 
 from hexwrap_solver.arrays import Bools, Floats, Ints
 from hexwrap_solver.geometry import angles_between, face_normals, normalize
+from hexwrap_solver.surface.closest import TriangleTree
 from hexwrap_solver.surface.topology import half_edges
 from hexwrap_solver.surface.types import Feature, Triangles
 
 #: A chain that turns by more than this at a vertex is two, radians.
 CORNER = np.deg2rad(40.0)
+#: Edges lie on a line if they are no farther from it than this part of the mesh's size.
+NEAR = 1e-3
 
 
 @dataclass(frozen=True)
@@ -59,6 +62,19 @@ def folds(mesh: Triangles, angle: float) -> tuple[Ints, Floats]:
     start, end = half_edges(mesh.faces)
     h, fold = h[fold > angle], fold[fold > angle]
     return np.stack([start[h], end[h]], axis=1), fold
+
+
+def lie_along(vertices: Floats, edges: Ints, lines: Sequence[Sequence[Sequence[float]]]) -> Bools:
+    """(k,) the edges (k, 2) with both ends on some of the polylines, to NEAR of the mesh's size."""
+    if not lines or len(edges) == 0:
+        return np.zeros(len(edges), dtype=bool)
+    points = np.concatenate([np.asarray(line, dtype=float).reshape(-1, 3) for line in lines])
+    last = np.cumsum([len(line) for line in lines]) - 1
+    start = np.delete(np.arange(len(points)), last)
+    segments = TriangleTree.build(points, np.stack([start, start + 1, start + 1], axis=1))
+    ends, at = np.unique(edges, return_inverse=True)
+    near = segments.nearest(vertices[ends]).distance <= NEAR * np.linalg.norm(np.ptp(vertices, axis=0))
+    return np.asarray(near[at.reshape(edges.shape)].all(axis=1))
 
 
 def chained(vertices: Floats, edges: Ints, fold: Floats, stops: Bools) -> tuple[Feature, ...]:

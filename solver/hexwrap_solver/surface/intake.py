@@ -13,7 +13,7 @@ from hexwrap_solver.surface.checks import LISTED, check_arrays, check_extent
 from hexwrap_solver.surface.degenerate import flat, repair_flat
 from hexwrap_solver.surface.duplicates import first_of_equals
 from hexwrap_solver.surface.errors import DegeneratePolygonError, NotOrientableError
-from hexwrap_solver.surface.features import chained, folds
+from hexwrap_solver.surface.features import chained, folds, lie_along
 from hexwrap_solver.surface.genus import (
     SentNames,
     check_connected,
@@ -133,8 +133,10 @@ def _build(sent: SentMesh, mesh: Triangles, polygon: Ints, label: Ints, settings
 
 
 def _features(surface: Surface, sent: SentMesh, settings: SurfaceSettings) -> tuple[Feature, ...]:
-    """Creases that were sent, else the folds of the mesh; in any case inside the surface."""
-    asked = (settings.features or FeatureSettings()).angle
+    """Creases that were sent, else the folds of the mesh, less those that are not wanted; in any case inside
+    the surface."""
+    wanted = settings.features or FeatureSettings()
+    asked = wanted.angle
     if sent.creases is not None and sent.fold is not None:
         edges, fold = surface.vertex_of_input[sent.creases], sent.fold
         inner = (edges >= 0).all(axis=1) & (edges[:, 0] != edges[:, 1])
@@ -151,6 +153,7 @@ def _features(surface: Surface, sent: SentMesh, settings: SurfaceSettings) -> tu
     n = len(surface.vertices)
     inside = (low * n + high)[np.diff(surface.edge_groups[1]) == 2]
     keep = np.isin(edges.min(axis=1) * n + edges.max(axis=1), inside)
+    keep[keep] = ~lie_along(surface.vertices, edges[keep], wanted.without)
     chains = chained(surface.vertices, edges[keep], fold[keep], rim)
     return tuple(replace(chain, given=sent.creases is not None) for chain in chains)
 

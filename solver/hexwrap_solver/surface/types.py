@@ -90,13 +90,20 @@ class FeatureSettings:
             most=1000,
         ),
     ] = ()
+    without: Annotated[
+        tuple[Polyline, ...],
+        Setting("polylines along folds and creases that are to be no lines of the pattern", most=1000),
+    ] = ()
 
     def __post_init__(self) -> None:
-        for i, line in enumerate(self.lines):
-            if len(line) < 2:
-                raise SettingError(f"line {i} has {len(line)} of the two points that it needs at least")
-        if sum(map(len, self.lines)) > MOST_POINTS:
-            raise SettingError(f"'lines' may have {MOST_POINTS} points together; give fewer")
+        for name, lines in (("lines", self.lines), ("without", self.without)):
+            for i, line in enumerate(lines):
+                if len(line) < 2:
+                    raise SettingError(
+                        f"line {i} of '{name}' has {len(line)} of the two points that it needs at least"
+                    )
+            if sum(map(len, lines)) > MOST_POINTS:
+                raise SettingError(f"'{name}' may have {MOST_POINTS} points together; give fewer")
 
 
 @dataclass(frozen=True)

@@ -12,17 +12,20 @@ from hexwrap_solver.conformal import conformal_map
 from hexwrap_solver.conformal.types import BoundaryCondition
 from hexwrap_solver.errors import SettingError
 from hexwrap_solver.explore.front import best_of, front_of, non_dominated, to_solve, within
-from hexwrap_solver.explore.predict import FLOOR, outlook
+from hexwrap_solver.explore.predict import floor, outlook
 from hexwrap_solver.explore.types import Costs, ExploreSettings, Figures, Limits, Vary
 from hexwrap_solver.explore.variants import SPARE, variants
 from hexwrap_solver.panels import fit_panels, measure, quantize
 from hexwrap_solver.panels.types import PanelSettings
 from hexwrap_solver.pattern import lay_pattern
+from hexwrap_solver.pattern.lattice import LATTICES
 from hexwrap_solver.pattern.types import PatternSettings
 from tests.solver.conformal.annuli import bump, catenoid
 
+NEW = ("brick", "truncated-hexagonal", "truncated-square")
 
-@pytest.mark.parametrize("sides", [3, 4, 6])
+
+@pytest.mark.parametrize("sides", [3, 4, 6, 8, 12])
 def test_the_floor_is_the_largest_regular_polygon_in_a_cell_of_growing_scale(sides: int) -> None:
     """The linear programme itself, for the polygon under z + a z²/2 with small a, over all its directions."""
     corner = np.exp(2j * np.pi * np.arange(sides) / sides) / (2 * np.sin(np.pi / sides))
@@ -37,13 +40,18 @@ def test_the_floor_is_the_largest_regular_polygon_in_a_cell_of_growing_scale(sid
         room = (normal.conj() * image).real
         found = linprog([0, 0, -1], A_ub=rows, b_ub=room, bounds=[(None, None)] * 3)
         lost.append((1 - found.x[2]) / small)
-    assert FLOOR[sides] == pytest.approx(np.mean(lost), rel=2e-3)
+    assert floor(corner) == pytest.approx(np.mean(lost), rel=2e-3)
 
 
 @pytest.mark.parametrize("surface", [bump(64, 40), catenoid(64, 40)], ids=["bump", "catenoid"])
 @pytest.mark.parametrize(
     ("mode", "kind", "boundary"),
-    [("straight", "hex", "whole"), ("isometric", "hex", "trim"), ("isometric", "quad", "whole")],
+    [
+        ("straight", "hex", "whole"),
+        ("isometric", "hex", "trim"),
+        ("isometric", "quad", "whole"),
+        *((("straight", kind, "whole")) for kind in NEW),
+    ],
 )
 def test_foreseen_is_near_measured(surface, mode: str, kind: str, boundary: str) -> None:
     cmap = conformal_map(surface, BoundaryCondition(mode).adapted(kind))
@@ -54,11 +62,12 @@ def test_foreseen_is_near_measured(surface, mode: str, kind: str, boundary: str)
         settings = PanelSettings(sizes=sizes, joint=joint)
         made = quantize(fit_panels(cmap, laid, settings), settings)
         found = seen.foresee(sizes, joint)
-        near = 0.02 if joint else 0.008  # of so few rows two have sides with no joint
+        # of so few rows two have sides with no joint
+        near = 0.035 if kind in NEW else 0.02 if joint else 0.008
         assert found.uncovered == pytest.approx(1 - measure(cmap, laid, made).coverage, abs=near)
         assert found.panels == pytest.approx(made.n_panels, rel=0.06)
         if sizes and boundary == "whole":
-            assert found.types <= sizes
+            assert found.types <= sizes * len(LATTICES[kind].outlines)
 
 
 def test_more_sizes_never_leave_more_open_and_joints_never_less() -> None:

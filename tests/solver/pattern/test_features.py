@@ -13,11 +13,13 @@ from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap
 from hexwrap_solver.panels.polygons import best_plane_distances, fan_areas
 from hexwrap_solver.pattern import lay_pattern
 from hexwrap_solver.pattern.lattice import LATTICES
+from hexwrap_solver.pattern.place import choose
 from hexwrap_solver.pattern.place.choose import Placing
 from hexwrap_solver.pattern.place.deform import distortion_of
+from hexwrap_solver.pattern.place.placement import cost_of
 from hexwrap_solver.pattern.types import Kind, Pattern, PatternSettings
 from hexwrap_solver.surface.drawn import with_lines
-from tests.solver.pattern.folded import ELL, RECTANGLE, prism
+from tests.solver.pattern.folded import ELL, RECTANGLE, plan, prism
 
 PLANS = {"box": RECTANGLE, "ell": ELL}
 
@@ -123,3 +125,53 @@ def test_edges_through_a_vertex_of_a_fold_are_found_once() -> None:
     assert euler(pattern) == 0
     assert fan_areas(pattern.cells).sum() == pytest.approx(120 * 60, rel=1e-9)
     assert not any("touch themselves" in note for note in pattern.notes)
+
+
+@pytest.mark.parametrize("kind", ["hex", "quad"])
+@pytest.mark.parametrize("seed", range(4))
+def test_no_cell_crosses_a_fold_of_any_prism(seed: int, kind: Kind) -> None:
+    """Of three to seven walls at random angles, at any rotation, with cells of a third of the narrowest wall
+    or less: each lies in the plane of one wall, and those on both sides of a fold share their nodes."""
+    rng = np.random.default_rng(seed)
+    walls = int(rng.integers(3, 8))
+    turn = 2 * np.pi / walls * (np.arange(walls) + rng.uniform(-0.3, 0.3, walls))
+    corners = tuple((float(x), float(y)) for x, y in 15 * np.stack([np.cos(turn), np.sin(turn)], axis=1))
+    cmap = conformal_map(prism(corners, height=40.0, edge=3.0), BoundaryCondition("straight"))
+    rotation = ("edge", "vertex", float(rng.uniform(0, 30)))[seed % 3]
+    base = np.array(corners) - plan(corners, 3.0).mean(axis=0)
+    side = np.roll(base, -1, axis=0) - base
+    width = np.linalg.norm(side, axis=1)
+    around = int(np.ceil(rng.uniform(3, 4) * width.sum() / width.min()))
+    pattern = lay_pattern(cmap, PatternSettings(kind, around=around, rotation=rotation, boundary="trim"))
+    normal = np.stack([side[:, 1], -side[:, 0]], axis=1) / width[:, None]
+    away = abs(pattern.vertices[:, :2] @ normal.T - (normal * base).sum(axis=1))  # from each wall
+    at = away[pattern.faces.values]
+    off = np.maximum.reduceat(at, pattern.faces.offsets[:-1], axis=0)
+    assert off.min(axis=1).max() < 1e-9
+    assert euler(pattern) == 0  # shared nodes: else there would be gaps
+    assert fan_areas(pattern.cells).sum() == pytest.approx(40 * float(width.sum()), rel=5e-3)
+
+
+def test_no_more_folds_than_a_bound_are_tried(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(choose, "MOST_FOLLOWED", 4)
+    cmap = conformal_map(prism(ELL), BoundaryCondition(mode="straight"))
+    pattern = lay_pattern(cmap, PatternSettings(edge_length=3.0))
+    assert len(cmap.surface.features) == 6
+    assert sum(feature.straight for feature in pattern.features) <= 4
+    assert any("Of 6 folds only the 4 longest" in note for note in pattern.notes)
+
+
+def test_no_distortion_is_told_that_is_none() -> None:
+    assert cost_of(float("inf"), 0.5) == cost_of(2e9) == "fold the layout over"
+    assert cost_of(0.7, 0.5) == "distort cells by 0.70, more than 0.5"
+    assert cost_of(1234.5) == "distort cells by more than 100"
+
+
+def test_a_number_that_suits_the_folds_better_is_told_and_the_one_asked_for_kept() -> None:
+    settings = PatternSettings("hex", around=60, rotation="vertex", boundary="trim")
+    pattern = lay_pattern(solved("box"), settings)
+    assert pattern.around == 60
+    (note,) = (note for note in pattern.notes if "would fit the folds better" in note)
+    better = lay_pattern(solved("box"), replace(settings, around=int(note.split()[0])))
+    assert better.distortion < 0.5 * pattern.distortion
+    assert not any("would fit the folds better" in note for note in better.notes)

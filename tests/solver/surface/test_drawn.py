@@ -7,14 +7,14 @@ from functools import cache
 import numpy as np
 import pytest
 
-from hexwrap_solver.arrays import Floats
+from hexwrap_solver.arrays import Floats, Ragged
 from hexwrap_solver.errors import SettingError
 from hexwrap_solver.geometry import face_areas, face_normals, normalize
 from hexwrap_solver.surface import surface_from_mesh, surface_from_nurbs
 from hexwrap_solver.surface.drawn import with_lines
 from hexwrap_solver.surface.errors import DrawnLineError
 from hexwrap_solver.surface.topology import boundary_loops, edges, twins
-from hexwrap_solver.surface.types import FeatureSettings, MeshSettings, Surface, SurfaceSettings
+from hexwrap_solver.surface.types import FeatureSettings, MeshSettings, SentMesh, Surface, SurfaceSettings
 from tests.solver.pattern.folded import grid, prism
 from tests.solver.surface.nurbs_shapes import cylinder
 
@@ -152,6 +152,23 @@ def test_settings_refuse_short_lines_and_too_many_points(
 ) -> None:
     with pytest.raises(SettingError, match="points"):
         FeatureSettings(lines=lines)
+
+
+def test_folds_along_given_lines_are_left_out() -> None:
+    surface = prism()
+    box = SentMesh(surface.vertices, Ragged(surface.faces.ravel(), np.arange(0, surface.faces.size + 1, 3)))
+    every = surface_from_mesh(box).features
+    gone, kept = every[0], every[1:]
+    line = surface.vertices[gone.vertices]
+    away = tuple(map(tuple, line[[0, -1]].tolist()))
+    left = surface_from_mesh(box, SurfaceSettings(features=FeatureSettings(without=(away,)))).features
+    assert [f.vertices.tolist() for f in left] == [f.vertices.tolist() for f in kept]
+    half = tuple(map(tuple, [line[0].tolist(), line[[0, -1]].mean(axis=0).tolist()]))
+    left = surface_from_mesh(box, SurfaceSettings(features=FeatureSettings(without=(half,)))).features
+    assert len(left) == len(every)
+    assert sum(len(f.vertices) for f in left) < sum(len(f.vertices) for f in every)
+    with pytest.raises(SettingError, match="without"):
+        FeatureSettings(without=(((0.0, 0.0, 0.0),),))
 
 
 @pytest.mark.parametrize("seed", range(8))

@@ -180,10 +180,7 @@ def place_by_sides(
         if tried[-1][0] < ENOUGH:
             break
     distortion, best, place = min(tried, key=lambda found: found[0] + found[1].extra)
-    width = width_per_cell(lattice, angle) * lattice.edge
-    around = round(cmap.circumference * abs(best.scale) / width)
-    if frame.cone_index == 0 and any(best.motion.shift):
-        around = int(lattice.cells_around(np.array(best.motion.shift)))
+    around = _cells_around(frame, best, angle)
     notes = (
         ("phase has no effect: lattice lines on all sides leave no freedom.",) if any(settings.phase) else ()
     )
@@ -192,11 +189,20 @@ def place_by_sides(
 
 def predicted(
     straightening: Straightening, settings: PatternSettings, spread: float | None = None
-) -> tuple[Floats, float]:
-    """(m,) predicted ratios of singular values − 1 of the best way to place the pattern, and its cost."""
-    strain = straightening.strain
+) -> tuple[Floats, int]:
+    """(m,) predicted ratios of singular values − 1 of the best way to place the pattern, and its number of
+    cells around."""
+    strain, frame = straightening.strain, straightening.frame
     best = _best_of(_trials(straightening, settings, spread), strain)[0]
-    return strain.ratios(best.moved, abs(best.scale)), best.cost(strain.sharp(best.moved))
+    around = _cells_around(frame, best, edge_angle(frame.lattice, settings))
+    return strain.ratios(best.moved, abs(best.scale)), around
+
+
+def _cells_around(frame: _Frame, trial: _Trial, angle: float) -> int:
+    if frame.cone_index == 0 and any(trial.motion.shift):
+        return int(frame.lattice.cells_around(np.array(trial.motion.shift)))
+    width = width_per_cell(frame.lattice, angle) * frame.lattice.edge
+    return round(frame.cmap.circumference * abs(trial.scale) / width)
 
 
 def _trials(

@@ -25,20 +25,24 @@ from hexwrap_solver.pattern.place.placement import (
     Placement,
     check_phase,
     cone_index_of,
+    cost_of,
     edge_angle,
     is_disk,
     is_straight,
     quantized,
 )
 from hexwrap_solver.pattern.place.sides import has_corners, is_polygon
-from hexwrap_solver.pattern.place.size import FREE, mean_stretch, wanted_edge
+from hexwrap_solver.pattern.place.size import FREE, mean_stretch, size_spread, wanted_edge
 from hexwrap_solver.pattern.types import PatternSettings
 
 #: Features are made straight where that costs no more than this at all but one triangle of a hundred, as
-#: predicted, and than that at the worst; above FINE, numbers of cells around further off are tried, too.
-P99, MOST_PREDICTED, MOST_DISTORTED, FINE = 0.99, 0.15, 1.5, 0.02
+#: predicted, and than that at the worst; above FINE, a number of cells around at which they cost less than
+#: half as much is told.
+P99, MOST_PREDICTED, MOST_DISTORTED, FINE = 0.99, 0.15, 1.5, 0.005
 #: Features are given up, the costliest first, in so many rounds.
 MOST_GIVEN_UP = 8
+#: So many, the longest, are tried: each is an unknown of its own in every round.
+MOST_FOLLOWED = 64
 #: More are not named one by one.
 MOST_NAMED = 4
 
@@ -104,8 +108,7 @@ class Placing:
         """Features in the domain, those that the pattern is cut along."""
         if self.cmap.kind == "net":
             return []
-        chains = chains_of(self.cmap, self.cmap.surface.features)
-        return [chain for chain in chains if chain.feature in self.features]
+        return chains_of(self.cmap, self.cmap.surface.features, self.features)
 
     def _along_features(self, settings: PatternSettings) -> tuple[Placement | None, list[str]]:
         """With lattice lines on as many features as bearable deformations allow, None if on none; and why not
@@ -121,23 +124,28 @@ class Placing:
                 "On this domain no line of the pattern follows a fold: cells are cut where it falls."
             ]
         chains = narrow(self.chains, self.cmap)
-        sentences = [self._wide_note(chain) for chain in self.chains if chain not in chains]
+        straight = {chain.feature for chain in chains}
+        sentences = [self._wide_note(chain) for chain in self.chains if chain.feature not in straight]
+        if len(chains) > MOST_FOLLOWED:
+            sentences.insert(
+                0,
+                f"Of {len(chains)} folds only the {MOST_FOLLOWED} longest were tried for lines of the "
+                "pattern: at the others cells are cut where they fall.",
+            )
+            chains = sorted(chains, key=lambda chain: -chain.length)[:MOST_FOLLOWED]
+            chains.sort(key=lambda chain: chain.feature)
         for _ in range(MOST_GIVEN_UP):
             if not chains:
                 return None, sentences
             straightening = self._straightened(tuple(chains))
             ratio, _ = predicted(straightening, settings)
-            spread = None
-            if np.quantile(ratio, P99) > FINE:
-                wider, _ = predicted(straightening, settings, FREE)
-                if np.quantile(wider, P99) < 0.5 * np.quantile(ratio, P99):
-                    ratio, spread = wider, FREE
             if np.quantile(ratio, P99) <= MOST_PREDICTED:
-                placed = place_by_sides(straightening, settings, spread)
+                placed = place_by_sides(straightening, settings)
                 if placed.distortion <= MOST_DISTORTED:
                     assert straightening.features is not None
                     return replace(placed, straight=straightening.features.straight), [
                         *sentences,
+                        *self._number_notes(straightening, settings, ratio, placed.around),
                         *(
                             self._third_note(c)
                             for c in chains
@@ -150,6 +158,22 @@ class Placing:
             ]
             chains = left
         return None, sentences
+
+    def _number_notes(
+        self, straightening: Straightening, settings: PatternSettings, ratio: Floats, around: int
+    ) -> list[str]:
+        """Which number of cells around would suit the features better than the size asked for."""
+        own = float(np.quantile(ratio, P99))
+        if own <= FINE or size_spread(settings) >= FREE:
+            return []
+        free, number = predicted(straightening, settings, FREE)
+        other = float(np.quantile(free, P99))
+        if number == around or other > 0.5 * own:
+            return []
+        return [
+            f"{number} cells around, instead of {around}, would fit the folds better: a distortion of about "
+            f"{other:.2g} instead of {own:.2g}."
+        ]
 
     def _wide_note(self, chain: Chain) -> str:
         cells = chain.width / self.cell
@@ -177,8 +201,8 @@ class Placing:
             else ""
         )
         return (
-            f"To lay a line of the pattern along the fold {self._ends(chain)} would distort cells there by "
-            f"about {worst:.2f}{law}: cells are cut where it falls."
+            f"To lay a line of the pattern along the fold {self._ends(chain)} would {cost_of(worst)} "
+            f"there{law}: cells are cut where it falls."
         )
 
     def _ends(self, chain: Chain) -> str:
@@ -253,12 +277,9 @@ class Placing:
         tried = place_by_sides(self._straightening, settings)
         if tried.distortion <= BEARABLE:
             return tried
-        cost = f"distort cells by {tried.distortion:.2f}, more than {BEARABLE:g}"
-        if not np.isfinite(tried.distortion):
-            cost = "fold the layout over"
         sentence = (
-            f"To align loop {' and loop '.join(map(str, loops))} at this size would {cost}: smaller cells, "
-            "or corners elsewhere, fit better."
+            f"To align loop {' and loop '.join(map(str, loops))} at this size would "
+            f"{cost_of(tried.distortion, BEARABLE)}: smaller cells, or corners elsewhere, fit better."
         )
         turned = abs(np.rad2deg(turn_between_loops(cmap, lattice, loops)))
         if turned > 1:

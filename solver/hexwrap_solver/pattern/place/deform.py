@@ -27,6 +27,8 @@ SIZE = 0.1
 ROUNDS, FLOOR = 4, 1e-2
 #: Below this worst ratio of singular values − 1, a round that gains nothing is the last one.
 FINE = 0.03
+#: Where no triangle bears more than so many times the root mean square, there is nothing to spread.
+EVEN = 1.1
 
 #: Pull towards the undeformed place, relative: it only settles what nothing else does.
 REST = 1e-9
@@ -52,6 +54,8 @@ def deform(system: System, glued: Glued, scale: complex, rest: Complexes, depth:
         if worst < least or best is rest:
             best, least = place, worst
         elif least <= FINE:
+            break
+        if bent.max() <= EVEN * np.sqrt((bent**2).mean()):
             break
         # Half-way in the logarithm: full steps of reweighting oscillate for powers above three.
         weight = np.sqrt(weight * even * (bent**2 / max((bent**2).mean(), 1e-300) + FLOOR))

@@ -44,12 +44,11 @@ class Chain:
     closed: bool
 
     @classmethod
-    def of(cls, cmap: ConformalMap, number: int, feature: Feature) -> Chain | None:
-        """None where the mesh of the map lacks one of its edges."""
-        edges = FeatureEdges.of(cmap.surface, (feature,))
-        if len(edges) < len(feature.vertices) - 1:
+    def of(cls, cmap: ConformalMap, number: int, feature: Feature, half_edge: Ints) -> Chain | None:
+        """half_edge: its edges. None where the mesh of the map lacks one of them."""
+        if len(half_edge) < len(feature.vertices) - 1:
             return None
-        face, c = edges.half_edge // 3, edges.half_edge % 3
+        face, c = half_edge // 3, half_edge % 3
         gained = cmap.sheet[face, (c + 1) % 3] - cmap.sheet[face, c]
         sheet = np.concatenate([[0], np.cumsum(gained)])
         place = cmap.deck.apply(cmap.uv[feature.vertices], sheet)
@@ -105,9 +104,12 @@ def _alone(ends: Ints) -> Ints:
     return np.flatnonzero((met <= 1).all(axis=1))
 
 
-def chains_of(cmap: ConformalMap, features: tuple[Feature, ...]) -> list[Chain]:
-    """Features that the mesh of an annulus or a disk still has."""
-    found = (Chain.of(cmap, i, feature) for i, feature in enumerate(features))
+def chains_of(cmap: ConformalMap, features: tuple[Feature, ...], wanted: frozenset[int]) -> list[Chain]:
+    """Features of which the numbers are wanted, and that the mesh of an annulus or a disk still has."""
+    numbers = sorted(wanted)
+    edges = FeatureEdges.of(cmap.surface, [features[i] for i in numbers])
+    own = np.split(edges.half_edge, np.searchsorted(edges.feature, np.arange(1, len(numbers))))
+    found = (Chain.of(cmap, i, features[i], half_edge) for i, half_edge in zip(numbers, own, strict=False))
     return [chain for chain in found if chain is not None]
 
 

@@ -34,6 +34,7 @@ from hexwrap_solver.pattern.place.placement import (
     NEARLY,
     Placement,
     anchor_vertex,
+    cost_of,
     edge_angle,
 )
 from hexwrap_solver.pattern.place.polygons import Alignment, Polygons
@@ -70,9 +71,7 @@ def place_on_net(
     if aligned.distortion <= BEARABLE:
         return aligned
     names = " and ".join(f"loop {loop}" for loop in polygons.loops)
-    cost = f"distort cells by {aligned.distortion:.2f}, more than {BEARABLE:g}"
-    if not np.isfinite(aligned.distortion):
-        cost = "fold the layout over"
+    cost = cost_of(aligned.distortion, BEARABLE)
     sentence = f"To align {names} at this size would {cost}: smaller cells, or corners elsewhere, fit better."
     ends = [loop for loop in polygons.loops if loop < 2]
     if ends and len(ends) < len(polygons.loops):

@@ -26,6 +26,8 @@ EXACT = 1e-9
 
 #: Worst ratio of singular values − 1 that an alignment may cost.
 BEARABLE = 0.5
+#: A predicted distortion so large is that of a triangle turned over; of large ones nobody needs the figure.
+FOLDED, MOST_TOLD = 1e6, 100.0
 
 
 @dataclass(frozen=True)
@@ -70,6 +72,14 @@ class Placement:
     def narrows(self) -> bool:
         """Whether fewer cells go around some places than others."""
         return self.motion is None or self.motion.cone_index != 0
+
+
+def cost_of(distortion: float, limit: float | None = None) -> str:
+    """What a deformation does, to be said of one that is not made: "would …"."""
+    if distortion > FOLDED:
+        return "fold the layout over"
+    size = f"{distortion:.2f}" if distortion < MOST_TOLD else f"more than {MOST_TOLD:g}"
+    return f"distort cells by {size}" + ("" if limit is None else f", more than {limit:g}")
 
 
 def quantum_name(lattice: Lattice) -> str:
