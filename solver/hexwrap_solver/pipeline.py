@@ -15,6 +15,7 @@ from hexwrap_solver.arrays import Progress, no_progress
 from hexwrap_solver.conformal import conformal_map
 from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap
 from hexwrap_solver.explore import best_boundary_map
+from hexwrap_solver.explore.worth import or_plain
 from hexwrap_solver.panels import fit_panels, make_components, measure, quantize, support
 from hexwrap_solver.panels.fit import FitKey
 from hexwrap_solver.panels.quantize import CurveKey, SizeKey, trade_off
@@ -192,11 +193,14 @@ def _map(
         (wanted, boundary, shape, classes),
         lambda progress: seated(surface, boundary, wanted, pattern, classes, progress),
     )
-    cmap = run(
-        "map",
-        boundary,
-        lambda progress: closed_map(surface, seats.frame, seats.placing, boundary, progress),
-    )
     placing = seats.placing
+
+    def closed(progress: Progress) -> ConformalMap:
+        found = closed_map(surface, seats.frame, placing, boundary, progress)
+        if not len(found.cones) or not placing.may_be_none or placing.proposals[0].count:
+            return found
+        return or_plain(found, surface, boundary, pattern or PatternSettings(), classes or SIZES, progress)
+
+    cmap = run("map", boundary, closed)
     taken = next(i for i, one in enumerate(placing.proposals) if one.count == len(cmap.cones))
     return cmap, Choices.of(placing.proposals, taken, classes or SIZES, fill_openings(surface).vertices)

@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 
 from hexwrap_solver.arrays import no_progress
+from hexwrap_solver.conformal import conformal_map
 from hexwrap_solver.conformal.types import BoundaryCondition
 from hexwrap_solver.errors import ConvergenceError, SingularitiesError
+from hexwrap_solver.explore.predict import outlook
+from hexwrap_solver.explore.worth import or_plain
 from hexwrap_solver.panels.types import PanelSettings
 from hexwrap_solver.pattern.lattice import LATTICES
 from hexwrap_solver.pattern.types import PatternSettings
@@ -149,6 +152,21 @@ def test_none_where_none_pays():
     found = solved(shapes.straight(), count="auto", around=16)
     assert found.map.kind == "cylinder"
     assert len(found.map.cones) == 0
+
+
+@pytest.mark.parametrize(("surface", "pay"), [(shapes.waist(), True), (shapes.straight(), False)])
+def test_never_worse_than_without(surface, pay):
+    """Two heptagons save sizes on the waist, and only make them where none are needed."""
+    condition, pattern = BoundaryCondition("isometric", quantum="hex"), PatternSettings(around=16)
+    n = len(surface.vertices)
+    at = tuple(SingularityAt(-1, vertex=n // 2 + i) for i in (0, 20))
+    seats = module.seated(surface, condition, SingularitySettings(at=at), pattern, 11)
+    cmap = module.closed_map(surface, seats.frame, seats.placing, condition)
+    taken = or_plain(cmap, surface, condition, pattern, 11)
+    assert (taken is cmap) == pay
+    assert pay or (not len(taken.cones) and "left out" in taken.notes[-1])
+    left = [outlook(one, pattern).foresee(11).uncovered for one in (taken, conformal_map(surface, condition))]
+    assert left[0] <= left[1]
 
 
 def test_too_few_are_refused():
