@@ -34,8 +34,10 @@ def length(value: float) -> str:
 
 
 def lengths(values: list[float]) -> list[str]:
-    """Lengths, each as ``length`` writes it, or with the digits that tell it apart from those beside it. Those
-    that differ by rounding are written alike: panels of other shapes along folds, or with other sides."""
+    """Lengths, each as ``length`` writes it, or with the digits that tell it apart from those beside it.
+
+    Those that differ by rounding are written alike: panels of other shapes along folds, or with other sides.
+    """
     words = [length(value) for value in values]
     for digits in range(5, MOST_DIGITS + 1):
         same = [

@@ -66,8 +66,8 @@ def _chosen(
     keep = share["straight"] <= share["isometric"] + MARGIN
     chosen, other = ("straight", "isometric") if keep else ("isometric", "straight")
     note = (
-        f"Boundary: {chosen}. Because cells differ in size, {SIZES} sizes leave at least {share[chosen]:.1%} of "
-        f"the surface uncovered; {share[other]:.1%} were it {other}."
+        f"Boundary: {chosen}. Because cells differ in size, {SIZES} sizes leave at least {share[chosen]:.1%} "
+        f"of the surface uncovered; {share[other]:.1%} were it {other}."
     )
     return _with_note(straight if keep else isometric, note)
 
