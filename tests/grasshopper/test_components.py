@@ -15,6 +15,9 @@ def test_settings(run_scenarios: Runner) -> None:
     run_scenarios("scenarios_settings", {})
 
 
+@pytest.mark.parametrize(
+    "run_scenarios", ["jython", pytest.param("cpython", marks=pytest.mark.long)], indirect=True
+)
 def test_against_a_live_server(run_scenarios: Runner, server_port: int) -> None:
     run_scenarios("scenarios_solve", {"HEXWRAP_PORT": str(server_port)})
 

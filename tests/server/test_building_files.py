@@ -142,7 +142,7 @@ def plate_corners(plate: Any) -> Floats:
     return np.asarray(points @ motion[:3, :3].T + motion[:3, 3])
 
 
-@pytest.mark.parametrize("kind", ["thick", "storeys"])
+@pytest.mark.parametrize("kind", ["thick", pytest.param("storeys", marks=pytest.mark.long)])
 def test_ifc_is_valid_and_has_the_panels_where_they_are(
     solution: Solution, thick: Solution, kind: str
 ) -> None:

@@ -196,6 +196,7 @@ def test_lost_scheduler_fails_its_job_and_is_found_again(tmp_path: Path) -> None
     run(story())
 
 
+@pytest.mark.long
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.skipif(os.name == "nt", reason="kill -9 of POSIX")
 def test_job_whose_machine_is_killed_fails_alone(tmp_path: Path) -> None:

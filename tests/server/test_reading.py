@@ -196,7 +196,7 @@ def test_curves_beside_the_surface_do_no_harm() -> None:
 
 def test_several_objects_are_named() -> None:
     vertices, quads = tube()
-    parts = rhino_mesh(2 * vertices, quads.tolist()), rhino3dm.NurbsSurface.CreateFromCylinder(cylinder())
+    parts = rhino_mesh(2.5 * vertices, quads.tolist()), rhino3dm.NurbsSurface.CreateFromCylinder(cylinder())
     with pytest.raises(
         SeveralObjectsError, match=r"'old' \(mesh.*'new' \(surface|'new' \(surface.*'old' \(mesh"
     ):

@@ -41,8 +41,9 @@ def test_signals_end_it_cleanly_while_it_works(tmp_path: Path, number: signal.Si
     assert ids[0] in log
 
 
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
-@pytest.mark.parametrize("number", [signal.SIGTERM, pytest.param(signal.SIGINT, marks=pytest.mark.long)])
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_signal_to_the_whole_group_costs_no_job(tmp_path: Path, number: signal.Signals) -> None:
     """As service managers and consoles send it: to the workers as well."""
     port = free_port()

@@ -37,6 +37,8 @@ LONGER = 2.5
 MOST = 60
 #: Walls that fall apart into more tubes than this are no building with courtyards.
 MOST_TUBES = 20
+#: Walls around a courtyard stand: they lean by no more than this, radians; else the block is a ring.
+LEANING = np.deg2rad(25.0)
 #: The open end opposite to a cap lies within this part of the height from the lower end.
 END = 0.35
 
@@ -90,7 +92,8 @@ def caps_of(mesh: Triangles) -> tuple[list[Cap], str]:
         return chosen, _sentence(chosen, len(pairs))
     # Around a courtyard the walls fall apart into an outer and an inner tube, and nothing else.
     area = np.bincount(label, mesh.areas[keep])
-    if len(area) > MOST_TUBES or not all(_is_tube(mesh.faces[keep][label == k]) for k in range(len(area))):
+    tubes = (_is_tube(mesh.faces[keep][label == k]) for k in range(len(area)))
+    if len(area) > MOST_TUBES or not _stand(mesh, keep, chosen[0].normal) or not all(tubes):
         return [], ""
     outer = int(area.argmax())
     inner = np.flatnonzero(keep)[label != outer]
@@ -172,6 +175,13 @@ def _pieces(mesh: Triangles, keep: Bools) -> Ints:
     """(k,) the piece that each kept face belongs to."""
     graph = face_graph(mesh.twin)[keep][:, keep]
     return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+
+
+def _stand(mesh: Triangles, keep: Bools, axis: Floats) -> bool:
+    """Whether the walls run along the axis, but for small parts of them such as ledges."""
+    lean = np.abs(normalize(face_normals(mesh.vertices, mesh.faces[keep])) @ axis) > np.sin(LEANING)
+    area = mesh.areas[keep]
+    return bool(area[lean].sum() <= 0.1 * area.sum())
 
 
 def _is_tube(faces: Ints) -> bool:
