@@ -16,7 +16,7 @@ from hexwrap_solver.panels import measure, rationalize
 from hexwrap_solver.panels.types import PanelSettings
 from hexwrap_solver.pattern import lay_pattern
 
-NAMES = ("tower", "facade", "waist", "entrance")
+NAMES = ("tower", "facade", "waist", pytest.param("entrance", marks=pytest.mark.long))
 
 
 @pytest.mark.parametrize("name", NAMES)
