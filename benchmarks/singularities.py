@@ -21,13 +21,13 @@ from __future__ import annotations
 
 import argparse
 import re
+import sys
 import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial import ConvexHull
 
 from hexwrap_server import samples
 from hexwrap_server.input.requests import SentSurface
@@ -52,6 +52,10 @@ from hexwrap_solver.singularities.types import SingularitySettings
 from hexwrap_solver.surface import surface_from_mesh, with_openings
 from hexwrap_solver.surface.types import FeatureSettings, SentMesh, Surface, SurfaceSettings
 from hexwrap_solver.threads import one_blas_thread
+
+sys.path.insert(0, str(Path(__file__).parents[1]))  # for tests.*, where this runs as a script
+
+from tests.solver.singularities import shapes
 
 SAMPLES = ("tower", "waist", "diagrid", "facade", "entrance", "cone", "isometric", "ring")
 #: Beside the samples: a tower with a round door, the sample dome, a closed ellipsoid.
@@ -155,7 +159,7 @@ def surface_of(name: str) -> tuple[Surface, PatternSettings]:
         smooth = SurfaceSettings(features=FeatureSettings(angle=None))
         return take_in(sent_surface(file.read_bytes(), file.name, smooth).sent, smooth), PatternSettings()
     if name == "ellipsoid":
-        return ellipsoid(), PatternSettings()
+        return shapes.ellipsoid(6000, 10.0), PatternSettings()
     asked = parse_request(samples.load("tower" if name == OTHERS[0] else name), 10**7, 10**6)
     assert isinstance(asked.surface, SentSurface)
     surface = take_in(asked.surface, asked.wanted.surface)
@@ -171,24 +175,8 @@ def with_door(surface: Surface, radius: float = 2.5) -> Surface:
     centre = vertices[ring[vertices[ring, 0].argmax()]]
     kept = ~(np.linalg.norm(vertices - centre, axis=1) < radius)[surface.faces].any(axis=1)
     used = np.unique(surface.faces[kept])
-    faces = np.searchsorted(used, surface.faces[kept])
-    return with_openings(_of_triangles(vertices[used], faces), "loop")
-
-
-def ellipsoid(n: int = 6000) -> Surface:
-    """Closed, 40 m × 28 m × 20 m: points of a spiral and their convex hull."""
-    i = np.arange(n) + 0.5
-    fall, turn = np.arccos(1 - 2 * i / n), np.pi * (1 + 5**0.5) * i
-    points = np.stack([np.cos(turn) * np.sin(fall), np.sin(turn) * np.sin(fall), np.cos(fall)], axis=1)
-    faces = ConvexHull(points).simplices.astype(np.int64)
-    a, b, c = (points[corner] for corner in faces.T)
-    inward = (np.cross(b - a, c - a) * (a + b + c)).sum(axis=1) < 0
-    faces[inward] = faces[inward][:, ::-1]
-    return _of_triangles(points * [20.0, 14.0, 10.0], faces)
-
-
-def _of_triangles(vertices: Floats, faces: Ints) -> Surface:
-    return surface_from_mesh(SentMesh(vertices, Ragged(faces.ravel(), 3 * np.arange(len(faces) + 1))))
+    faces = Ragged.from_table(np.searchsorted(used, surface.faces[kept]))
+    return with_openings(surface_from_mesh(SentMesh(vertices[used], faces)), "loop")
 
 
 def against_greedy(name: str) -> Iterator[str]:

@@ -60,7 +60,8 @@ def slivers() -> Surface:
     return surface_of(np.stack([radius * np.cos(turn), radius * np.sin(turn), height], axis=1), regular.faces)
 
 
-def ellipsoid(n: int = 1200) -> Surface:
+def ellipsoid(n: int = 1200, radius: float = 1.0) -> Surface:
+    """Closed, 4 : 2.8 : 2, the least radius given: points of a spiral and their convex hull."""
     i = np.arange(n) + 0.5
     fall, turn = np.arccos(1 - 2 * i / n), np.pi * (1 + 5**0.5) * i
     points = np.stack([np.cos(turn) * np.sin(fall), np.sin(turn) * np.sin(fall), np.cos(fall)], axis=1)
@@ -68,7 +69,7 @@ def ellipsoid(n: int = 1200) -> Surface:
     a, b, c = (points[corner] for corner in faces.T)
     inward = (np.cross(b - a, c - a) * (a + b + c)).sum(axis=1) < 0
     faces[inward] = faces[inward][:, ::-1]
-    return surface_of(points * [2.0, 1.4, 1.0], faces)
+    return surface_of(radius * points * [2.0, 1.4, 1.0], faces)
 
 
 def dome(n: int = 1800) -> Surface:
