@@ -30,9 +30,9 @@ LAST_ROUNDINGS = 1e-12
 OVERSHOOT = 0.1
 #: Cuts of one step; more were never seen to help.
 MAX_TRIALS = 40
-#: The factorised Hessian is used again (a chord step) where at most this many such steps, each leaving as much
-#: of the residual as the last one did, would reach rounding: a step costs a fourth of one with a factorisation,
-#: after which two or three chord steps would follow all the same.
+#: The factorised Hessian is used again (a chord step) where at most this many such steps, each leaving as
+#: much of the residual as the last one did, would reach rounding: a step costs a fourth of one with a
+#: factorisation, after which two or three chord steps would follow all the same.
 CHORDS = 6
 #: What a chord step may leave of the residual to be kept.
 CHORD_GAIN = 0.2
