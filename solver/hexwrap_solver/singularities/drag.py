@@ -63,6 +63,12 @@ class Grip:
     axes: Floats
     steps: Floats | None
 
+    def ways(self, surface: Surface) -> Floats:
+        """(2, k, 3) where the vertices go, per unit along each axis, to first order."""
+        normal = surface.normals[self.vertex]
+        way = self.share[:, None] * self.axes[:, None]
+        return np.asarray(way - np.einsum("akx,kx->ak", way, normal)[:, :, None] * normal)
+
 
 def rims(surface: Surface) -> Ints:
     """(k, 2) edges around the openings that were filled."""
