@@ -213,9 +213,7 @@ class Chart:
         surface, base, n = self.surface, self.energy.lengths, len(self.surface.vertices)
         for grip in self.hold:
             face = self._around(grip.vertex)
-            for way in grip.ways(surface):  # to first order a vertex moves in its tangent plane
-                moved = surface.vertices.copy()
-                moved[grip.vertex] += step * self.cell * way
+            for moved in grip.moved(surface, step * self.cell):
                 yield 0.0, face, opposite_lengths(moved, surface.faces[face])
         for loop, wave in self.waves:
             face = self._around(loop)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -63,11 +64,18 @@ class Grip:
     axes: Floats
     steps: Floats | None
 
-    def ways(self, surface: Surface) -> Floats:
-        """(2, k, 3) where the vertices go, per unit along each axis, to first order."""
+    def moved(self, surface: Surface, step: float) -> Iterator[Floats]:
+        """(n, 3) the surface's vertices after a small step along each axis; on a NURBS surface to first
+        order, in their tangent planes."""
+        if self.steps is None:
+            for move in step * np.eye(2):
+                yield dragged(surface, [self], move[None]).vertices
+            return
         normal = surface.normals[self.vertex]
-        way = self.share[:, None] * self.axes[:, None]
-        return np.asarray(way - np.einsum("akx,kx->ak", way, normal)[:, :, None] * normal)
+        for axis in self.axes:
+            vertices = surface.vertices.copy()
+            vertices[self.vertex] += step * self.share[:, None] * (axis - (normal @ axis)[:, None] * normal)
+            yield vertices
 
 
 def rims(surface: Surface) -> Ints:
