@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from hexwrap_server.output.colours import encoded, from_hex, linear
 from hexwrap_server.output.raster import Camera, Polygons, draw, planes
@@ -247,7 +247,9 @@ def _openness(nearest: Floats, radius: float) -> Floats:
     light = np.ones(nearest.shape)
     for blur, reach, coarse in HOLLOWS:
         weight, total = (
-            ndimage.gaussian_filter(image[::coarse, ::coarse].astype(np.float64), blur / coarse, truncate=2.5)
+            scipy.ndimage.gaussian_filter(
+                image[::coarse, ::coarse].astype(np.float64), blur / coarse, truncate=2.5
+            )
             for image in (there, depth)
         )
         around = _enlarged(total / np.maximum(weight, 1e-9), nearest.shape)
