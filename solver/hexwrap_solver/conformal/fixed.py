@@ -15,9 +15,17 @@ from hexwrap_solver.linalg.factor import Factorisation
 #: Accepted residual, radians: boundary angles are promised to 1e-9.
 ACCEPTED = 3e-10
 #: Degenerate triangles make Newton leap: no single step may change the logarithm of a length by more than
-#: ``leap``.
+#: ``leap``. A chord step that is tried in vain costs a fourth of a step.
 RULES = Rules(
-    steps=60, leap=8.0, accepted=ACCEPTED, stalls=1, large=ACCEPTED, share=0.1, settled=0.05, usual=10
+    steps=60,
+    leap=8.0,
+    accepted=ACCEPTED,
+    stalls=1,
+    large=ACCEPTED,
+    share=0.1,
+    settled=0.05,
+    usual=10,
+    promising=0.25,
 )
 #: Multiples of its largest diagonal entry that make a singular Hessian definite.
 SHIFTS = (0.0, 1e-12, 1e-9, 1e-6)
