@@ -67,8 +67,8 @@ def _chosen(
     chosen, other = ("straight", "isometric") if keep else ("isometric", "straight")
     left = {mode: f"at least {part:.1%}" if part >= 0.0005 else "nothing" for mode, part in share.items()}
     note = (
-        f"Boundary: {chosen}. At {SIZES} sizes, cells that differ in size leave {left[chosen]} of the surface "
-        f"uncovered; were it {other}, {left[other]}."
+        f"Boundary: {chosen}. At {SIZES} sizes, cells that differ in size leave {left[chosen]} of the "
+        f"surface uncovered; were it {other}, {left[other]}."
     )
     return _with_note(straight if keep else isometric, note)
 
