@@ -1,10 +1,14 @@
 """One BLAS thread for tests that call single stages; the pipeline sees to it itself. Long files first."""
 
 import os
+import sys
 
 import pytest
 
 os.environ.update(dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1"))
+# Tests start some hundred processes. Each would compile the whole program again.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 #: Files that take a minute or more are begun first: begun last, one would keep the others' processes idle.
 LONG_FILES = (

@@ -40,10 +40,10 @@ def check_mesh(result: Json) -> list[str]:
     mesh = result["mesh"]
     faces = np.array(mesh["faces"])
     n = len(mesh["vertices"])
-    half = Counter((int(a), int(b)) for f in faces for a, b in zip(f, np.roll(f, -1), strict=True))
+    half = Counter((a, b) for f in mesh["faces"] for a, b in zip(f, f[1:] + f[:1], strict=True))
     if max(half.values()) > 1:
         bad.append("an oriented edge occurs twice")
-    edges = {tuple(sorted(e)) for e in half}
+    edges = {(min(e), max(e)) for e in half}
     if n - len(edges) + len(faces) != 2 - len(mesh["loops"]):
         bad.append(f"Euler characteristic {n - len(edges) + len(faces)} with {len(mesh['loops'])} loops")
     boundary = {e for e in half if (e[1], e[0]) not in half}
@@ -72,22 +72,19 @@ def check_map(result: Json) -> list[str]:
     if (area <= 0).any():
         bad.append(f"{int((area <= 0).sum())} faces are not positively oriented")
     where: dict[tuple[int, int], list[tuple[int, int]]] = defaultdict(list)
-    for f, face in enumerate(faces):
+    for f, face in enumerate(result["mesh"]["faces"]):
         for k in range(3):
-            where[tuple(sorted((int(face[k]), int(face[(k + 1) % 3]))))].append((f, k))
+            a, b = face[k], face[(k + 1) % 3]
+            where[min(a, b), max(a, b)].append((f, k))
     net = m["kind"] == "net"
     if net:
         bad += _check_motions(z, faces, where, result["pattern"])
-    sheet = None if net else np.array(m["sheet"])
+    sheet, of = None if net else m["sheet"], result["mesh"]["faces"]
     for (a, b), places in [] if net else where.items():
         if len(places) == 2:
             (f, k), (h, j) = places
-            step = (
-                sheet[h][(j + 1) % 3] - sheet[f][k]
-                if faces[h][j] != faces[f][k]
-                else sheet[h][j] - sheet[f][k]
-            )
-            other = (j, (j + 1) % 3) if faces[h][j] != faces[f][k] else ((j + 1) % 3, j)
+            step = sheet[h][(j + 1) % 3] - sheet[f][k] if of[h][j] != of[f][k] else sheet[h][j] - sheet[f][k]
+            other = (j, (j + 1) % 3) if of[h][j] != of[f][k] else ((j + 1) % 3, j)
             step2 = sheet[h][other[0]] - sheet[f][(k + 1) % 3]
             if step != step2:
                 bad.append(f"faces {f} and {h} disagree on edge {a}–{b} by more than one power of g")
@@ -209,30 +206,31 @@ def check_panels(result: Json, *, regular: bool = True, overlap_free: bool = Tru
     bad = []
     p = result["panels"]
     table = {s["size"]: s["edge_length"] for s in result["sizes"]}
-    for i, polygon in enumerate(p["polygons"]):
-        if not (p["whole"][i] and regular):
-            continue
-        q = np.array(polygon)
-        length = p["edge_length"][i]
-        edge = np.linalg.norm(np.roll(q, -1, 0) - q, axis=1)
-        c = q.mean(0)
-        normal = np.linalg.svd(q - c)[2][2]
-        a, b = np.roll(q, -1, 0) - q, np.roll(q, 1, 0) - q
-        cos = (a * b).sum(1) / (np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1))
-        off = np.abs(cos + np.cos(2 * np.pi / len(q))).max()  # −cos of the exterior angle
-        worst = max(np.abs(edge - length).max(), np.abs((q - c) @ normal).max(), length * off)
-        if worst > 1e-9 * max(length, 1e-7 * np.abs(q).max() * 1e-3) + 4e-16 * np.abs(q).max() * 8:
-            bad.append(f"panel {p['label'][i]} is off by {worst / length:.2e} ℓ")
-            break
-        if p["size"][i] in table and abs(table[p["size"][i]] - length) > 1e-9 * length:
-            bad.append(f"panel {p['label'][i]} has ℓ = {length}, its class {table[p['size'][i]]}")
-            break
+    lengths = np.array(p["edge_length"])
     inward, pattern_normals = 0, np.array(result["pattern"]["normals"])
-    for i, polygon in enumerate(p["polygons"]):
-        q, n = np.array(polygon), np.array(p["normal"][i])
-        area = np.cross(q - q[0], np.roll(q, -1, 0) - q[0]).sum(0)
-        outside = pattern_normals[result["pattern"]["faces"][p["face"][i]]].sum(0)
-        inward += bool(area @ n <= 0 or n @ outside <= 0 or abs(np.linalg.norm(n) - 1) > 1e-9)
+    outward = np.array([pattern_normals[result["pattern"]["faces"][f]].sum(0) for f in p["face"]])
+    for panel, q in by_corners(p["polygons"]):
+        after, n = np.roll(q, -1, axis=1), np.array(p["normal"])[panel]
+        area = np.cross(q - q[:, :1], after - q[:, :1]).sum(axis=1)
+        is_out = ((area * n).sum(1) > 0) & ((n * outward[panel]).sum(1) > 0)
+        inward += int((~is_out | (np.abs(np.linalg.norm(n, axis=1) - 1) > 1e-9)).sum())
+        if not regular:
+            continue
+        length, spread = lengths[panel], np.abs(q).max(axis=(1, 2))
+        edge = np.linalg.norm(after - q, axis=2)
+        centred = q - q.mean(axis=1, keepdims=True)
+        height = np.einsum("pci,pi->pc", centred, np.linalg.svd(centred)[2][:, 2])
+        a, b = after - q, np.roll(q, 1, axis=1) - q
+        cos = (a * b).sum(2) / (np.linalg.norm(a, axis=2) * np.linalg.norm(b, axis=2))
+        off = np.abs(cos + np.cos(2 * np.pi / q.shape[1])).max(1)  # −cos of the exterior angle
+        worst = np.max([np.abs(edge - length[:, None]).max(1), np.abs(height).max(1), length * off], axis=0)
+        slack = 1e-9 * np.maximum(length, 1e-10 * spread) + 4e-16 * spread * 8
+        for i in np.flatnonzero(np.array(p["whole"])[panel] & (worst > slack))[:1]:
+            bad.append(f"panel {p['label'][panel[i]]} is off by {worst[i] / length[i]:.2e} ℓ")
+    for label, size, length, whole in zip(p["label"], p["size"], p["edge_length"], p["whole"], strict=True):
+        if regular and whole and size in table and abs(table[size] - length) > 1e-9 * length:
+            bad.append(f"panel {label} has ℓ = {length}, its class {table[size]}")
+            break
     if inward:
         bad.append(f"{inward} panels or their normals do not look outward")
     counts = Counter(p["size"])
@@ -244,6 +242,13 @@ def check_panels(result: Json, *, regular: bool = True, overlap_free: bool = Tru
     if overlap_free:
         bad += overlaps(result)
     return bad
+
+
+def by_corners(polygons: list[list[list[float]]]) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Indices (k,) of the polygons with as many corners, and these (k, corners, 3)."""
+    count = np.array([len(polygon) for polygon in polygons])
+    groups = [np.flatnonzero(count == n) for n in np.unique(count)]
+    return [(group, np.array([polygons[i] for i in group])) for group in groups]
 
 
 def check_quality(result: Json) -> list[str]:
@@ -327,18 +332,21 @@ def overlaps(result: Json) -> list[str]:
         for h in row
         if h >= 0 and f in of and h in of and h != f
     }
-    count = 0
-    for i, j in pairs:
-        axis = np.array(p["normal"][i]) + np.array(p["normal"][j])
-        axis /= np.linalg.norm(axis)
-        e1 = np.cross(axis, [1.0, 0, 0] if abs(axis[0]) < 0.7 else [0, 1.0, 0])
-        e1 /= np.linalg.norm(e1)
-        e2 = np.cross(axis, e1)
-        origin = np.array(p["center"][i])
-        flat = [
-            shapely.Polygon(np.stack([(np.array(p["polygons"][k]) - origin) @ e for e in (e1, e2)], 1))
-            for k in (i, j)
-        ]
-        if flat[0].intersection(flat[1]).area > 1e-9 * min(p["edge_length"][i], p["edge_length"][j]) ** 2:
-            count += 1
+    if not pairs:
+        return []
+    pair = np.array(sorted(pairs))
+    normal, center, length = (np.array(p[name]) for name in ("normal", "center", "edge_length"))
+    axis = normal[pair].sum(axis=1)
+    axis /= np.linalg.norm(axis, axis=1, keepdims=True)
+    e1 = np.cross(axis, np.where(np.abs(axis[:, :1]) < 0.7, [[1.0, 0, 0]], [[0, 1.0, 0]]))
+    e1 /= np.linalg.norm(e1, axis=1, keepdims=True)
+    frame, origin = np.stack([e1, np.cross(axis, e1)], axis=2), center[pair[:, 0]]
+    flat = np.empty(pair.shape, dtype=object)
+    for panel, q in by_corners(p["polygons"]):
+        row = np.full(len(p["polygons"]), -1)
+        row[panel] = np.arange(len(panel))
+        at, side = np.nonzero(row[pair] >= 0)
+        flat[at, side] = shapely.polygons((q[row[pair[at, side]]] - origin[at, None]) @ frame[at])
+    shared = shapely.area(shapely.intersection(flat[:, 0], flat[:, 1]))
+    count = int((shared > 1e-9 * length[pair].min(axis=1) ** 2).sum())
     return [f"{count} pairs of neighbours overlap"] if count else []

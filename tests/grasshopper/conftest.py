@@ -23,8 +23,11 @@ ROOT = Path(__file__).resolve().parents[2]
 HEADLESS = Path(__file__).parent / "headless"
 DIST = ROOT / "grasshopper" / "dist"
 
-#: Java's best compiler takes longer than what it would speed up here.
-QUICK_JAVA = {"JAVA_TOOL_OPTIONS": "-XX:TieredStopAtLevel=1 -XX:+UseSerialGC"}
+#: Java's best compiler takes longer than what it would speed up here; Jython would leave class files behind.
+QUICK_JAVA = {
+    "JAVA_TOOL_OPTIONS": "-XX:TieredStopAtLevel=1 -XX:+UseSerialGC",
+    "PYTHONDONTWRITEBYTECODE": "1",
+}
 
 Runner = Callable[[str, dict[str, str]], None]
 

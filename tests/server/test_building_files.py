@@ -298,14 +298,16 @@ def test_arrows_point_up_and_texts_stand_upright(regular: Solution) -> None:
     assert np.stack([-np.sin(turn), np.cos(turn)], axis=1) == pytest.approx(up, abs=1e-9)
 
 
-def test_sheets_measure_three_by_one_and_a_half_metres() -> None:
+def test_sheets_measure_three_by_one_and_a_half_metres_or_the_next_stock_that_holds_a_panel() -> None:
     small = np.full((3, 2), 0.4)
     assert sheet_size(small, Meta(unit="m")) == (3.0, 1.5)
     assert sheet_size(small * 1000, Meta(unit="mm")) == pytest.approx((3000, 1500))
     assert sheet_size(small / 0.3048, Meta(unit="ft")) == pytest.approx((9.8425197, 4.9212598))
-    wide, high = sheet_size(np.full((3, 2), 1.9), Meta(unit="m"))
-    assert wide > 6 * 1.9
-    assert high > 4 * 1.9
+    assert sheet_size(np.full((3, 2), 1.7), Meta(unit="m")) == (4.0, 2.0)
+    assert sheet_size(np.full((3, 2), 2900.0), Meta(unit="mm")) == pytest.approx((6000, 3210))
+    wide, high = sheet_size(np.full((3, 2), 3.3), Meta(unit="m"))
+    assert wide > 6 * 3.3
+    assert high > 4 * 3.3
     assert sheet_size(small, Meta(sheet=(2.0, 1.0))) == (2.0, 1.0)
 
 

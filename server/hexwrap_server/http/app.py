@@ -23,7 +23,7 @@ from hexwrap_server import __version__
 from hexwrap_server.errors import HttpError, PortTakenError, StorageError, bad_parameters
 from hexwrap_server.http.answers import problem_response
 from hexwrap_server.http.compressed import Compressed
-from hexwrap_server.http.docs import add_docs
+from hexwrap_server.http.docs import DocumentedApp, add_docs
 from hexwrap_server.http.head import Head
 from hexwrap_server.http.hops.routes import hops_router
 from hexwrap_server.http.observe import METHODS, Observer
@@ -62,12 +62,13 @@ def create_app(settings: Settings | None = None, engine: Engine | None = None) -
         finally:
             await service.stop()
 
-    app = FastAPI(
+    app = DocumentedApp(
         title="hexwrap",
         version=__version__,
         summary="Seamless hexagonal, quad and triangle panels on tube-like surfaces",
         lifespan=lifespan,
         redirect_slashes=False,
+        openapi_url=None,
         docs_url=None,
         redoc_url=None,
     )

@@ -1,13 +1,16 @@
-"""``/docs``: the OpenAPI document as one page for people, with nothing loaded from elsewhere."""
+"""The OpenAPI document, and ``/docs``: the same as a page for people, with nothing loaded from elsewhere."""
 
 from __future__ import annotations
 
+import asyncio
 import json
 from html import escape
+from threading import Lock
 from typing import Any
 
 from fastapi import FastAPI, Request
-from starlette.responses import HTMLResponse, Response
+from fastapi.utils import deep_dict_update
+from starlette.responses import HTMLResponse, JSONResponse, Response
 
 STYLE = """
 body { font: 16px/1.5 system-ui, sans-serif; max-width: 60rem; margin: 3rem auto; padding: 0 1.5rem; }
@@ -19,13 +22,33 @@ pre { background: #f4f5f8; padding: 1rem; overflow: auto; max-height: 32rem; }
 """
 
 
-def add_docs(app: FastAPI) -> None:
-    """Serves the page."""
+class DocumentedApp(FastAPI):
+    """Describes its routes when it is asked to: the schemas take half a second, which no start waits for."""
+
+    _describing = Lock()
+
+    def openapi(self) -> dict[str, Any]:
+        with self._describing:
+            if self.openapi_schema is None:
+                from hexwrap_server.http.openapi import OPERATIONS
+
+                for path, operations in super().openapi()["paths"].items():
+                    for method, operation in operations.items():
+                        deep_dict_update(operation, OPERATIONS[f"{method.upper()} {path}"])
+            return super().openapi()
+
+
+def add_docs(app: DocumentedApp) -> None:
+    """Serves the document and the page; it is made beside the event loop."""
+
+    @app.get("/openapi.json", include_in_schema=False)
+    async def document(request: Request) -> Response:
+        return JSONResponse(await asyncio.to_thread(app.openapi))
 
     @app.get("/docs", include_in_schema=False)
     async def docs(request: Request) -> Response:
         policy = {"Content-Security-Policy": "default-src 'none'; style-src 'unsafe-inline'"}
-        return HTMLResponse(page(app.openapi()), headers=policy)
+        return HTMLResponse(page(await asyncio.to_thread(app.openapi)), headers=policy)
 
 
 def page(document: dict[str, Any]) -> str:

@@ -87,33 +87,48 @@ _FILE = {"multipart/form-data": {"schema": record(("file",), file={"type": "stri
 _POINTS = record(("points",), more=False, points=listed(PLANE))
 _PLACES = record(("points",), more=False, points=listed(POINT))
 
-HEALTH = _route(_answers(_json(_HEALTH)))
-READY = _route(_answers(_json(_HEALTH), 200, 503))
-METRICS = _route(_answers({"text/plain": {"schema": {"type": "string"}}}))
-JOBS = _route(_answers(_json(record(("jobs",), jobs=listed(_JOB)))))
-JOB = _route(_answers(_json(_JOB), 200, 404))
-EVENTS = _route(_answers({"text/event-stream": {"schema": {"type": "string"}}}, 200, 404))
-RESULT = _route(_answers(_json(_RESULT), 200, 404, 409, 410, 500, 503))
-DELETE_JOB = _route(_answers({}, 204, 404))
-POST_JOB = _route(_answers(_json(_JOB), 202, *_BODY_FAULTS, 503), _json(_request_schema()))
-POST_EXPLORE = _route(_answers(_json(_JOB), 202, *_BODY_FAULTS, 503), _json(_request_schema(ExploreBody)))
-SOLVE = _route(_answers(_json(_RESULT), 200, *_BODY_FAULTS, 409, 410, 500, 503), _json(_request_schema()))
-SURFACES = _route(
-    _answers(_json(record(("id", "vertices", "faces", "loops", "repairs"))), 201, *_BODY_FAULTS, 500, 503),
-    _json({"anyOf": [_MESH, _NURBS]}) | _FILE,
-)
-LIFT = _route(
-    _answers(_json(record(("points", "normals", "inside"))), 200, *_BODY_FAULTS, 404, 409, 410, 503),
-    _json(_POINTS),
-)
-FLATTEN = _route(
-    _answers(_json(record(("uv", "distance"))), 200, *_BODY_FAULTS, 404, 409, 410, 503), _json(_PLACES)
-)
-FILES = _route(
-    _answers({"application/octet-stream": {"schema": {"type": "string"}}}, 200, 404, 409, 410, 500, 503)
-)
-SETTINGS = _route(_answers(_json(record(("type", "properties")))))
-SAMPLES = _route(_answers(_json(record(("samples",), samples=listed(record(("name",)))))))
-SAMPLE = _route(_answers(_json(record(("surface",))), 200, 404))
-REQUEST = _route(_answers(_json(record(("surface", "boundary", "pattern", "panels"))), 200, 404))
-PREVIEW = _route(_answers(_json(record(("vertices", "faces"))), 200, *_BODY_FAULTS, 500, 503), _FILE)
+#: By method and path; FastAPI adds what it knows of parameters.
+OPERATIONS: dict[str, dict[str, Any]] = {
+    "GET /health": _route(_answers(_json(_HEALTH))),
+    "GET /ready": _route(_answers(_json(_HEALTH), 200, 503)),
+    "GET /metrics": _route(_answers({"text/plain": {"schema": {"type": "string"}}})),
+    "GET /v1/jobs": _route(_answers(_json(record(("jobs",), jobs=listed(_JOB))))),
+    "GET /v1/jobs/{id}": _route(_answers(_json(_JOB), 200, 404)),
+    "GET /v1/jobs/{id}/events": _route(
+        _answers({"text/event-stream": {"schema": {"type": "string"}}}, 200, 404)
+    ),
+    "GET /v1/jobs/{id}/result": _route(_answers(_json(_RESULT), 200, 404, 409, 410, 500, 503)),
+    "DELETE /v1/jobs/{id}": _route(_answers({}, 204, 404)),
+    "POST /v1/jobs": _route(_answers(_json(_JOB), 202, *_BODY_FAULTS, 503), _json(_request_schema())),
+    "POST /v1/explore": _route(
+        _answers(_json(_JOB), 202, *_BODY_FAULTS, 503), _json(_request_schema(ExploreBody))
+    ),
+    "POST /v1/solve": _route(
+        _answers(_json(_RESULT), 200, *_BODY_FAULTS, 409, 410, 500, 503), _json(_request_schema())
+    ),
+    "POST /v1/surfaces": _route(
+        _answers(
+            _json(record(("id", "vertices", "faces", "loops", "repairs"))), 201, *_BODY_FAULTS, 500, 503
+        ),
+        _json({"anyOf": [_MESH, _NURBS]}) | _FILE,
+    ),
+    "POST /v1/jobs/{id}/lift": _route(
+        _answers(_json(record(("points", "normals", "inside"))), 200, *_BODY_FAULTS, 404, 409, 410, 503),
+        _json(_POINTS),
+    ),
+    "POST /v1/jobs/{id}/flatten": _route(
+        _answers(_json(record(("uv", "distance"))), 200, *_BODY_FAULTS, 404, 409, 410, 503), _json(_PLACES)
+    ),
+    "GET /v1/jobs/{id}/files/{name}": _route(
+        _answers({"application/octet-stream": {"schema": {"type": "string"}}}, 200, 404, 409, 410, 500, 503)
+    ),
+    "GET /v1/settings": _route(_answers(_json(record(("type", "properties"))))),
+    "GET /v1/samples": _route(_answers(_json(record(("samples",), samples=listed(record(("name",))))))),
+    "GET /v1/samples/{name}": _route(_answers(_json(record(("surface",))), 200, 404)),
+    "GET /v1/jobs/{id}/request": _route(
+        _answers(_json(record(("surface", "boundary", "pattern", "panels"))), 200, 404)
+    ),
+    "POST /v1/surfaces/preview": _route(
+        _answers(_json(record(("vertices", "faces"))), 200, *_BODY_FAULTS, 500, 503), _FILE
+    ),
+}

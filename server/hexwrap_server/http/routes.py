@@ -11,7 +11,7 @@ from isal import igzip
 from starlette.responses import Response, StreamingResponse
 
 from hexwrap_server.errors import GoneError, HttpError, JobFailedError, bad_parameters, not_found
-from hexwrap_server.http import head, openapi
+from hexwrap_server.http import head
 from hexwrap_server.http.answers import JSON, json_response, problem_response
 from hexwrap_server.http.bodies import sent_body
 from hexwrap_server.http.metrics import MEDIA_TYPE as METRICS_TYPE
@@ -58,13 +58,13 @@ def manager_of(request: Request) -> JobManager:
     return service_of(request).manager
 
 
-@router.get("/health", openapi_extra=openapi.HEALTH)
+@router.get("/health")
 async def health(request: Request) -> Response:
     """Whether the server lives."""
     return json_response(service_of(request).health())
 
 
-@router.get("/ready", openapi_extra=openapi.READY)
+@router.get("/ready")
 async def ready(request: Request) -> Response:
     """Whether a job would be run now."""
     service = service_of(request)
@@ -75,13 +75,13 @@ async def ready(request: Request) -> Response:
     return json_response(service.health())
 
 
-@router.get("/metrics", openapi_extra=openapi.METRICS)
+@router.get("/metrics")
 async def metrics(request: Request) -> Response:
     """Prometheus text."""
     return Response(service_of(request).metrics.text(), media_type=METRICS_TYPE)
 
 
-@router.post("/v1/jobs", status_code=202, openapi_extra=openapi.POST_JOB)
+@router.post("/v1/jobs", status_code=202)
 async def post_job(request: Request) -> Response:
     """Have a surface panelized."""
     manager = manager_of(request)
@@ -89,7 +89,7 @@ async def post_job(request: Request) -> Response:
     return json_response(manager.document(job), 202, {"Location": f"/v1/jobs/{job.id}"})
 
 
-@router.post("/v1/explore", status_code=202, openapi_extra=openapi.POST_EXPLORE)
+@router.post("/v1/explore", status_code=202)
 async def post_explore(request: Request) -> Response:
     """Have variants of a surface looked at, and the promising ones solved."""
     manager = manager_of(request)
@@ -97,7 +97,7 @@ async def post_explore(request: Request) -> Response:
     return json_response(manager.document(job), 202, {"Location": f"/v1/jobs/{job.id}"})
 
 
-@router.get("/v1/jobs", openapi_extra=openapi.JOBS)
+@router.get("/v1/jobs")
 async def list_jobs(
     request: Request,
     limit: Annotated[int, Query(ge=1, le=1000)] = 100,
@@ -109,7 +109,7 @@ async def list_jobs(
     return await asyncio.to_thread(json_response, {"jobs": jobs, "next": more})
 
 
-@router.get("/v1/jobs/{id}", openapi_extra=openapi.JOB)
+@router.get("/v1/jobs/{id}")
 async def get_job(
     request: Request, id: JobId, wait: Annotated[float, Query(ge=0, le=MAX_WAIT, allow_inf_nan=False)] = 0.0
 ) -> Response:
@@ -119,7 +119,7 @@ async def get_job(
     return json_response(manager.document(job), headers={"Cache-Control": "no-store"} | _timing(job))
 
 
-@router.get("/v1/jobs/{id}/events", openapi_extra=openapi.EVENTS)
+@router.get("/v1/jobs/{id}/events")
 async def events(request: Request, id: JobId) -> Response:
     """A job's progress as Server-Sent Events."""
     manager = manager_of(request)
@@ -130,7 +130,7 @@ async def events(request: Request, id: JobId) -> Response:
     return StreamingResponse(stream, headers=headers, media_type="text/event-stream")
 
 
-@router.get("/v1/jobs/{id}/result", openapi_extra=openapi.RESULT)
+@router.get("/v1/jobs/{id}/result")
 async def get_result(
     request: Request, id: JobId, include: Annotated[str | None, Query(description=", ".join(PARTS))] = None
 ) -> Response:
@@ -138,14 +138,14 @@ async def get_result(
     return await _result(request, manager_of(request).get(id), _parts(include))
 
 
-@router.delete("/v1/jobs/{id}", status_code=204, openapi_extra=openapi.DELETE_JOB)
+@router.delete("/v1/jobs/{id}", status_code=204)
 async def delete_job(request: Request, id: JobId) -> Response:
     """Stop a job, or forget it."""
     await manager_of(request).delete(id)
     return Response(status_code=204)
 
 
-@router.post("/v1/solve", openapi_extra=openapi.SOLVE)
+@router.post("/v1/solve")
 async def solve(
     request: Request, include: Annotated[str | None, Query(description=", ".join(PARTS))] = None
 ) -> Response:
@@ -173,7 +173,7 @@ async def _solved(request: Request, parsed: ParsedRequest, parts: list[str] | No
     return await _result(request, job, parts)
 
 
-@router.post("/v1/surfaces", status_code=201, openapi_extra=openapi.SURFACES)
+@router.post("/v1/surfaces", status_code=201)
 async def post_surface(
     request: Request,
     name: Annotated[str | None, Query(max_length=200, description="name of a raw file")] = None,
@@ -193,19 +193,19 @@ async def post_surface(
     return json_response({"id": intake.id} | intake.answer, 201)
 
 
-@router.post("/v1/jobs/{id}/lift", openapi_extra=openapi.LIFT)
+@router.post("/v1/jobs/{id}/lift")
 async def lift(request: Request, id: JobId) -> Response:
     """Points of the unrolled domain → points of the surface."""
     return await _carry(request, id, "lift")
 
 
-@router.post("/v1/jobs/{id}/flatten", openapi_extra=openapi.FLATTEN)
+@router.post("/v1/jobs/{id}/flatten")
 async def flatten(request: Request, id: JobId) -> Response:
     """Points near the surface → points of the unrolled domain."""
     return await _carry(request, id, "flatten")
 
 
-@router.get("/v1/jobs/{id}/files/{name}", openapi_extra=openapi.FILES)
+@router.get("/v1/jobs/{id}/files/{name}")
 async def get_file(
     request: Request,
     id: JobId,

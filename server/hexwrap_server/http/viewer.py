@@ -15,7 +15,6 @@ from starlette.staticfiles import StaticFiles
 
 from hexwrap_server import samples
 from hexwrap_server.errors import not_found
-from hexwrap_server.http import openapi
 from hexwrap_server.http.answers import JSON, json_response
 from hexwrap_server.http.bodies import sent_body
 from hexwrap_server.http.routes import JobId, service_of
@@ -44,19 +43,19 @@ async def page() -> Response:
     )
 
 
-@router.get("/v1/settings", openapi_extra=openapi.SETTINGS)
+@router.get("/v1/settings")
 async def settings() -> Response:
     """JSON Schema of a request but for the arrays of its surface, with help, units and bounds: for forms."""
     return json_response(schema(Body))
 
 
-@router.get("/v1/samples", openapi_extra=openapi.SAMPLES)
+@router.get("/v1/samples")
 async def list_samples() -> Response:
     """The bundled surfaces."""
     return json_response({"samples": [{"name": name} for name in samples.names()]})
 
 
-@router.get("/v1/samples/{name}", openapi_extra=openapi.SAMPLE)
+@router.get("/v1/samples/{name}")
 async def sample(name: str) -> Response:
     """A bundled surface as a complete request body."""
     if name not in samples.names():
@@ -66,7 +65,7 @@ async def sample(name: str) -> Response:
     return Response(orjson.dumps(samples.load(name)), media_type=JSON)
 
 
-@router.get("/v1/jobs/{id}/request", openapi_extra=openapi.REQUEST)
+@router.get("/v1/jobs/{id}/request")
 async def job_request(request: Request, id: JobId) -> Response:
     """What a job was asked to do, its surface by id: to be changed and sent again."""
     service = service_of(request)
@@ -79,7 +78,7 @@ async def job_request(request: Request, id: JobId) -> Response:
     return json_response({"name": job.name, "surface": surface} | asked)
 
 
-@router.post("/v1/surfaces/preview", openapi_extra=openapi.PREVIEW)
+@router.post("/v1/surfaces/preview")
 async def preview(
     request: Request,
     name: Annotated[str | None, Query(max_length=200, description="name of a raw file")] = None,

@@ -29,9 +29,10 @@ if TYPE_CHECKING:
 
 #: Space left between outlines, and along the rim of a sheet, in parts of the largest panel's width.
 SPACE = 0.04
-#: Sheets in metres where no size was asked for.
-SHEET = (3.0, 1.5)
-#: Panels across and up a sheet where they are larger than that.
+#: Sheets in metres where no size was asked for: the smallest that holds the largest panel. Usual stock of
+#: metal and board; the last is a whole pane of float glass.
+SHEETS = ((3.0, 1.5), (4.0, 2.0), (6.0, 3.21))
+#: Panels across and up a sheet where they are larger than all of these.
 ACROSS = (6, 4)
 #: Heights of the texts and the distance of the neighbours' names from their edges, in parts of the inradius
 #: (of a triangle these leave room for one another, too).
@@ -116,10 +117,11 @@ def sheet_size(extent: Floats, meta: Meta) -> tuple[float, float]:
     """Width and height of the sheets, model units."""
     if meta.sheet is not None:
         return meta.sheet
-    width, height = (side / unit_of(meta.unit).metres for side in SHEET)
     space = SPACE * float(extent.max())
-    if np.all(extent + 2 * space <= [width, height]):
-        return width, height
+    for stock in SHEETS:
+        width, height = (side / unit_of(meta.unit).metres for side in stock)
+        if np.all(extent + 2 * space <= [width, height]):
+            return width, height
     width, height = (
         n * (m + space) + space for n, m in zip(ACROSS, extent.max(axis=0).tolist(), strict=True)
     )

@@ -21,9 +21,9 @@ class Meta:
     """name: of the job, any text. timings: seconds per stage.
 
     unit: of all lengths (``m``, ``cm``, ``mm``, ``ft``, ``in``); None: the surface's own, if it has one.
-    sheet: width and height of the sheets of ``flat.dxf`` in model units; None: 3 × 1.5 m, or, where panels
-    are larger than that, a size that holds about six by four of the largest. group: what shares a sheet
-    there.
+    sheet: width and height of the sheets of ``flat.dxf`` in model units; None: the first of
+    3 × 1.5 m, 4 × 2 m, 6 × 3.21 m that holds the largest panel, or, where none does, a size that holds about
+    six by four of it. group: what shares a sheet there.
     storey: height of the storeys of ``panels.ifc`` in model units, None: no storeys.
     """
 

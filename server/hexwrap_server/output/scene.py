@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from hexwrap_server.output.colours import encoded, from_hex, linear
 from hexwrap_server.output.raster import Camera, Polygons, draw, planes
@@ -54,8 +55,8 @@ class Scene:
     view: Floats
 
 
-def render(scene: Scene) -> Floats:
-    """(height, width, 3) sRGB in 0..1 on white."""
+def render(scene: Scene) -> NDArray[np.uint8]:
+    """(height, width, 3) sRGB on white."""
     points: Floats = np.vstack([scene.panels.outline.values, scene.shell.outline.values]).astype(float)
     radius = float(np.linalg.norm(points, axis=1).max())
     camera = _camera(points, radius, scene.view)
@@ -72,21 +73,32 @@ def render(scene: Scene) -> Floats:
     lit = _lit(camera, drawn, np.where(sunny[middle], middle, -1), sun, scene, points, radius)
     sky_seen = _openness(nearest[FINE // 2 :: FINE, FINE // 2 :: FINE], radius)
     outline = _outline(owner, n_panels)
+    ground = direct[-1, 0] * lit + sky[-1, 0]  # grey: one channel
+    image = np.repeat(_shade(ground)[..., None], 3, axis=2)
+    samples = [(slice(i, None, FINE), slice(j, None, FINE)) for i in range(FINE) for j in range(FINE)]
+    shown = np.flatnonzero(np.maximum.reduce([owner[of] for of in samples]) >= 0)
     # Half the memory of the usual numbers, and twice the speed: these are millions of samples.
     tables = direct.astype(np.float32), sky.astype(np.float32)
-    lights = lit.astype(np.float32)[..., None], sky_seen.astype(np.float32)[..., None]
-    image = tables[0][-1] * lights[0] + tables[1][-1]  # the ground alone
-    samples = [(slice(i, None, FINE), slice(j, None, FINE)) for i in range(FINE) for j in range(FINE)]
-    shown = np.any([owner[of] >= 0 for of in samples], axis=0)
-    sun_there, sky_there = (light[shown] for light in lights)
-    model = np.zeros((int(shown.sum()), 3), dtype=np.float32)
+    sun_there, sky_there = (light.ravel()[shown, None].astype(np.float32) for light in (lit, sky_seen))
+    model = np.zeros((len(shown), 3), dtype=np.float32)
     for of in samples:
-        row = owner[of][shown]
-        light = tables[0][row] * sun_there + tables[1][row] * sky_there
-        model += light * outline[of][shown, None]
-    image[shown] = model / FINE**2
-    steps = (image * SHADES).clip(0, SHADES).astype(np.int32)
-    return np.asarray(encoded(np.arange(SHADES + 1) / SHADES)[steps])
+        row = owner[of].ravel()[shown]
+        row[row < 0] = len(direct) - 1  # the ground
+        light = tables[0].take(row, axis=0)
+        light *= sun_there
+        from_sky = tables[1].take(row, axis=0)
+        from_sky *= sky_there
+        light += from_sky
+        light *= outline[of].ravel()[shown, None]
+        model += light
+    image.reshape(-1, 3)[shown] = _shade(model / FINE**2)
+    return image
+
+
+def _shade(light: NDArray[Any]) -> NDArray[np.uint8]:
+    """Linear light as 8-bit sRGB."""
+    table = np.rint(255 * encoded(np.arange(SHADES + 1) / SHADES)).astype(np.uint8)
+    return table.take((light * SHADES).astype(np.int32), mode="clip")
 
 
 def _visible(camera: Camera, panels: Polygons, shell: Polygons) -> tuple[NDArray[np.int32], Floats]:
@@ -96,12 +108,14 @@ def _visible(camera: Camera, panels: Polygons, shell: Polygons) -> tuple[NDArray
     arms = np.asarray(panels.outline.values) - panels.anchor[panels.outline.row]
     reach = np.zeros(panels.outline.n_rows)
     np.maximum.at(reach, panels.outline.row, DIP * np.linalg.norm(arms, axis=1))
-    both = np.flatnonzero((owner.ravel() >= 0) & (behind.ravel() >= 0))
-    sunk = 1 / nearest.ravel()[both] - 1 / depth.ravel()[both]
-    shown = (behind >= 0) & (owner < 0)
-    shown.ravel()[both[sunk > reach[owner.ravel()[both]]]] = True
-    owner[shown] = behind[shown] + panels.outline.n_rows
-    nearest[shown] = depth[shown]
+    there = np.flatnonzero(behind.ravel() >= 0)
+    before, far = owner.ravel()[there], depth.ravel()[there]
+    with np.errstate(divide="ignore"):  # nothing before the shell is infinitely far
+        sunk = 1 / nearest.ravel()[there] - 1 / far
+    # Where no panel stands the last row is read: nothing reaches that far.
+    seen = there[sunk > reach[before]]
+    owner.ravel()[seen] = behind.ravel()[seen] + panels.outline.n_rows
+    nearest.ravel()[seen] = depth.ravel()[seen]
     return owner, nearest
 
 
@@ -138,17 +152,14 @@ class Sun:
         seen = self.camera.see(points)
         at, limit = self.camera.project(seen), 1.0 / (seen[:, 2] - bias)
         share = np.zeros(len(points))
+        # A border without anything near stands for what lies beside the map.
+        bordered, side = np.pad(self.nearest, 1).ravel(), self.camera.width + 2
+        most = (self.camera.width + 1, self.camera.height + 1)
         for k in range(taps):  # Vogel's spiral: even over the disk
             turn, reach = k * np.pi * (3 - np.sqrt(5)), blur * np.sqrt((k + 0.5) / taps)
-            x = np.floor(at[:, 0] + reach * np.cos(turn)).astype(np.int64)
-            y = np.floor(at[:, 1] + reach * np.sin(turn)).astype(np.int64)
-            inside = (x >= 0) & (x < self.camera.width) & (y >= 0) & (y < self.camera.height)
-            near = np.where(
-                inside,
-                self.nearest[y.clip(0, self.camera.height - 1), x.clip(0, self.camera.width - 1)],
-                0.0,
-            )
-            share += near < limit
+            x = np.clip(at[:, 0] + (reach * np.cos(turn) + 1), 0, most[0]).astype(np.int32)
+            y = np.clip(at[:, 1] + (reach * np.sin(turn) + 1), 0, most[1]).astype(np.int32)
+            share += bordered.take(y * side + x) < limit
         return share / taps
 
 
@@ -236,7 +247,9 @@ def _openness(nearest: Floats, radius: float) -> Floats:
     light = np.ones(nearest.shape)
     for blur, reach, coarse in HOLLOWS:
         weight, total = (
-            ndimage.gaussian_filter(image[::coarse, ::coarse].astype(np.float64), blur / coarse, truncate=2.5)
+            scipy.ndimage.gaussian_filter(
+                image[::coarse, ::coarse].astype(np.float64), blur / coarse, truncate=2.5
+            )
             for image in (there, depth)
         )
         around = _enlarged(total / np.maximum(weight, 1e-9), nearest.shape)

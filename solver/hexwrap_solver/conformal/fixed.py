@@ -15,9 +15,17 @@ from hexwrap_solver.linalg.factor import Factorisation
 #: Accepted residual, radians: boundary angles are promised to 1e-9.
 ACCEPTED = 3e-10
 #: Degenerate triangles make Newton leap: no single step may change the logarithm of a length by more than
-#: ``leap``.
+#: ``leap``. A chord step that is tried in vain costs a fourth of a step.
 RULES = Rules(
-    steps=60, leap=8.0, accepted=ACCEPTED, stalls=1, large=ACCEPTED, share=0.1, settled=0.05, usual=10
+    steps=60,
+    leap=8.0,
+    accepted=ACCEPTED,
+    stalls=1,
+    large=ACCEPTED,
+    share=0.1,
+    settled=0.05,
+    usual=10,
+    promising=0.25,
 )
 #: Multiples of its largest diagonal entry that make a singular Hessian definite.
 SHIFTS = (0.0, 1e-12, 1e-9, 1e-6)
@@ -31,13 +39,15 @@ VIOLATING_AT_FIRST, VIOLATING = 16, 8
 class Minimum:
     """u: (n,) log scale factors. residual: max |angle sum − target| over the unknowns. violating: number of
     triangles that violate the triangle inequality (then the original triangulation has no solution here).
-    iterations: steps taken, of which ``factorisations`` had a Hessian of their own."""
+    iterations: steps taken, of which ``factorisations`` had a Hessian of their own. factorisation: of the
+    last of these."""
 
     u: Floats
     corners: Corners
     residual: float
     iterations: int
     factorisations: int
+    factorisation: Factorisation
 
     @property
     def converged(self) -> bool:
@@ -52,7 +62,8 @@ def minimise(energy: Energy, start: Floats | None = None, progress: Progress = n
     """Minimises the energy from ``start`` (u = 0 by default), see ``newton``; not converged where some
     triangles will plainly not come to satisfy the triangle inequality."""
     x = np.zeros(energy.n_dof) if start is None else energy.unknowns_of(start)
-    found = descend(_Fixed(energy), x, RULES, progress, energy.target)
+    fixed = _Fixed(energy)
+    found = descend(fixed, x, RULES, progress, energy.target)
     point = found.point
     return Minimum(
         energy.scale_of(point.x),
@@ -60,6 +71,7 @@ def minimise(energy: Energy, start: Floats | None = None, progress: Progress = n
         largest(point.gradient),
         found.iterations,
         found.factorisations,
+        fixed.factorisation,
     )
 
 

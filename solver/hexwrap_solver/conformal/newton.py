@@ -30,9 +30,9 @@ LAST_ROUNDINGS = 1e-12
 OVERSHOOT = 0.1
 #: Cuts of one step; more were never seen to help.
 MAX_TRIALS = 40
-#: After a full step, the factorised Hessian is used again where at most this many such chord steps (each
-#: leaving as much of the residual as the last step did) would reach rounding: a step costs a fourth of one
-#: with a factorisation, after which two or three chord steps would follow all the same.
+#: The factorised Hessian is used again (a chord step) where at most this many such steps, each leaving as
+#: much of the residual as the last one did, would reach rounding: a step costs a fourth of one with a
+#: factorisation, after which two or three chord steps would follow all the same.
 CHORDS = 6
 #: What a chord step may leave of the residual to be kept.
 CHORD_GAIN = 0.2
@@ -89,7 +89,9 @@ class Rules:
     from which on stagnation counts as rounding; at the ``stalls``-th time the search ends. large, share:
     residuals above this, radians, and this share of the largest are brought down locally; at_first: before
     the first step, too. settled: a step that leaves at most this share of the residual is near the minimum.
-    usual: steps expected, for the progress. words: what the steps are called."""
+    usual: steps expected, for the progress. words: what the steps are called. promising: where a full
+    step with its own Hessian left at most this share of the residual, a chord step is tried even if many of
+    that gain would be needed: they mostly leave a tenth of that or less."""
 
     steps: int
     leap: float
@@ -101,6 +103,7 @@ class Rules:
     usual: int
     at_first: bool = False
     words: str = ""
+    promising: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -129,6 +132,7 @@ def descend(
         words = f"Newton step {iterations + 1}{rules.words}, residual {residual:.1e} rad"
         progress(min(0.9, iterations / rules.usual), words)
         step = _chord(energy, point) if chord else None
+        fresh = step is None
         if step is None:
             factorisations += 1
             step = _newton(energy, energy.again(point) if chord else point, rules.leap)
@@ -151,7 +155,8 @@ def descend(
             break
         if energy.is_hopeless(point, iterations, settled):
             break
-        chord = step.full and _chords_left(largest(point.gradient), gain, tolerance) <= CHORDS
+        few = _chords_left(largest(point.gradient), gain, tolerance) <= CHORDS
+        chord = step.full and (few or (fresh and gain <= rules.promising))
     return Descended(point, iterations, factorisations)
 
 

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.optimize import isotonic_regression
+import scipy
 
 from hexwrap_solver.arrays import Bools, Floats, Ints
 
@@ -104,7 +104,8 @@ def _upper_envelope(slope: Floats, intercept: Floats, at: Floats) -> Ints:
     run = np.diff(slope)
     quotient = np.diff(intercept) / run
     # Blocks of the decreasing fit are the edges of the concave majorant; their ends are its corners.
-    corner = np.asarray(isotonic_regression(quotient, weights=run, increasing=False).blocks)
+    fit = scipy.optimize.isotonic_regression(quotient, weights=run, increasing=False)
+    corner = np.asarray(fit.blocks)
     edge_slope = np.diff(intercept[corner]) / np.diff(slope[corner])
     # Line corner[t+1] overtakes corner[t] where the abscissa passes −edge_slope[t], ascending in t.
     return corner[np.searchsorted(-edge_slope, at, side="right")]

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize_scalar
+import scipy
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
@@ -117,7 +117,7 @@ class _Probe:
         angles = np.arange(PLANES) * np.pi / PLANES
         best = angles[int(np.argmin([cost(angle) for angle in angles]))]
         step = np.pi / PLANES
-        near = minimize_scalar(cost, bounds=(best - step, best + step), method="bounded")
+        near = scipy.optimize.minimize_scalar(cost, bounds=(best - step, best + step), method="bounded")
         yield normal(float(near.x) if near.fun < cost(best) else best)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import minimize_scalar
+import scipy
 
 from hexwrap_solver.arrays import Floats
 from hexwrap_solver.surface.checks import LARGEST, SMALLEST, check_extent, check_finite
@@ -189,7 +189,7 @@ def _extent(nurbs: NurbsSurface, direction: int, at: float) -> float:
 
 def _narrowest(nurbs: NurbsSurface, direction: int, low: float, high: float) -> float:
     """Where the parameter line between two of them is shortest."""
-    found = minimize_scalar(
+    found = scipy.optimize.minimize_scalar(
         lambda x: _extent(nurbs, direction, x),
         bounds=(low, high),
         method="bounded",

@@ -104,6 +104,14 @@ def tower(holes: int, kind: str = "hex", wide: int = 4) -> ConformalMap:
 
 
 @cache
+def straightened(holes: int, loops: tuple[int, ...], kind: str) -> ConformalMap:
+    """A tower with openings; some loops, openings too, are closed straight lines, the others isometric."""
+    straight = tuple(LoopCondition("straight", loop=loop) for loop in loops)
+    condition = BoundaryCondition("isometric", quantum=kind, loops=straight)
+    return conformal_map(tower(holes, wide=8).surface, condition)
+
+
+@cache
 def doors(count: int) -> ConformalMap:
     """A tower whose foot is straight, with rectangular doors: four corners of 270° each."""
     found = tower(count).surface

@@ -22,6 +22,9 @@ from hexwrap_solver.geometry import face_normals, normalize
 from hexwrap_solver.pattern import lay_pattern
 from hexwrap_solver.pattern.lattice import LATTICES
 from hexwrap_solver.pattern.place.choose import place_lattice
+from hexwrap_solver.pattern.place.placement import edge_angle
+from hexwrap_solver.pattern.place.polygons import Polygons
+from hexwrap_solver.pattern.place.rows import rows_along
 from hexwrap_solver.pattern.types import Pattern, PatternSettings
 from hexwrap_solver.surface import surface_from_mesh
 from hexwrap_solver.surface.topology import next_half_edge
@@ -119,21 +122,41 @@ def test_a_rectangular_roof_is_filled_by_quads_up_to_its_four_sides():
     assert whole.distortion < 0.05
 
 
+def check_rows(cmap, lattice, settings, loops):
+    """Every edge of the loops runs along a row of nodes. Returns the placement."""
+    placed = place_lattice(cmap, lattice, settings)
+    z = placed.glued.corners(cmap.surface.faces, placed.place).ravel()
+    on_loop = np.isin(cmap.surface.faces.ravel(), np.concatenate([cmap.surface.loops[i] for i in loops]))
+    rim = np.flatnonzero((cmap.surface.twin < 0) & on_loop)
+    along = z[next_half_edge(rim)] - z[rim]
+    steps = np.angle(along / lattice.forward) / lattice.quantum
+    assert np.abs(steps - np.rint(steps)).max() < 1e-9
+    lines = rows_along(lattice, edge_angle(lattice, settings), settings.boundary)
+    row = ((np.conj(1j * along / abs(along)) * z[rim]).real - lines.first) / lines.period
+    assert np.abs(row - np.rint(row)).max() < 1e-9
+    return placed
+
+
+@pytest.mark.parametrize("kind", ["hex", "quad"])
+@pytest.mark.parametrize(("holes", "loops"), [(1, (2,)), (1, (0, 2)), (2, (2, 3))])
+def test_straight_openings_are_lattice_lines(holes, loops, kind):
+    """Also where several pieces of the cut reach them, so that no single motion is their holonomy."""
+    cmap, settings = nets.straightened(holes, loops, kind), PatternSettings(kind=kind, around=60)
+    words = Polygons.of(cmap, LATTICES[kind], list(loops)).closed
+    assert max(len(word) for _, word in words) > 1
+    placed = check_rows(cmap, LATTICES[kind], settings, loops)
+    assert placed.distortion < 0.1
+    check_theorems(cmap, lay_pattern(cmap, settings))
+
+
 @pytest.mark.parametrize("doors", [1, 2])
 def test_frames_of_doors_are_lattice_lines(doors):
     """Every boundary edge runs along a row of nodes, around each door the motions are a translation of the
     lattice, and quads fill the wall up to its ends and frames."""
     cmap, lattice = nets.doors(doors), LATTICES["quad"]
     settings = PatternSettings(kind="quad", around=40)
-    placed = place_lattice(cmap, lattice, settings)
+    placed = check_rows(cmap, lattice, settings, range(2 + doors))
     assert placed.distortion < 0.2
-    z = placed.glued.corners(cmap.surface.faces, placed.place).ravel()
-    rim = np.flatnonzero(cmap.surface.twin < 0)
-    along = z[next_half_edge(rim)] - z[rim]
-    steps = np.angle(along / lattice.forward) / lattice.quantum
-    assert np.abs(steps - np.rint(steps)).max() < 1e-9
-    row = (np.conj(1j * along / abs(along)) * z[rim]).real / lattice.edge
-    assert np.abs(row - np.rint(row)).max() < 1e-9
     assert (placed.isometries[:, 0] == 0).all()
     pattern = lay_pattern(cmap, settings)
     check_theorems(cmap, pattern)

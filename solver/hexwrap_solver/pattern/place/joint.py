@@ -8,6 +8,7 @@ fulfil the equations between the motions, which are linear over the integers, is
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -34,9 +35,15 @@ class Joint:
     families: list[tuple[Ints, Ints, NearestIntegers]]
 
     @classmethod
-    def of(cls, cmap: ConformalMap, lattice: Lattice, motions: Holonomy, along: Ints | None = None) -> Joint:
-        """along: (t, 2) of which translations must be multiples, 0 where they need not. There is no family
-        where not all singularities can stand at centres."""
+    def of(
+        cls,
+        cmap: ConformalMap,
+        lattice: Lattice,
+        motions: Holonomy,
+        along: Sequence[tuple[Ints, Ints]] = (),
+    ) -> Joint:
+        """along: motions whose product must be a translation by a multiple of a lattice vector (2,). There is
+        no family where not all singularities can stand at centres."""
         form = _form(cmap, lattice, motions)
         families = []
         for start, steps in _families(lattice, motions, along):
@@ -114,7 +121,9 @@ def _form(cmap: ConformalMap, lattice: Lattice, motions: Holonomy) -> Floats:
     return np.asarray((form + form.T) / 2)
 
 
-def _families(lattice: Lattice, motions: Holonomy, along: Ints | None) -> list[tuple[Ints, Ints]]:
+def _families(
+    lattice: Lattice, motions: Holonomy, along: Sequence[tuple[Ints, Ints]]
+) -> list[tuple[Ints, Ints]]:
     """The translations that fulfil all equations. Moving the origin by a translation v of the tiling changes
     those of motions that turn by (1 − ζ^r)v and nothing else: one of these is kept to a family each of the
     residues modulo 1 − ζ^r, so that what differs by this only counts once."""
@@ -129,14 +138,10 @@ def _families(lattice: Lattice, motions: Holonomy, along: Ints | None) -> list[t
             continue
         turning = np.eye(2, dtype=np.int64) - lattice.rotations[-int(motions.index[w]) % lattice.order]
         blocks.append((part, -turning, turning @ offset))
-    if along is not None:
-        e = lattice.coordinates(lattice.position(along) / e1)
-        for i, motion in enumerate(lead.tolist()):
-            if along[motion].any() or along[motions.mate[motion]].any():
-                row = e[motion] if along[motion].any() else e[motions.mate[motion]]
-                part = np.zeros((2, 2 * len(lead)), dtype=np.int64)
-                part[:, 2 * i : 2 * i + 2] = np.eye(2)
-                blocks.append((part, -np.rint(row).astype(np.int64)[:, None], np.zeros(2)))
+    for word, vector in along:
+        step = lattice.coordinates(lattice.position(vector[None]) / e1)[0]
+        further = -np.rint(step).astype(np.int64)[:, None]
+        blocks.append((_of_word(lattice, motions, word), further, np.zeros(2)))
     turning = np.eye(2, dtype=np.int64) - lattice.rotations[motions.turn[lead]]
     size = np.abs(np.rint(np.linalg.det(turning))).astype(np.int64)
     residues = [np.zeros(2)]

@@ -208,8 +208,7 @@ def _choices(
     turn = lattice.quantum * np.arange(DIRECTIONS) / DIRECTIONS if free else np.zeros(1)
     A = (factor * (1 + size_spread(settings) * size)[:, None] * np.exp(1j * turn)).ravel()
     off = np.repeat(abs(size), len(turn))
-    along = None if alignment is None else alignment.rows_of(len(motions.turn))
-    joint = Joint.of(cmap, lattice, motions, along)
+    joint = Joint.of(cmap, lattice, motions, [] if alignment is None else alignment.along())
     found = []
     for family, (x, energy) in enumerate(joint.near(A)):
         best = np.argsort(np.sqrt(energy) + COST_OF_SIZE * off, kind="stable")[:SHORTLIST]

@@ -27,7 +27,7 @@ class Polygons:
     loop: (s,) of each side. direction: (s,) unit complex; middle: (s,) mean place of its vertices; length:
     (s,). half_edge: (k,) boundary half-edges of all sides, in order; side: (k,) of each. starts: per loop,
     position of its first half-edge. words: motions met from each half-edge to the next, see ``_rounds``.
-    closed: (l,) the motion of a loop that is one straight line, −1 for others.
+    closed: per loop that is one straight line, its first side and the motions met once around it, in order.
     """
 
     loops: list[int]
@@ -39,18 +39,17 @@ class Polygons:
     side: Ints
     starts: Ints
     words: list[tuple[Ints, Ints]]
-    closed: Ints
+    closed: list[tuple[int, Ints]]
 
     @classmethod
     def of(cls, cmap: ConformalMap, lattice: Lattice, loops: list[int]) -> Polygons:
-        """loops: polygons, see ``sides.is_polygon``; those that are straight lines which several pieces of
-        the cut reach are left out."""
+        """loops: polygons, see ``sides.is_polygon``."""
         surface, net = cmap.surface, cmap.net
         tail = surface.faces.ravel()
         leaving = np.full(len(surface.vertices), -1, dtype=np.int64)
         rim = np.flatnonzero(surface.twin < 0)
         leaving[tail[rim]] = rim
-        kept, parts = [], []
+        parts = []
         for loop in loops:
             corner = corners_of(curvatures(cmap, loop), lattice)
             shift = int(np.argmax(corner))
@@ -59,9 +58,9 @@ class Polygons:
             straight = not corner.any()
             corner[0] = True
             words = _rounds(net.across.ravel(), net.crossing.ravel(), surface.twin, half_edge)
-            met = np.concatenate([crossing for _, crossing in words])
-            if straight and len(met) > 1:
-                continue
+            # In order along the loop, and around each vertex in that of the rounds.
+            order = np.argsort(np.concatenate([which for which, _ in words]), kind="stable")
+            met = np.concatenate([crossing for _, crossing in words])[order]
             turn, shift_ = np.ones(len(half_edge), dtype=complex), np.zeros(len(half_edge), dtype=complex)
             for which, crossing in words:
                 shift_[which] += turn[which] * net.translation[crossing]
@@ -78,17 +77,16 @@ class Polygons:
             middle = np.bincount(side, weight * (start + end).real / 2) + 1j * np.bincount(
                 side, weight * (start + end).imag / 2
             )
-            kept.append(loop)
-            motion = int(met[0]) if straight and len(met) else -1
-            parts.append((half_edge, side, step, middle / np.bincount(side, weight), words, motion))
+            once = met if straight else met[:0]
+            parts.append((half_edge, side, step, middle / np.bincount(side, weight), words, once))
         sizes = [len(part[0]) for part in parts]
         sides = [len(part[2]) for part in parts]
         first, low = np.cumsum([0, *sizes]), np.cumsum([0, *sides])
         none = np.zeros(0, dtype=np.int64)
         step = np.concatenate([none, *(part[2] for part in parts)])
         return cls(
-            kept,
-            np.repeat(np.array(kept, dtype=np.int64), sides),
+            loops,
+            np.repeat(np.array(loops, dtype=np.int64), sides),
             step / np.maximum(abs(step), 1e-300),
             np.concatenate([none, *(part[3] for part in parts)]),
             abs(step),
@@ -96,7 +94,7 @@ class Polygons:
             np.concatenate([none, *(part[1] + n for part, n in zip(parts, low, strict=False))]),
             first[:-1],
             [(which + n, c) for part, n in zip(parts, first, strict=False) for which, c in part[4]],
-            np.array([part[5] for part in parts], dtype=np.int64),
+            [(int(n), part[5]) for part, n in zip(parts, low, strict=False) if len(part[5])],
         )
 
     @property
@@ -138,14 +136,13 @@ class Alignment:
             rows.period,
         )
 
-    def rows_of(self, motions: int) -> Ints:
-        """(t, 2) lattice vectors of whose multiples motions must be translations, 0 where they are free."""
-        rows = np.zeros((motions, 2), dtype=np.int64)
-        for loop, motion in zip(self.polygons.loops, self.polygons.closed.tolist(), strict=True):
-            if motion >= 0:
-                side = int(np.flatnonzero(self.polygons.loop == loop)[0])
-                rows[motion] = self.lattice.shortest_towards(complex(-1j * self.normal[side]))
-        return rows
+    def along(self) -> list[tuple[Ints, Ints]]:
+        """Motions whose product must be a translation by a multiple of a lattice vector (2,): what is met
+        once around each closed line."""
+        return [
+            (word, self.lattice.shortest_towards(complex(-1j * self.normal[side])))
+            for side, word in self.polygons.closed
+        ]
 
     def misfit(self, A: Complexes, B: Complexes) -> Floats:
         """(k,) mean distance of the sides from their nearest lines, for places of the lattice (k,)."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 import shapely
-from scipy.ndimage import binary_dilation
 
 from hexwrap_solver.arrays import Bools, Floats
 from hexwrap_solver.surface.brep.pull import Patch
@@ -87,7 +87,7 @@ def field_of(patch: Patch, outline: shapely.Polygon) -> Field:
     shape = len(v), len(u)
     inside = shapely.contains_xy(outline, grid).reshape(shape)
     near = (
-        binary_dilation(inside, iterations=2, structure=np.ones((3, 3), dtype=bool))
+        scipy.ndimage.binary_dilation(inside, iterations=2, structure=np.ones((3, 3), dtype=bool))
         if inside.any()
         else ~inside
     )
