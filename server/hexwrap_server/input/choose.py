@@ -88,12 +88,13 @@ def choose(
     if rivals:
         near = [other for other in fitting if other is best or any(other is one for one in rivals)]
         gaps = [apart[id(other)] for other in rivals if id(other) in apart]
-        raise several(content, [meant[i] for part in near for i in part.members], len(near), unit, gaps)
+        fins = sum(part.is_fin for part in near)
+        raise several(content, [meant[i] for part in near for i in part.members], len(near), unit, gaps, fins)
     part = next((other for other in alike if _is_exact(other, meant)), best)
     used = [meant[i] for i in part.members]
     geometry, told = brep_where_needed(part.make(), content.tolerance)
-    for seam in found.joints if len(used) > 1 or len(meant) == 1 else ():
-        told += joint(seam, content.tolerance or 0.0, len(used))
+    if len(used) > 1 or len(meant) == 1:
+        told += joint(part.joint, content.tolerance or 0.0, len(used))
     told += strays([piece for members, piece in found.strays if members & set(part.members)])
     told += list(apart.values())[:SHOWN]
     told += coarse_numbers(geometry, content.tolerance)
@@ -214,8 +215,17 @@ def several(
     count: int,
     unit: str | None,
     gaps: Sequence[str] = (),
+    fins: int = 0,
 ) -> SeveralObjectsError:
+    """fins: how many of the parts touch larger ones without being joined to them along an edge."""
     distinct = list({id(found): found for found in objects}.values())
+    if len(distinct) < 2 and fins:
+        return SeveralObjectsError(
+            f"The mesh falls into {count} pieces of about the same size, which meet only at vertices and at "
+            "edges that more than two faces share: remove inner walls and double faces (Rhino's "
+            "ExtractNonManifoldMeshEdges finds them, ExtractDuplicateMeshFaces those that are double).",
+            data={"objects": rows(content.objects)},
+        )
     if len(distinct) < 2:
         return SeveralObjectsError(
             f"The mesh is in {count} pieces of about the same size that do not meet: delete those that are "

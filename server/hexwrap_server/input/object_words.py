@@ -68,8 +68,7 @@ def others(content: FileContent, used: Sequence[Found]) -> tuple[str, ...]:
     left = [found for found in content.objects if id(found) not in kept]
     if not left:
         return ()
-    taken = ", ".join(described(found, i, content.unit) for i, found in enumerate(content.objects)
-                      if id(found) in kept)  # fmt: skip
+    taken = listed(used, content.unit, content.objects)
     return (f"Taken: {taken}. Left out: {listed(left, content.unit, content.objects)}.",)
 
 

@@ -22,6 +22,8 @@ from hexwrap_solver.surface.checks import check_arrays
 from hexwrap_solver.surface.nurbs_checks import TOLERANCE, closed_within, end_gap
 from hexwrap_solver.surface.pieces import Joint, Piece, joined, only, pieces, together
 
+#: Of more pieces of a mesh than these, only the largest are no strays.
+MOST = 300
 #: The tolerance of a file counts up to this part of the size of what is joined.
 COARSEST = 1e-3
 
@@ -39,18 +41,19 @@ class Part:
     rim: Floats
     box: Floats
     make: Callable[[], Geometry]
+    joint: Joint
+    is_fin: bool = False
 
 
 @dataclass(frozen=True)
 class Parts:
-    """strays: small pieces that were left out, with the places of their objects. joints: what was joined.
+    """strays: small pieces that were left out, with the places of their objects.
 
     spoilt: objects that cannot be read, with the reason. copies: objects that another one covers exactly.
     """
 
     parts: list[Part] = field(default_factory=list)
     strays: list[tuple[set[int], Piece]] = field(default_factory=list)
-    joints: list[Joint] = field(default_factory=list)
     spoilt: list[tuple[int, str]] = field(default_factory=list)
     copies: list[int] = field(default_factory=list)
 
@@ -121,17 +124,17 @@ def _is_copy(prints: list[Floats], tolerance: float | None) -> bool:
 
 
 def _add_meshes(mesh: SentMesh, owner: Ints, tolerance: float | None, found: Parts) -> None:
+    joint = Joint()
     if tolerance is not None:
         mesh, source, joint = joined(mesh, min(tolerance, COARSEST * _size(mesh.vertices[mesh.faces.values])))
         owner = owner[source]
-        found.joints.append(joint)
     split = [(piece, np.unique(owner[piece.faces]).tolist()) for piece in pieces(mesh)]
     largest: dict[int, float] = {}
     for piece, members in split:  # the largest come first
         for i in members:
             largest.setdefault(i, piece.area)
-    for piece, members in split:
-        if all(piece.area < STRAY * largest[i] for i in members):
+    for k, (piece, members) in enumerate(split):
+        if k >= MOST or all(piece.area < STRAY * largest[i] for i in members):
             found.strays.append((set(members), piece))
         else:
             found.parts.append(
@@ -142,6 +145,8 @@ def _add_meshes(mesh: SentMesh, owner: Ints, tolerance: float | None, found: Par
                     piece.rim,
                     np.array([piece.low, piece.high]),
                     partial(only, mesh, piece.faces),
+                    joint,
+                    piece.is_fin,
                 )
             )
 
@@ -156,10 +161,11 @@ def _add_breps(objects: list[tuple[int, NurbsSurface | Brep]], tolerance: float 
     ]
     whole = one_brep(breps)
     owner = np.repeat([i for i, _ in objects], [len(brep.faces) for brep in breps])
+    joint = Joint()
     if len(objects) > 1:
         whole, joints = joined_brep(whole)
         x, y, z = joints.place.tolist()
-        found.joints.append(Joint(joints.count, joints.gap, (x, y, z)))
+        joint = Joint(joints.count, joints.gap, (x, y, z))
     for faces in _connected(whole):
         members = tuple(np.unique(owner[faces]).tolist())
         own = [geometry for i, geometry in objects if i in members]
@@ -167,7 +173,7 @@ def _add_breps(objects: list[tuple[int, NurbsSurface | Brep]], tolerance: float 
         make = partial(_same, own[0]) if len(own) == 1 else partial(_some, whole, faces)
         nets = np.concatenate([whole.faces[f].surface.control_points[..., :3].reshape(-1, 3) for f in faces])
         box = np.array([nets.min(axis=0), nets.max(axis=0)])
-        found.parts.append(Part(members, loops, _net_area(whole, faces), rim, box, make))
+        found.parts.append(Part(members, loops, _net_area(whole, faces), rim, box, make, joint))
 
 
 def _same(geometry: Geometry) -> Geometry:

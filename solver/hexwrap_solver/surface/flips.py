@@ -87,8 +87,10 @@ def flip_to_delaunay(
     waiting = np.zeros(0, dtype=np.int64)
     for _ in range(ROUNDS):
         h = np.concatenate([waiting, 3 * changed, 3 * changed + 1, 3 * changed + 2])
-        h = np.unique(np.minimum(h, twin[h]))
-        h = h[h >= 0]
+        h = np.minimum(h, twin[h])
+        looked_at = np.zeros(len(twin), dtype=bool)
+        looked_at[h[h >= 0]] = True
+        h = np.flatnonzero(looked_at)
         if kept is not None:
             start, end = faces.ravel()[h], faces.ravel()[next_half_edge(h)]
             h = h[~np.isin(np.minimum(start, end) * n + np.maximum(start, end), kept)]

@@ -32,10 +32,15 @@ TRIALS = 24
 
 @dataclass(frozen=True)
 class SentNames:
-    """Sent indices of the working mesh's elements: vertex (n,), face (m,)."""
+    """Sent indices of the working mesh's elements: vertex (n,), face (m,); and its points (n, 3)."""
 
     vertex: Ints
     face: Ints
+    points: Floats
+
+    def at(self, vertices: Ints) -> str:
+        """The middle of vertices of the working mesh."""
+        return "at (" + ", ".join(f"{x:.6g}" for x in self.points[vertices].mean(axis=0)) + ")"
 
     def edges(self, faces: Ints, h: Ints) -> list[list[int]]:
         """Half-edges as pairs of sent vertices."""
@@ -52,10 +57,12 @@ def check_edges(faces: Ints, order: Ints, first: Ints, names: SentNames) -> None
     h = order[first[crowded]]
     edges = names.edges(faces, h[:LISTED])
     touching = np.concatenate([order[first[k] : first[k + 1]] for k in crowded[:LISTED]])
+    ends = np.array([side[h[0]] for side in half_edges(faces)])
     raise NonManifoldEdgeError(
         f"{_count(len(h), 'edge')} of the surface {'has' if len(h) == 1 else 'have'} more than two faces, "
-        f"the first, between vertices {edges[0][0]} and {edges[0][1]}, has {np.diff(first)[crowded[0]]}: "
-        "remove inner walls, double faces and fins, so that every edge has one or two faces.",
+        f"the first, {names.at(ends)} between vertices {edges[0][0]} and {edges[0][1]}, has "
+        f"{np.diff(first)[crowded[0]]}: remove inner walls, double faces and fins (Rhino's ShowEdges finds "
+        "non-manifold edges), so that every edge has one or two faces.",
         edges=edges,
         faces=np.unique(names.face[touching // 3])[:LISTED],
     )
@@ -129,11 +136,12 @@ def _umbrellas(faces: Ints, twin: Ints) -> tuple[int, Ints]:
 def _pinched(faces: Ints, twin: Ints, n: int, names: SentNames) -> NonManifoldVertexError:
     _, fan = _umbrellas(faces, twin)
     fans = np.unique(np.stack([faces.ravel(), fan], axis=1), axis=0)[:, 0]
-    vertices = names.vertex[np.flatnonzero(np.bincount(fans, minlength=n) > 1)]
+    pinched = np.flatnonzero(np.bincount(fans, minlength=n) > 1)
+    vertices = names.vertex[pinched]
     return NonManifoldVertexError(
         f"The surface is non-manifold at {_count(len(vertices), 'vertex', 'vertices')}, the "
-        f"first is vertex {vertices[0]}: faces must surround every vertex in one fan, so pull the parts "
-        "apart there or join them along an edge.",
+        f"first is vertex {vertices[0]} {names.at(pinched[:1])}: faces must surround every vertex in one "
+        "fan, so pull the parts apart there or join them along an edge.",
         vertices=vertices[:LISTED],
     )
 
@@ -150,7 +158,8 @@ def _handles(
     return HandlesError(
         f"The surface has {_count(genus, 'handle')} ({_count(loops, 'boundary loop')}, Euler characteristic "
         f"{euler}): only surfaces without handles have a map. Cut it open along the loop of {len(loop)} "
-        f"edges, {length:.4g} long, through the vertices {shown}, or fill the hole that it goes around.",
+        f"edges, {length:.4g} long, {names.at(loop)}, through the vertices {shown} (Rhino's Split), or fill "
+        "the hole that it goes around.",
         vertices=sent[:LISTED],
         edges=edges[:LISTED],
         data={"loops": loops, "euler_characteristic": euler, "genus": genus, "loop_length": length},

@@ -104,7 +104,7 @@ def _build(sent: SentMesh, mesh: Triangles, polygon: Ints, label: Ints, settings
         first_of_equals(draft.faces, *draft.mesh.edge_groups),
         "with the same corners as another one {was} left out",
     )
-    names = SentNames(np.arange(n), draft.polygon)
+    names = SentNames(np.arange(n), draft.polygon, vertices)
     check_edges(draft.faces, *draft.mesh.edge_groups, names)
     _orient(draft, names)
     _flatten(draft)
@@ -115,7 +115,9 @@ def _build(sent: SentMesh, mesh: Triangles, polygon: Ints, label: Ints, settings
     new = np.full(n, -1, dtype=np.int64)
     new[index] = np.arange(len(index))
     faces = new[draft.faces]
-    loops = loops_of(vertices[index], faces, draft.mesh.twin, SentNames(index, draft.polygon))
+    loops = loops_of(
+        vertices[index], faces, draft.mesh.twin, SentNames(index, draft.polygon, vertices[index])
+    )
     stand = np.where(used, new[label], -1)
     normals = vertex_normals(vertices[index], faces)
     if sent.normals is not None:

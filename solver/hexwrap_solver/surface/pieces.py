@@ -75,29 +75,20 @@ def pieces(mesh: SentMesh) -> list[Piece]:
     largest = np.full(n, count)
     np.minimum.at(largest, welded.faces, rank[piece][:, None])
     attached = np.bincount(piece, (largest[welded.faces] < rank[piece][:, None]).any(axis=1), count) > 0
-    found = []
     by_piece = np.argsort(piece[first], kind="stable")
     ends = np.searchsorted(piece[first][by_piece], np.arange(count + 1))
-    owner = piece[rim // 3]
-    order = np.argsort(owner, kind="stable")
-    rim_ends = np.searchsorted(owner[order], np.arange(count + 1))
-    for k in range(count):
-        own = order[rim_ends[k] : rim_ends[k + 1]]
-        faces = by_piece[ends[k] : ends[k + 1]]
-        if len(faces) == 0:
-            continue
-        points = mesh.vertices[triangles[first[faces]].ravel()]
-        found.append(
-            Piece(
-                faces,
-                len(np.unique(loop[start[own]])),
-                float(area[k]),
-                points.min(axis=0),
-                points.max(axis=0),
-                mesh.vertices[np.unique(start[own])],
-                bool(attached[k]),
-            )
-        )
+    held = np.flatnonzero(np.diff(ends))
+    points = mesh.vertices[triangles[first[by_piece]]]
+    low = np.minimum.reduceat(points.min(axis=1), ends[held])
+    high = np.maximum.reduceat(points.max(axis=1), ends[held])
+    owner, at = np.divmod(np.unique(piece[rim // 3].astype(np.int64) * n + start), n)
+    rims = np.split(mesh.vertices[at], np.searchsorted(owner, np.arange(1, count)))
+    loops = np.bincount(np.unique(owner * n + loop[at]) // n, minlength=count)
+    faces = np.split(by_piece, ends[1:-1])
+    found = [
+        Piece(faces[k], int(loops[k]), float(area[k]), low[i], high[i], rims[k], bool(attached[k]))
+        for i, k in enumerate(held.tolist())
+    ]
     return sorted(found, key=lambda piece: -piece.area)
 
 

@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import Annotated, Literal
 
 import numpy as np
+from scipy.interpolate import NdBSpline
 
 from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged
 from hexwrap_solver.errors import SettingError
@@ -150,6 +151,13 @@ class Origin:
     attributes: tuple[tuple[str, str], ...] = ()
 
 
+def premultiplied(control_points: Floats) -> Floats:
+    """Control points (…, 4) as (x·w, y·w, z·w, w)."""
+    return np.concatenate(
+        [control_points[..., :3] * control_points[..., 3:], control_points[..., 3:]], axis=-1
+    )
+
+
 @dataclass(frozen=True)
 class NurbsSurface:
     """Tensor-product rational B-spline surface with *full* knot vectors.
@@ -163,6 +171,11 @@ class NurbsSurface:
     knots: tuple[Floats, Floats]
     control_points: Floats
     closed: tuple[bool, bool]
+
+    @cached_property
+    def spline(self) -> NdBSpline:
+        """Of homogeneous coordinates (x·w, y·w, z·w, w)."""
+        return NdBSpline(self.knots, premultiplied(self.control_points), self.degree)
 
 
 @dataclass(frozen=True)

@@ -6,14 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.interpolate import BSpline
 
 from hexwrap_solver.arrays import Floats
 from hexwrap_solver.surface import NurbsSurface, surface_from_nurbs
 from hexwrap_solver.surface.brep.surface import surface_from_patch
 from hexwrap_solver.surface.errors import PoleError
 from hexwrap_solver.surface.normals import with_tangents
-from hexwrap_solver.surface.nurbs import basis, domain, evaluate, evaluate_points, wrap
+from hexwrap_solver.surface.nurbs import domain, evaluate, evaluate_points, wrap
 from hexwrap_solver.surface.nurbs_checks import check_pinches
 from hexwrap_solver.surface.projection import project, start_parameters
 from tests.solver.surface.nurbs_shapes import (
@@ -24,22 +23,6 @@ from tests.solver.surface.nurbs_shapes import (
     swapped,
     torus_part,
 )
-
-
-@pytest.mark.parametrize("degree", [1, 2, 3, 5])
-def test_basis_functions_are_those_of_scipy(degree: int) -> None:
-    knots = np.sort(np.random.default_rng(degree).uniform(0, 10, 14))
-    n = len(knots) - degree - 1
-    x = np.linspace(knots[degree], knots[n], 60)
-    first, values = basis(knots, degree, x)
-    for order in range(min(degree, 3)):
-        full = np.zeros((len(x), n))
-        np.put_along_axis(full, first[:, None] + np.arange(degree + 1), values[order], axis=1)
-        for i in range(n):
-            spline = BSpline(knots, np.eye(n)[i], degree)
-            np.testing.assert_allclose(full[:, i], spline(x, order) if order else spline(x), atol=1e-9)
-    np.testing.assert_allclose(values[0].sum(axis=1), 1)
-    np.testing.assert_allclose(values[1].sum(axis=1), 0, atol=1e-9)
 
 
 def test_rational_circles_are_exact() -> None:

@@ -7,7 +7,6 @@ import numpy as np
 from hexwrap_solver.arrays import Floats
 from hexwrap_solver.geometry import angles_between
 from hexwrap_solver.surface.brep.types import Edge, NurbsCurve
-from hexwrap_solver.surface.nurbs import basis
 
 #: An edge is sampled in at least PLACES places, and PER_SPAN between two knots.
 PLACES, PER_SPAN = 16, 2
@@ -17,11 +16,8 @@ CORNER = np.deg2rad(0.5)
 
 def evaluate_curve(curve: NurbsCurve, t: Floats) -> tuple[Floats, Floats, Floats]:
     """Points, first and second derivatives, each (k, 3), at parameters (k,) inside the domain."""
-    first, values = basis(curve.knots, curve.degree, np.clip(t, *curve.domain))
-    net = curve.control_points.copy()
-    net[:, :3] *= net[:, 3:]
-    local = net[first[:, None] + np.arange(curve.degree + 1)]
-    a, b, c = np.einsum("okp,kpd->okd", values, local)
+    x = np.clip(t, *curve.domain)
+    a, b, c = (curve.spline(x, nu) for nu in range(3))
     point = a[:, :3] / a[:, 3:]
     tangent = (b[:, :3] - b[:, 3:] * point) / a[:, 3:]
     bend = (c[:, :3] - 2 * b[:, 3:] * tangent - c[:, 3:] * point) / a[:, 3:]

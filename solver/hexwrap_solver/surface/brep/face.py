@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -78,6 +79,11 @@ class Piece:
     loose: Bools
     fixed: Bools
 
+    @cached_property
+    def twin(self) -> Ints:
+        """(3m,) see ``topology.twins``."""
+        return twins(self.faces, len(self.points))
+
     def middle(self, start: Ints, end: Ints) -> Floats:
         """(k, 2) parameters halfway along edges."""
         a, b = self.uv[start], self.uv[end]
@@ -143,19 +149,18 @@ def _without_doubles(patch: Patch, piece: Piece, id: Ints, taken: set[int]) -> P
     Such come where a face is only a few triangles wide around a pole or a seam, whose two sides are the same
     vertices, and where faces have chords between the same corners.
     """
-    own = np.array(sorted(taken), dtype=np.int64)
     for _ in range(ROUNDS):
         n = len(piece.points)
         label = np.concatenate([id, np.full(n - len(id), -1)])
         inside = label < 0
         label[inside] = (1 << 31) + np.flatnonzero(inside)
-        twin = twins(piece.faces, n)
         start, end = half_edges(piece.faces)
-        h = np.flatnonzero(twin > np.arange(len(twin)))
+        h = np.flatnonzero(piece.twin > np.arange(len(piece.twin)))
         key = key_of(label[start[h]], label[end[h]])
         _, place, count = np.unique(key, return_inverse=True, return_counts=True)
         chord = ~inside[start[h]] & ~inside[end[h]]
-        double = (count[place] > 1) | (chord & np.isin(key, own))
+        double = count[place] > 1
+        double[chord] |= np.array([k in taken for k in key[chord].tolist()], dtype=bool)
         if not double.any():
             taken.update(key[chord].tolist())
             break
@@ -337,8 +342,7 @@ def _least_angles(points: Floats, faces: Ints) -> Floats:
 
 def _too_long(patch: Patch, piece: Piece, sizes: Sizes) -> Ints:
     """Inner half-edges to be halved, the worst first."""
-    twin = twins(piece.faces, len(piece.points))
-    h = np.flatnonzero(twin > np.arange(len(twin)))
+    h = np.flatnonzero(piece.twin > np.arange(len(piece.twin)))
     start, end = (side[h] for side in half_edges(piece.faces))
     length = np.linalg.norm(piece.points[start] - piece.points[end], axis=1)
     excess = length / sizes.longest
@@ -357,13 +361,12 @@ def _too_long(patch: Patch, piece: Piece, sizes: Sizes) -> Ints:
 
 def _halved(patch: Patch, piece: Piece, h: Ints) -> Piece:
     """Edges (no two of a face) split at the middle of their parameters."""
-    twin = twins(piece.faces, len(piece.points))
-    h = independent(h, twin, len(piece.faces))
+    h = independent(h, piece.twin, len(piece.faces))
     faces = piece.faces
     start, end = (side[h] for side in half_edges(faces))
     uv = piece.middle(start, end)
     new = len(piece.uv) + np.arange(len(h))
-    t = twin[h]
+    t = piece.twin[h]
     c = faces.ravel()[_third(h)]
     d = faces.ravel()[_third(t)]
     out = faces.copy()

@@ -8,6 +8,7 @@ twice, comes to lie on both ends of the period. At a pole one parameter is free;
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -43,7 +44,7 @@ class Patch:
     grid: Floats
     tree: cKDTree
 
-    @property
+    @cached_property
     def opened(self) -> NurbsSurface:
         """The surface as one that is closed nowhere: both ends of a period are different places."""
         return replace(self.surface, closed=(False, False))

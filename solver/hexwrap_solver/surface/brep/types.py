@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
+from scipy.interpolate import BSpline
 
 from hexwrap_solver.arrays import Floats
-from hexwrap_solver.surface.types import NurbsSurface, SentMesh
+from hexwrap_solver.surface.types import NurbsSurface, SentMesh, premultiplied
 
 
 @dataclass(frozen=True)
@@ -24,6 +26,11 @@ class NurbsCurve:
     @property
     def domain(self) -> tuple[float, float]:
         return float(self.knots[self.degree]), float(self.knots[len(self.knots) - 1 - self.degree])
+
+    @cached_property
+    def spline(self) -> BSpline:
+        """Of homogeneous coordinates (x·w, y·w, z·w, w)."""
+        return BSpline(self.knots, premultiplied(self.control_points), self.degree)
 
 
 @dataclass(frozen=True)

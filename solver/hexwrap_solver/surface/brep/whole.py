@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.interpolate import BSpline
 
 from hexwrap_solver.arrays import Floats
 from hexwrap_solver.surface.brep.curves import evaluate_curve
 from hexwrap_solver.surface.brep.types import Brep, Edge, Face, NurbsCurve, Trim
-from hexwrap_solver.surface.nurbs import basis, domain
+from hexwrap_solver.surface.nurbs import domain
 from hexwrap_solver.surface.nurbs_checks import closed_within, collapsed
-from hexwrap_solver.surface.types import NurbsSurface
+from hexwrap_solver.surface.types import NurbsSurface, premultiplied
 
 
 def brep_of_surface(nurbs: NurbsSurface, tolerance: float) -> Brep:
@@ -50,11 +51,8 @@ def brep_of_surface(nurbs: NurbsSurface, tolerance: float) -> Brep:
 
 def isocurve(nurbs: NurbsSurface, direction: int, at: float) -> NurbsCurve:
     """The curve on which the parameter of direction is constant."""
-    first, values = basis(nurbs.knots[direction], nurbs.degree[direction], np.array([at]))
-    net = np.moveaxis(nurbs.control_points, direction, 0).copy()
-    net[..., :3] *= net[..., 3:]
-    rows = first[0] + np.arange(nurbs.degree[direction] + 1)
-    made = np.einsum("p,pqc->qc", values[0, 0], net[rows])
+    net = premultiplied(np.moveaxis(nurbs.control_points, direction, 0))
+    made = np.asarray(BSpline(nurbs.knots[direction], net, nurbs.degree[direction])(at))
     made[:, :3] /= made[:, 3:]
     return NurbsCurve(nurbs.degree[1 - direction], nurbs.knots[1 - direction], made)
 
