@@ -9,6 +9,7 @@ That keeps each operation contiguous in memory.
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -94,11 +95,22 @@ class Energy:
         self.corner = np.ascontiguousarray(surface.faces.T)
         self.lengths = np.ascontiguousarray(surface.lengths.T[[1, 2, 0]])
         self.dof, self.n_dof = _unknowns(targets)
-        self.target = self.reduce(np.where(targets.shared < 0, targets.angle, 0.0))
-        for shared in range(1, len(targets.shared_angle)):
-            self.target[self.dof[np.argmax(targets.shared == shared)]] = targets.shared_angle[shared]
+        self.target = self._reduced(targets)
         self._pair: Ints | None = None
         self._find_pattern(surface)
+
+    def aimed_at(self, targets: Targets) -> Energy:
+        """The same with other target angles; what is pinned and tied must stay."""
+        other = copy(self)
+        other.targets, other.target = targets, self._reduced(targets)
+        return other
+
+    def _reduced(self, targets: Targets) -> Floats:
+        """(n_dof,) target of each unknown."""
+        target = self.reduce(np.where(targets.shared < 0, targets.angle, 0.0))
+        for shared in range(1, len(targets.shared_angle)):
+            target[self.dof[np.argmax(targets.shared == shared)]] = targets.shared_angle[shared]
+        return target
 
     @property
     def points(self) -> Floats:

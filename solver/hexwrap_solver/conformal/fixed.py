@@ -39,13 +39,15 @@ VIOLATING_AT_FIRST, VIOLATING = 16, 8
 class Minimum:
     """u: (n,) log scale factors. residual: max |angle sum − target| over the unknowns. violating: number of
     triangles that violate the triangle inequality (then the original triangulation has no solution here).
-    iterations: steps taken, of which ``factorisations`` had a Hessian of their own."""
+    iterations: steps taken, of which ``factorisations`` had a Hessian of their own. factorisation: of the
+    last of these."""
 
     u: Floats
     corners: Corners
     residual: float
     iterations: int
     factorisations: int
+    factorisation: Factorisation
 
     @property
     def converged(self) -> bool:
@@ -60,7 +62,8 @@ def minimise(energy: Energy, start: Floats | None = None, progress: Progress = n
     """Minimises the energy from ``start`` (u = 0 by default), see ``newton``; not converged where some
     triangles will plainly not come to satisfy the triangle inequality."""
     x = np.zeros(energy.n_dof) if start is None else energy.unknowns_of(start)
-    found = descend(_Fixed(energy), x, RULES, progress, energy.target)
+    fixed = _Fixed(energy)
+    found = descend(fixed, x, RULES, progress, energy.target)
     point = found.point
     return Minimum(
         energy.scale_of(point.x),
@@ -68,6 +71,7 @@ def minimise(energy: Energy, start: Floats | None = None, progress: Progress = n
         largest(point.gradient),
         found.iterations,
         found.factorisations,
+        fixed.factorisation,
     )
 
 

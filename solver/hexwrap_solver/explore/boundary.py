@@ -65,9 +65,10 @@ def _chosen(
     share = {"straight": foreseen(straight), "isometric": foreseen(isometric)}
     keep = share["straight"] <= share["isometric"] + MARGIN
     chosen, other = ("straight", "isometric") if keep else ("isometric", "straight")
+    left = {mode: f"at least {part:.1%}" if part >= 0.0005 else "nothing" for mode, part in share.items()}
     note = (
-        f"Boundary: {chosen}. Because cells differ in size, {SIZES} sizes leave at least {share[chosen]:.1%} "
-        f"of the surface uncovered; {share[other]:.1%} were it {other}."
+        f"Boundary: {chosen}. At {SIZES} sizes, cells that differ in size leave {left[chosen]} of the "
+        f"surface uncovered; were it {other}, {left[other]}."
     )
     return _with_note(straight if keep else isometric, note)
 

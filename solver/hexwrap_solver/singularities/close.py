@@ -8,7 +8,8 @@ loops (a dipole each), so that the map stays conformal.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property, partial
 
@@ -17,8 +18,8 @@ import numpy as np
 from hexwrap_solver.arrays import Complexes, Floats, Ints, Progress, no_progress
 from hexwrap_solver.conformal.energy import Corners, corner_angles, opposite_lengths, total
 from hexwrap_solver.conformal.layout import FaceTree, develop
+from hexwrap_solver.conformal.types import Targets
 from hexwrap_solver.errors import ConvergenceError
-from hexwrap_solver.linalg.factor import Factorisation
 from hexwrap_solver.linalg.integers import nearest_integers
 from hexwrap_solver.singularities.cut import Branches, branches
 from hexwrap_solver.singularities.drag import Grip, dragged, grips
@@ -101,26 +102,47 @@ class Chart:
         """The first cone is the root of the cut. angles: see ``targets``. slope: (m, 3) squared sine of
         every half-edge's angle to the horizontal, in which direction a stretch is allowed; None: none is.
         The surface gets more vertices where its triangles cannot follow the map. Raises ConvergenceError."""
-        wanted = partial(targets, ends=ends, loops=loops, quantum=quantum, vertex=cones, index=index)
-        self.energy, surface, found = solvable(
-            surface, lambda one: wanted(one, angles=_extended(angles, one))
-        )
-        self.surface, self.cones, self.index, self.cell = surface, cones, index, cell
+        self._targets = partial(targets, ends=ends, loops=loops, quantum=quantum, index=index)
+        self._angles = angles
+        self.energy, surface, found = solvable(surface, lambda one: self._wanted(one, cones))
+        self.surface, self.index, self.cell = surface, index, cell
         self.quantum, self.ends = quantum, ends
-        self.factor = Factorisation(self.energy.points, self.energy.rows, self.energy.columns)
-        self.cut: Branches = branches(surface, int(cones[0]), cones[1:], tuple(surface.loops))
-        self.tree = FaceTree.of(self.cut.twin)
-        self.hold: list[Grip] = grips(surface, cones, cell)
         pairs = list(zip(surface.loops, ends, strict=True))
         self.waves = [_waves(surface, loop) for loop, end in pairs if end == "free"]
         self.straight = [_rim(surface, loop) for loop, end in pairs if end == "straight"]
         self.slope = None if slope is None else np.ascontiguousarray(slope(surface).T[[1, 2, 0]])
         self.area = vertex_areas(surface)
-        self.factor.factorise(*self.energy.hessian(found.corners))
-        self._x = self.energy.unknowns_of(found.u)
-        self._at = np.zeros(self.unknowns)
+        self.factor = found.factorisation
+        self._seat(cones, self.energy.unknowns_of(found.u), found.corners)
+
+    def _wanted(self, surface: Surface, cones: Ints) -> Targets:
+        return self._targets(surface, vertex=cones, angles=_extended(self._angles, surface))
+
+    def _seat(self, cones: Ints, x: Floats, corners: Corners) -> None:
+        """x, corners: the map with the singularities at these vertices."""
+        surface = self.surface
+        self.cones = cones
+        self.cut: Branches = branches(surface, int(cones[0]), cones[1:], tuple(surface.loops))
+        self.tree = FaceTree.of(self.cut.twin)
+        self.hold: list[Grip] = grips(surface, cones, self.cell)
+        self.factor.factorise(*self.energy.hessian(corners))
+        self._x, self._at = x, np.zeros(self.unknowns)
         self._response: Floats | None = None  # (n_dof, unknowns) of the energy's unknowns to those here
         self._root = int(np.flatnonzero(surface.faces.ravel() == cones[0])[0])
+
+    def reseated(self, cones: Ints) -> Chart | None:
+        """The same map with the singularities at other vertices, from this one, which is used up; None where
+        that does not lead there."""
+        other = copy(self)
+        other.energy = self.energy.aimed_at(self._wanted(self.surface, cones))
+        _, _, other.energy.lengths = self._given(np.zeros(self.unknowns))
+        try:
+            with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+                _, corners, _ = other._solve(self._x, 0.0)
+        except ConvergenceError:
+            return None
+        other._seat(cones, other._x, corners)
+        return other
 
     @property
     def unknowns(self) -> int:
@@ -136,7 +158,7 @@ class Chart:
         half = np.exp(factor / 2)[self.energy.corner]
         lengths = opposite_lengths(surface.vertices, surface.faces) * half[[1, 2, 0]] * half[[2, 0, 1]]
         if self.slope is not None:
-            lengths *= np.sqrt(1 + ((1 + STRETCH * x[-1]) ** 2 - 1) * self.slope)
+            lengths *= self._stretched(x[-1])
         return surface, factor, lengths
 
     def at(self, x: Floats, enough: float = 0.0) -> Seen:
@@ -163,32 +185,56 @@ class Chart:
         found: by one step of Newton's method for all of them together."""
         energy, base, x = self.energy, self.energy.lengths, self._x
         u = energy.scale_of(x)
-        scale = np.exp((u.mean() - u) / 2)
-        given, right = [], np.empty((energy.n_dof, self.unknowns))
-        for i in range(self.unknowns):
-            one = np.zeros(self.unknowns)
-            one[i] = step
-            _, factor, lengths = self._given(one)
-            given.append((factor, lengths))
-            face = np.flatnonzero((lengths != base).any(axis=0))
+        scale, angle = np.exp((u.mean() - u) / 2), energy.corners(u).angle
+        given, right = list(self._changes(step)), np.empty((energy.n_dof, self.unknowns))
+        for i, (_, face, lengths) in enumerate(given):
             corner = energy.corner[:, face]
-            angle = [corner_angles(of[:, face] * scale[corner]).angle for of in (lengths, base)]
-            change = total(corner.ravel(), (angle[0] - angle[1]).ravel(), energy.n)
-            right[:, i] = energy.reduce(change)
+            more = corner_angles(lengths * scale[corner]).angle - angle[:, face]
+            right[:, i] = energy.reduce(total(corner.ravel(), more.ravel(), energy.n))
         response = self.factor.solve(right)
         self._response = response / step
-        face, tree = self._surroundings()
+        seen, tree = self._surroundings()
+        corner, flat = energy.corner[:, seen], np.full((len(self.surface.faces), 3), np.nan, dtype=complex)
         found = []
-        for i, (factor, lengths) in enumerate(given):
+        for i, (factor, face, lengths) in enumerate(given):
             u = energy.scale_of(x + response[:, i])
             u -= self._mean(u + factor)
-            corner = energy.corner[:, face]
             half = np.exp(u / 2)[corner]
-            flat_lengths = lengths[:, face] * half[[1, 2, 0]] * half[[2, 0, 1]]
-            flat = np.full((len(self.surface.faces), 3), np.nan, dtype=complex)
-            flat[face] = develop(tree, flat_lengths, corner_angles(flat_lengths)).T
+            changed = base.copy()
+            changed[:, face] = lengths
+            flat_lengths = changed[:, seen] * half[[1, 2, 0]] * half[[2, 0, 1]]
+            flat[seen] = develop(tree, flat_lengths, corner_angles(flat_lengths)).T
             found.append(self._holonomy(flat.ravel()))
         return found
+
+    def _changes(self, step: float) -> Iterator[tuple[Floats | float, Ints, Floats]]:
+        """For a step of each unknown from 0 what it changes: the dipoles' part of u, and the lengths (3, k)
+        of which faces (k,)."""
+        surface, base, n = self.surface, self.energy.lengths, len(self.surface.vertices)
+        for grip in self.hold:
+            face = self._around(grip.vertex)
+            for moved in grip.moved(surface, step * self.cell):
+                yield 0.0, face, opposite_lengths(moved, surface.faces[face])
+        for loop, wave in self.waves:
+            face = self._around(loop)
+            for along in wave.T:
+                factor = np.zeros(n)
+                factor[loop] = DIPOLE * step * along
+                half = np.exp(factor / 2)[self.energy.corner[:, face]]
+                yield factor, face, base[:, face] * half[[1, 2, 0]] * half[[2, 0, 1]]
+        if self.slope is not None:
+            yield 0.0, np.arange(len(surface.faces)), base * self._stretched(step)
+
+    def _around(self, vertex: Ints) -> Ints:
+        """Faces at these vertices."""
+        marked = np.zeros(len(self.surface.vertices), dtype=bool)
+        marked[vertex] = True
+        return np.flatnonzero(marked[self.surface.faces].any(axis=1))
+
+    def _stretched(self, x: float) -> Floats:
+        """(3, m) factors of the lengths."""
+        assert self.slope is not None
+        return np.asarray(np.sqrt(1 + ((1 + STRETCH * x) ** 2 - 1) * self.slope))
 
     def _surroundings(self) -> tuple[Ints, FaceTree]:
         """The faces along the cut and the straight loops, and those that lead there from the tree's root;

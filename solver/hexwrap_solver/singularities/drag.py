@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -62,6 +63,19 @@ class Grip:
     share: Floats
     axes: Floats
     steps: Floats | None
+
+    def moved(self, surface: Surface, step: float) -> Iterator[Floats]:
+        """(n, 3) the surface's vertices after a small step along each axis; on a NURBS surface to first
+        order, in their tangent planes."""
+        if self.steps is None:
+            for move in step * np.eye(2):
+                yield dragged(surface, [self], move[None]).vertices
+            return
+        normal = surface.normals[self.vertex]
+        for axis in self.axes:
+            vertices = surface.vertices.copy()
+            vertices[self.vertex] += step * self.share[:, None] * (axis - (normal @ axis)[:, None] * normal)
+            yield vertices
 
 
 def rims(surface: Surface) -> Ints:

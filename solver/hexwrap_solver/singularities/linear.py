@@ -16,7 +16,7 @@ from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
-from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged
+from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints, Ragged
 from hexwrap_solver.conformal.energy import Energy
 from hexwrap_solver.conformal.fixed import minimise
 from hexwrap_solver.conformal.types import Targets
@@ -63,6 +63,14 @@ class Steepness:
         row = pairs.T.ravel()
         share = csr_array((1.0 / degree[row], (row, np.concatenate([at, at]))), shape=(n, len(pairs)))
         return cls(pairs, 1 / np.maximum(far, 1e-300), share)
+
+
+@dataclass(frozen=True)
+class Tube:
+    """The map with both ends straight and no singularities. place: (n,) in turns. scale: (n,) u."""
+
+    place: Complexes
+    scale: Floats
 
 
 @dataclass(frozen=True)
@@ -167,13 +175,14 @@ class Responses:
         self,
         surface: Surface,
         rules: Rules,
-        turn: Floats | None = None,
+        tube: Tube | None = None,
         patches: int = PATCHES,
         steps: bool = True,
     ) -> None:
-        """turn: (n,) see Model. patches: about how many. steps: with the nonlinear solution; else the metric
-        of the surface itself stands in."""
-        self.surface, self.rules, self.turn = surface, rules, turn
+        """tube: for two straight ends that must stand in lattice directions to each other. patches: about how
+        many. steps: with the nonlinear solution; else the metric of the surface itself stands in."""
+        self.surface, self.rules = surface, rules
+        self.turn = None if tube is None else tube.place.real
         turns = round(2 * np.pi / rules.quantum)
         self.free = tuple(i for i, end in enumerate(rules.ends) if end == "free")
         self.loops = reference_loops(surface, rules)
@@ -183,7 +192,7 @@ class Responses:
         background = self.rest * rules.quantum if not self.free else 0.0
         wanted = targets(surface, rules.ends, self.loops, rules.quantum, none, none, background, rules.angles)
         self.energy = energy = Energy(surface, wanted)
-        u, self.factor = _reference(energy, steps)
+        u, self.factor = _reference(energy, steps, None if tube is None else tube.scale)
         patch, self.middle = _patches(surface, area, patches)
         weight = np.bincount(patch, area)
         shape = (len(self.middle), len(patch))
@@ -262,13 +271,13 @@ class Responses:
 def linear_model(
     surface: Surface,
     rules: Rules,
-    turn: Floats | None = None,
+    tube: Tube | None = None,
     seats: Ints | None = None,
     patches: int = PATCHES,
     steps: bool = True,
 ) -> Model:
     """For seats (q,), or None: as the rules allow; see ``Responses``."""
-    found = Responses(surface, rules, turn, patches, steps)
+    found = Responses(surface, rules, tube, patches, steps)
     return found.model(found.seats() if seats is None else seats)
 
 
@@ -285,20 +294,21 @@ def _ragged(rows: list[Ints]) -> Ragged:
     return Ragged(np.concatenate([np.zeros(0, dtype=np.int64), *rows]), offsets)
 
 
-def _reference(energy: Energy, steps: bool) -> tuple[Floats, Factorisation]:
+def _reference(energy: Energy, steps: bool, start: Floats | None) -> tuple[Floats, Factorisation]:
     """u without singularities and the factorised Hessian there; where triangles would have to be flipped, one
     Newton step on the surface's own metric: with smooth surfaces, u is linear anyway."""
-    u, corners, holds = np.zeros(energy.n), energy.corners(np.zeros(energy.n)), False
     if steps:
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            found = minimise(energy)
-        if holds := found.converged and not found.violating:
-            u, corners = found.u, found.corners
-    factor = Factorisation(energy.points, energy.rows, energy.columns)
+            found = minimise(energy, start)
+        if found.converged and not found.violating:
+            found.factorisation.factorise(*energy.hessian(found.corners))
+            return found.u, found.factorisation
+    corners, factor = (
+        energy.corners(np.zeros(energy.n)),
+        Factorisation(energy.points, energy.rows, energy.columns),
+    )
     diagonal, off = energy.hessian(corners)
-    factor.factorise(diagonal + (0.0 if holds else 1e-12 * np.abs(diagonal).max()), off)
-    if holds:
-        return u, factor
+    factor.factorise(diagonal + 1e-12 * np.abs(diagonal).max(), off)
     return energy.scale_of(factor.solve(-energy.gradient(corners))), factor
 
 

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from hexwrap_solver.arrays import Floats, Ints
 from hexwrap_solver.errors import SingularitiesError
-from hexwrap_solver.singularities.linear import Responses, linear_model
+from hexwrap_solver.singularities.linear import Responses, Tube, linear_model
 from hexwrap_solver.singularities.search import STARTS, STARTS_ALIGNED, Search, State, curve
 from hexwrap_solver.singularities.symmetry import OFF, Group, orbits, symmetries
 from hexwrap_solver.singularities.types import Proposal, Rules, SingularityAt
@@ -48,14 +48,14 @@ class Placing:
 
 
 def place(
-    surface: Surface, rules: Rules, count: int | Literal["auto"] = "auto", turn: Floats | None = None
+    surface: Surface, rules: Rules, count: int | Literal["auto"] = "auto", tube: Tube | None = None
 ) -> Placing:
     """The whole curve over the number of singularities, up to ``rules.most``, and the number to take: with
     "auto" as many as pay, else at most ``count``, whatever leaves least uncovered.
 
-    turn: see ``linear.Model``. Raises SingularitiesError where no number is possible.
+    tube: see ``Responses``. Raises SingularitiesError where no number is possible.
     """
-    known = Responses(surface, rules, turn)
+    known = Responses(surface, rules, tube)
     patience = PATIENCE if count == "auto" else None
     proposals, symmetry = _symmetric(known, patience) if rules.symmetric else (_curve(known, patience), "")
     if not proposals:

@@ -178,8 +178,7 @@ class Search:
 
     def additions(self, state: State, k: int, most: int) -> list[tuple[float, State]]:
         """The best ways to add a singularity of index k, loops changed along with it."""
-        draft = _Drafts(self, [state])
-        values = draft.with_one_more(np.array([float(k)]), draft.crowd[:, int(k > 0)])[0]
+        values = _Drafts(self, [state]).with_one_more(np.array([float(k)]))[0]
         if not values.size:
             return []
         best = np.argpartition(values.ravel(), min(most, values.size) - 1)[:most]
@@ -322,44 +321,38 @@ class _Drafts:
             found.append(State.of(pairs, tuple(loops.tolist())))
         return found
 
-    def _totals(self, value: Floats, turn: Floats) -> Floats:
+    @property
+    def _totals(self) -> Floats:
         search = self.search
-        return value if search.model.turn is None else value + search._cost_of_turn(turn)
+        return self.value if search.model.turn is None else self.value + search._cost_of_turn(self.turn)
 
     def _crowd(self, which: Ints, seat: Ints, k: Floats, by: int) -> None:
         for positive in (0, 1):
             same = ((k > 0) == bool(positive)).astype(np.int64)
             self.crowd[which, positive] += by * self.search._close[same, seat]
 
-    def with_one_more(self, k: Floats, crowd: Counts, which: Ints | None = None) -> Floats:
-        """(s, moves, q) values of these states with one more of index k (s,) on each seat, loops changed by
-        each move; ∞ where crowded (s, q)."""
+    def with_one_more(self, k: Floats) -> Floats:
+        """(s, moves, q) values with one more of index k (s,) on each seat, loops changed by each move; ∞
+        where that is too near to others."""
+        crowd = self.crowd[np.arange(len(k)), (k > 0).astype(np.int64)]
+        return self._with_one_more(k, crowd, self.value, self.gradient, self.turn)
+
+    def _with_one_more(
+        self, k: Floats, crowd: Counts, value: Floats, gradient: Floats, turn: Floats
+    ) -> Floats:
+        """To states of these values."""
         search, q = self.search, self.search.seats
-        which = np.arange(len(self.value)) if which is None else which
         change, more = search._moves
-        gradient = self.gradient[which]
-        base = self.value[which, None] + 2 * gradient[:, q:] @ change.T + search._quadratic
-        alone = (2 * k)[:, None] * gradient[:, :q] + (k * k)[:, None] * search.alone[:q]
+        base = value[:, None] + 2 * gradient[:, q:] @ change.T + search._quadratic
+        alone = gradient[:, :q] * (2 * k)[:, None]
+        alone += (k * k)[:, None] * search.alone[:q]
         if search.model.turn is not None:
-            alone += search._cost_of_turn(self.turn[which, None] + k[:, None] * search.model.turn)
-        alone[crowd > 0] = np.inf
+            alone += search._cost_of_turn(turn[:, None] + k[:, None] * search.model.turn)
+        np.copyto(alone, np.inf, where=crowd > 0)
         values = alone[:, None, :] + base[:, :, None]
         if len(search.moves) > 1:
             values += (2 * k)[:, None, None] * more
         return np.asarray(values)
-
-    def _change(self, which: Ints, seat: Ints, k: Floats, sign: int) -> None:
-        """Adds (1) or takes away (−1) a singularity of each; for those taken away the gradient is changed
-        first."""
-        search = self.search
-        if sign < 0:
-            self.gradient[which] -= k[:, None] * search.square[seat]
-        slope = self.gradient[which, seat]
-        self.value[which] += sign * (2 * k * slope + k * k * search.alone[seat])
-        if sign > 0:
-            self.gradient[which] += k[:, None] * search.square[seat]
-        self.turn[which] += sign * k * self._turn_of(seat)
-        self._crowd(which, seat, k, sign)
 
     def _move(self, which: Ints, move: Ints, steps: Ints) -> None:
         """Makes a move of each, so many times."""
@@ -372,46 +365,63 @@ class _Drafts:
 
     def settle(self, least: float) -> None:
         """See ``Search.settled``."""
+        n = self.seat.shape[1]
+        #: How many singularities have stayed since anything changed; n − 1, and the next one stays as well.
+        stayed = np.full(len(self.value), -1)
         active = np.arange(len(self.value))
         for _ in range(SWEEPS):
-            before = self._totals(self.value, self.turn)[active]
-            for i in range(self.seat.shape[1]):
-                self.relocate(active, i, least)
-            self.turn_loops(active, least)
-            active = active[self._totals(self.value, self.turn)[active] < before - least]
+            for i in range(n):
+                which = active[stayed[active] < n - 1]
+                if not len(which):
+                    break
+                stayed[which] = np.where(self.relocate(which, i, least), 0, stayed[which] + 1)
+            stayed[active[self.turn_loops(active, least)]] = -1
+            active = active[stayed[active] < n - 1]
             if not len(active):
                 break
 
-    def relocate(self, which: Ints, i: int, least: float) -> None:
-        """The i-th singularity of each to the best seat, where that gains at least so much."""
-        search = self.search
+    def relocate(self, which: Ints, i: int, least: float) -> Bools:
+        """The i-th singularity of each to the best seat, where that gains at least so much: (w,) which do."""
+        search, every = self.search, np.arange(len(which))
         seat, k = self.seat[which, i], self.index[which, i]
-        before = self._totals(self.value[which], self.turn[which])
-        self._change(which, seat, k, -1)
-        values = self.with_one_more(k, self.crowd[which, (k > 0).astype(np.int64)], which)
-        values = values.reshape(len(which), -1)
+        # the states without it
+        gradient = k[:, None] * search.square[seat]
+        np.subtract(self.gradient[which], gradient, out=gradient)
+        value = self.value[which] - (2 * k * gradient[every, seat] + k * k * search.alone[seat])
+        turn = self.turn[which] - k * self._turn_of(seat)
+        crowd = self.crowd[which, (k > 0).astype(np.int64)] - search._close[1][seat]
+        values = self._with_one_more(k, crowd, value, gradient, turn).reshape(len(which), -1)
         best = values.argmin(axis=1)
-        gains = values[np.arange(len(which)), best] < before - least
-        move = np.where(gains, best // search.seats, 0)
-        seat = np.where(gains, best % search.seats, seat)
+        gains = values[every, best] < self._totals[which] - least
+        at, to = which[gains], best[gains] % search.seats
+        self._crowd(at, seat[gains], k[gains], -1)
+        k, gradient = k[gains], gradient[gains]
+        self.value[at] = value[gains] + 2 * k * gradient[np.arange(len(at)), to] + k * k * search.alone[to]
+        self.gradient[at] = gradient + k[:, None] * search.square[to]
+        self.turn[at] = turn[gains] + k * self._turn_of(to)
+        self._crowd(at, to, k, 1)
+        self.seat[at, i] = to
+        move = best[gains] // search.seats
         turned = np.flatnonzero(move)
         if len(turned):
-            self._move(which[turned], move[turned], np.ones(len(turned), dtype=np.int64))
-        self._change(which, seat, k, 1)
-        self.seat[which, i] = seat
+            self._move(at[turned], move[turned], np.ones(len(turned), dtype=np.int64))
+        return np.asarray(gains)
 
-    def turn_loops(self, which: Ints, least: float) -> None:
+    def turn_loops(self, which: Ints, least: float) -> Bools:
         """Loops changed as long as that gains, by each move to its minimum at once: where coordinates are
-        wild, it can be 100,000 quanta away."""
+        wild, it can be 100,000 quanta away. (w,) which do."""
         change, q = self.search._moves[0], self.search.seats
-        bend = self.search._quadratic
-        while len(which):
-            slope = 2 * self.gradient[which][:, q:] @ change.T
+        bend, turned = self.search._quadratic, np.zeros(len(which), dtype=bool)
+        left = np.arange(len(which))
+        while len(left):
+            slope = 2 * self.gradient[which[left]][:, q:] @ change.T
             best = (slope + bend).argmin(axis=1)
-            at = slope[np.arange(len(which)), best]
+            at = slope[np.arange(len(left)), best]
             gains = (at + bend[best] < -least) & (bend[best] > 0)
-            which, best, at = which[gains], best[gains], at[gains]
-            self._move(which, best, np.maximum(1, np.rint(-at / (2 * bend[best]))).astype(np.int64))
+            left, best, at = left[gains], best[gains], at[gains]
+            turned[left] = True
+            self._move(which[left], best, np.maximum(1, np.rint(-at / (2 * bend[best]))).astype(np.int64))
+        return np.asarray(turned)
 
 
 def _plus(loops: tuple[int, ...], move: tuple[int, ...]) -> tuple[int, ...]:

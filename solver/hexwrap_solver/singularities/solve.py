@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -29,7 +30,7 @@ from hexwrap_solver.pattern.place.size import (
 from hexwrap_solver.pattern.types import Kind, PatternSettings
 from hexwrap_solver.singularities.close import Chart, Closed, Closing, Line
 from hexwrap_solver.singularities.drag import refined, rims
-from hexwrap_solver.singularities.linear import vertex_areas
+from hexwrap_solver.singularities.linear import Tube, vertex_areas
 from hexwrap_solver.singularities.place import Placing, given, place
 from hexwrap_solver.singularities.types import End, Proposal, Rules, SingularitySettings
 from hexwrap_solver.surface.holes import fill_openings
@@ -62,8 +63,7 @@ class Frame:
     """What the singularities of one surface are chosen and closed for.
 
     width: of a cell, which is that of the surface as of the domain. line: for straight loops that are to be
-    lattice lines; aligned: which ones. turn: (n,) and slope: (m, 3) of two straight ends, see
-    ``linear.Model`` and ``close.Chart``. sized: a size of the cells was asked for.
+    lattice lines; aligned: which ones. tube: where both are. sized: a size of the cells was asked for.
     """
 
     lattice: Lattice
@@ -71,7 +71,7 @@ class Frame:
     width: float
     line: Line | None
     aligned: tuple[bool, ...]
-    turn: Floats | None
+    tube: Tube | None
     free_scale: float
     sized: bool
 
@@ -127,13 +127,14 @@ def frame_of(
         else None,
         symmetric=settings.symmetric,
     )
-    turn = None
+    straight_tube = None
     if tube is not None and all(aligned):
-        turn = tube.uv.real / tube.circumference
+        n = len(surface.vertices)
+        straight_tube = Tube(tube.uv[:n] / tube.circumference, tube.log_scale[:n])
     free_scale = ASKED if pattern.edge_length is not None else FREE
     line = _line(lattice, angle, pattern.boundary) if any(aligned) else None
     sized = pattern.edge_length is not None or pattern.around is not None
-    return Frame(lattice, rules, width, line, aligned, turn, free_scale, sized)
+    return Frame(lattice, rules, width, line, aligned, straight_tube, free_scale, sized)
 
 
 def _check_kind(lattice: Lattice, settings: SingularitySettings) -> None:
@@ -253,7 +254,7 @@ def chosen(surface: Surface, frame: Frame, settings: SingularitySettings) -> Pla
     if settings.at:
         return Placing((given(surface, frame.rules, settings.at),), 0)
     count: int | Literal["auto"] = "auto" if settings.count is None else settings.count
-    placing = place(surface, frame.rules, count, frame.turn)
+    placing = place(surface, frame.rules, count, frame.tube)
     return replace(placing, may_be_none=settings.count == "auto")
 
 
@@ -337,11 +338,15 @@ def closed_at(
     failed: ConvergenceError | None = None
     vertex, index = _ordered(proposal)
     finer = refined(surface, surface.vertices[vertex], frame.width)
-    slope = _slope if frame.turn is not None else None
+    slope = partial(_slope, surface, frame.tube) if frame.tube is not None else None
     quantum, ends, angles = frame.lattice.quantum, frame.rules.ends, frame.rules.angles
+    chart: Chart | None = None
     for again in range(AGAIN + 1):
         try:
-            chart = Chart(finer, vertex, index, proposal.loops, ends, quantum, frame.width, slope, angles)
+            chart = None if chart is None or finer is not chart.surface else chart.reseated(vertex)
+            chart = chart or Chart(
+                finer, vertex, index, proposal.loops, ends, quantum, frame.width, slope, angles
+            )
             closing = Closing(chart, frame.width, frame.line, frame.free_scale, frame.aligned)
         except ConvergenceError as error:
             work.left -= HARD * len(finer.vertices)
@@ -368,13 +373,15 @@ def closed_at(
     raise failed
 
 
-def _slope(surface: Surface) -> Floats:
-    """(m, 3) squared sine of the half-edges' angles to the horizontal in the cylinder without singularities,
-    which may be that of a refined mesh."""
-    tube = conformal_map(surface, BoundaryCondition("straight"))
-    corners = tube.uv[surface.faces]
-    edge = np.roll(corners, -1, axis=1) - corners
-    edge -= tube.circumference * np.rint(edge.real / tube.circumference)
+def _slope(before: Surface, tube: Tube, surface: Surface) -> Floats:
+    """(m, 3) squared sine of the half-edges' angles to the horizontal in the tube that ``before`` is as it
+    has more vertices now: they come last."""
+    seen = before.tree.nearest(surface.vertices[len(before.vertices) :])
+    corner = tube.place[before.faces[seen.face]]
+    corner -= np.rint((corner - corner[:, :1]).real)
+    place = np.concatenate([tube.place, (seen.barycentric * corner).sum(axis=1)])[surface.faces]
+    edge = np.roll(place, -1, axis=1) - place
+    edge -= np.rint(edge.real)
     return np.asarray((edge.imag / np.abs(edge)) ** 2)
 
 
