@@ -650,21 +650,35 @@ def test_theme_and_keyboard(browser, server: Server) -> None:
         assert not wanted
 
 
-@pytest.mark.skipif(
-    shutil.which("npm") is None, reason="npm is not installed: the bundle cannot be built again"
-)
-def test_the_bundle_is_what_the_source_builds(tmp_path: Path) -> None:
-    copy = tmp_path / "server" / "viewer"
-    shutil.copytree(VIEWER, copy, ignore=shutil.ignore_patterns("node_modules"))
+@pytest.fixture(scope="module")
+def build(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of the source beside which the build's packages are installed."""
+    folder = tmp_path_factory.mktemp("build") / "server" / "viewer"
+    shutil.copytree(VIEWER, folder, ignore=shutil.ignore_patterns("node_modules"))
     npm = shutil.which("npm")
     done = subprocess.run(
-        [npm, "install", "--silent"], cwd=copy, capture_output=True, text=True, timeout=PATIENCE
+        [npm, "install", "--silent"], cwd=folder, capture_output=True, text=True, timeout=PATIENCE
     )
     if done.returncode:
         pytest.skip(f"npm could not install the build's packages: {done.stderr.strip()[-200:]}")
-    subprocess.run([npm, "run", "check"], cwd=copy, check=True, capture_output=True, timeout=PATIENCE)
-    subprocess.run([npm, "run", "build"], cwd=copy, check=True, capture_output=True, timeout=PATIENCE)
-    built = tmp_path / "server" / "hexwrap_server" / "static"
+    return folder
+
+
+@pytest.mark.long  # as the types of the Python code
+@pytest.mark.skipif(
+    shutil.which("npm") is None, reason="npm is not installed: the bundle cannot be built again"
+)
+def test_types_of_the_source_are_content(build: Path) -> None:
+    subprocess.run([shutil.which("npm"), "run", "check"], cwd=build, check=True, timeout=PATIENCE)
+
+
+@pytest.mark.skipif(
+    shutil.which("npm") is None, reason="npm is not installed: the bundle cannot be built again"
+)
+def test_the_bundle_is_what_the_source_builds(build: Path) -> None:
+    npm = shutil.which("npm")
+    subprocess.run([npm, "run", "build"], cwd=build, check=True, capture_output=True, timeout=PATIENCE)
+    built = build.parent / "hexwrap_server" / "static"
     for name in sorted(p.name for p in STATIC.iterdir()):
         assert (built / name).read_bytes() == (STATIC / name).read_bytes(), (
             f"{name}: run npm run build in server/viewer"
