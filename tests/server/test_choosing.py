@@ -214,8 +214,15 @@ def test_neither_ground_nor_a_small_tube_stands_for_a_building(side: float) -> N
 
 def test_a_file_without_surfaces_names_what_it_holds() -> None:
     line = rhino3dm.LineCurve(rhino3dm.Point3d(0, 0, 0), rhino3dm.Point3d(1, 0, 0))
-    with pytest.raises(UnreadableFileError, match="1 LineCurve"):
+    with pytest.raises(UnreadableFileError, match="1 curves"):
         Model().add(line).choose()
+
+
+def test_smaller_pieces_of_the_mesh_that_is_taken_are_told_with_their_place() -> None:
+    n = len(VERTICES)
+    far = np.array([500.0, 0, 0])
+    model = Model().add(rhino_mesh(np.vstack([VERTICES, 0.4 * VERTICES + far]), [*QUADS, *(QUADS + n)]))
+    assert "1 other piece of the same object left out, at (" in " ".join(model.choose().notes)
 
 
 def test_strays_are_left_out_and_told_with_their_place() -> None:

@@ -29,7 +29,8 @@ def print_content(console: Console, data: bytes, filename: str, settings: Surfac
     except HexwrapError as error:
         refusal = error.detail
     tolerance = f", tolerance {content.tolerance:g}" if content.tolerance else ""
-    console.print(f"{filename}: {len(content.objects)} surfaces, unit {unit or 'not known'}{tolerance}")
+    count = len(content.objects)
+    console.print(f"{filename}: {count} surface{'s' * (count != 1)}, unit {unit or 'not known'}{tolerance}")
     console.print(_table(content, chosen, unit))
     if len(content.objects) > MOST_ROWS:
         console.print(f"… and {len(content.objects) - MOST_ROWS} more")

@@ -96,7 +96,7 @@ class FaceTree:
         weight = np.ones(3 * m, dtype=np.int8) if rounding is None else np.maximum(rounding, rounding[twin])
         graph = sparse.csr_matrix((weight, neighbour, starts), shape=(m, m))
         if rounding is not None:
-            graph = minimum_spanning_tree(graph)
+            graph = sparse.csr_matrix(minimum_spanning_tree(graph))
         found, before = breadth_first_order(graph, 0, directed=rounding is None)
         order, parent = found.astype(np.int64), before.astype(np.int64)
         parent[0] = 0
