@@ -216,8 +216,8 @@ def _nearly(
             near = label(meant[other.members[0]], number[id(meant[other.members[0]])])
             notes[id(other)] = (
                 f"{near[0].upper()}{near[1:]} comes within {distance[k]:.3g} of the surface at "
-                f"{point(other.boundary[k])}{allowed} and was not joined: close the gap with Rhino's MatchSrf "
-                "or JoinEdge."
+                f"{point(other.boundary[k])}{allowed} and was not joined: close the gap with Rhino's "
+                "MatchSrf or JoinEdge."
             )
     return notes
 
