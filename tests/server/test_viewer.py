@@ -225,15 +225,17 @@ def obj_surface(text: str) -> dict[str, Any]:
     }
 
 
+@pytest.fixture(scope="class")
+def tower(browser, server: Server) -> Iterator[Page]:
+    """A page that shows the tower."""
+    with opened(browser, server) as page:
+        page.select_option("#sample", "tower")
+        shown(page)
+        yield page
+
+
 class TestResult:
     """What is read off one result, all on one page."""
-
-    @pytest.fixture(scope="class")
-    def tower(self, browser, server: Server) -> Iterator[Page]:
-        with opened(browser, server) as page:
-            page.select_option("#sample", "tower")
-            shown(page)
-            yield page
 
     def test_sample_solves_and_panels_can_be_picked_and_read(self, tower: Page, server: Server) -> None:
         job = tower.evaluate("document.documentElement.dataset.shown")
