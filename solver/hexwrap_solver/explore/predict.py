@@ -22,7 +22,7 @@ from hexwrap_solver.domain.locate import barycentric
 from hexwrap_solver.panels.sizes import partition_by_area
 from hexwrap_solver.pattern.lattice import LATTICES, Lattice
 from hexwrap_solver.pattern.lay.nodes import lattice_points_in_triangles
-from hexwrap_solver.pattern.place.choose import Placing
+from hexwrap_solver.pattern.place.choose import PlacementFamily
 from hexwrap_solver.pattern.place.rotation import with_rotation
 from hexwrap_solver.pattern.types import Kind, PatternSettings
 
@@ -120,7 +120,7 @@ def outlook(cmap: ConformalMap, settings: PatternSettings, progress: Progress = 
     """
     lattice = LATTICES[settings.kind]
     settings, _ = with_rotation(cmap, lattice, settings)
-    placing = Placing.of(cmap, lattice, settings)
+    placing = PlacementFamily.of(cmap, lattice, settings)
     progress(0.5, "placing the lattice")
     placement = placing.at(settings)
     surface = cmap.surface
