@@ -37,7 +37,7 @@ def print_content(console: Console, data: bytes, filename: str, settings: Surfac
     if content.others:
         others = ", ".join(f"{count} {kind}" for kind, count in sorted(content.others.items()))
         console.print(f"Besides: {others}")
-    for sentence in (refusal,) if refusal else chosen.told if chosen else ():
+    for sentence in (refusal,) if refusal else chosen.notes if chosen else ():
         console.print(sentence)
     return 1 if refusal else 0
 

@@ -53,11 +53,11 @@ MOST = 300
 
 @dataclass(frozen=True)
 class Chosen:
-    """What a file stands for. told: sentences for the user. used: the objects it is made of."""
+    """What a file stands for. notes: sentences for the user. used: the objects it is made of."""
 
     geometry: Geometry
     used: tuple[Found, ...]
-    told: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 def choose(
@@ -71,8 +71,8 @@ def choose(
     if content.mesh is None and len(meant) == 1:
         geometry = meant[0].read()
         if not isinstance(geometry, SentMesh):
-            geometry, told = brep_where_needed(geometry, content.tolerance)
-            return Chosen(geometry, tuple(meant), (*told, *others(content, meant)))
+            geometry, notes = brep_where_needed(geometry, content.tolerance)
+            return Chosen(geometry, tuple(meant), (*notes, *others(content, meant)))
     meant = sorted(meant, key=lambda item: -max(item.size))[:MOST]
     found = parts_of(content, meant)
     if not found.parts:
@@ -94,14 +94,14 @@ def choose(
         raise several(content, [meant[i] for part in near for i in part.members], len(near), unit, gaps, fins)
     part = next((other for other in alike if _is_exact(other, meant)), best)
     used = [meant[i] for i in part.members]
-    geometry, told = brep_where_needed(part.make(), content.tolerance)
+    geometry, notes = brep_where_needed(part.make(), content.tolerance)
     if len(used) > 1 or len(meant) == 1:
-        told += joint(part.joint, content.tolerance, len(used))
-    told += apart_from([other.box for other in found.parts if other is not part and _shares(other, part)])
-    told += strays([piece for members, piece in found.strays if members & set(part.members)])
-    told += list(apart.values())[:SHOWN]
-    told += coarse_numbers(geometry, content.tolerance)
-    return Chosen(geometry, tuple(used), (*told, *copies(len(found.copies)), *others(content, used)))
+        notes += joint(part.joint, content.tolerance, len(used))
+    notes += apart_from([other.box for other in found.parts if other is not part and _shares(other, part)])
+    notes += strays([piece for members, piece in found.strays if members & set(part.members)])
+    notes += list(apart.values())[:SHOWN]
+    notes += coarse_numbers(geometry, content.tolerance)
+    return Chosen(geometry, tuple(used), (*notes, *copies(len(found.copies)), *others(content, used)))
 
 
 def _weight(part: Part) -> float:
@@ -203,23 +203,23 @@ def _nearly(
     reach = COARSEST * size if content.tolerance is None else NEARLY * tolerance
     allowed = "" if content.tolerance is None else f", more than the file's tolerance of {tolerance:g},"
     number = {id(item): i for i, item in enumerate(content.objects)}
-    if not len(part.rim):
+    if not len(part.boundary):
         return {}
-    told = {}
-    tree = cKDTree(part.rim)
+    notes = {}
+    tree = cKDTree(part.boundary)
     for other in others:
-        if not len(other.rim):
+        if not len(other.boundary):
             continue
-        distance = np.asarray(tree.query(other.rim)[0])
+        distance = np.asarray(tree.query(other.boundary)[0])
         k = int(np.argmin(np.where(distance > tolerance, distance, np.inf)))
         if tolerance < distance[k] < reach:
             near = label(meant[other.members[0]], number[id(meant[other.members[0]])])
-            told[id(other)] = (
+            notes[id(other)] = (
                 f"{near[0].upper()}{near[1:]} comes within {distance[k]:.3g} of the surface at "
-                f"{point(other.rim[k])}{allowed} and was not joined: close the gap with Rhino's MatchSrf or "
-                "JoinEdge."
+                f"{point(other.boundary[k])}{allowed} and was not joined: close the gap with Rhino's "
+                "MatchSrf or JoinEdge."
             )
-    return told
+    return notes
 
 
 def several(

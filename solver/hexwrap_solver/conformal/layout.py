@@ -284,7 +284,7 @@ def normalise(
 
 def _loop_length(surface: Surface, uv: Complexes, sheet: Ints, deck: Deck) -> float:
     """Geometric mean of the two loops' lengths in the domain; it does not depend on the cut."""
-    start, end, first = _rim(surface, uv, sheet, deck)
+    start, end, first = _boundary_edges(surface, uv, sheet, deck)
     edge = np.abs(end - start)
     return float(np.sqrt(edge[first].sum()) * np.sqrt(edge[~first].sum()))
 
@@ -292,20 +292,22 @@ def _loop_length(surface: Surface, uv: Complexes, sheet: Ints, deck: Deck) -> fl
 def _runs_around(apex: complex, surface: Surface, uv: Complexes, sheet: Ints, deck: Deck) -> bool:
     """Whether both loops turn about the apex by K. Where K is near 2πm, m ≠ 0, they may lie beside it, and
     turn by K − 2πm only."""
-    start, end, first = _rim(surface, uv, sheet, deck)
+    start, end, first = _boundary_edges(surface, uv, sheet, deck)
     turn = np.angle((end - apex) / (start - apex))
     swept = turn[first].sum(), -turn[~first].sum()
     return bool(max(abs(angle - deck.angle) for angle in swept) < np.pi)
 
 
-def _rim(surface: Surface, uv: Complexes, sheet: Ints, deck: Deck) -> tuple[Complexes, Complexes, Bools]:
+def _boundary_edges(
+    surface: Surface, uv: Complexes, sheet: Ints, deck: Deck
+) -> tuple[Complexes, Complexes, Bools]:
     """(k,) where the boundary edges start and end in some sheet, and which of them belong to loop 0."""
-    rim = np.flatnonzero(surface.twin < 0)
+    boundary = np.flatnonzero(surface.twin < 0)
     flat, sheets = surface.faces.ravel(), sheet.ravel()
-    start, end = (deck.apply(uv[flat[h]], sheets[h]) for h in (rim, next_half_edge(rim)))
+    start, end = (deck.apply(uv[flat[h]], sheets[h]) for h in (boundary, next_half_edge(boundary)))
     first = np.zeros(len(uv), dtype=bool)
     first[surface.loops[0]] = True
-    return start, end, first[flat[rim]]
+    return start, end, first[flat[boundary]]
 
 
 def _upright(uv: Complexes, deck: Deck, foot: complex) -> tuple[Complexes, Deck]:

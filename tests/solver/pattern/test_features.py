@@ -14,7 +14,7 @@ from hexwrap_solver.panels.polygons import best_plane_distances, fan_areas
 from hexwrap_solver.pattern import lay_pattern
 from hexwrap_solver.pattern.lattice import LATTICES
 from hexwrap_solver.pattern.place import choose
-from hexwrap_solver.pattern.place.choose import Placing
+from hexwrap_solver.pattern.place.choose import PlacementFamily
 from hexwrap_solver.pattern.place.deform import distortion_of
 from hexwrap_solver.pattern.place.placement import cost_of
 from hexwrap_solver.pattern.types import Kind, Pattern, PatternSettings
@@ -56,7 +56,7 @@ def test_creases_lie_on_lines_and_cut_cells_into_exact_parts(kind: Kind, rotatio
     cmap = solved("box")
     settings = PatternSettings(kind, around=60, rotation=rotation, boundary="trim")
     lattice = LATTICES[kind]
-    placement = Placing.of(cmap, lattice, settings).at(settings)
+    placement = PlacementFamily.of(cmap, lattice, settings).at(settings)
     assert placement.straight == {0, 1, 2, 3}
     assert np.isfinite(distortion_of(cmap, placement.glued, placement.place))  # no triangle turned over
     assert placement.distortion < 0.012
