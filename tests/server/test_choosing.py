@@ -108,7 +108,7 @@ def two() -> Model:
 def test_a_lone_object_is_taken_without_a_word() -> None:
     chosen = Model().add(mesh_at(), "tower").choose()
     assert isinstance(chosen.geometry, SentMesh)
-    assert chosen.told == ()
+    assert chosen.notes == ()
 
 
 def test_the_only_tube_is_taken_and_told() -> None:
@@ -117,7 +117,7 @@ def test_the_only_tube_is_taken_and_told() -> None:
     )
     chosen = model.choose()
     assert names(chosen) == ["tower"]
-    (sentence,) = chosen.told
+    (sentence,) = chosen.notes
     assert "Taken: 'tower' (mesh" in sentence
     assert "'context' (closed polysurface" in sentence
     assert "500 × 500 × 0 m" in sentence
@@ -185,7 +185,7 @@ def test_copies_in_place_count_once_and_are_told() -> None:
     """Two copies of an open tube would be joined along both rims, to a torus."""
     chosen = Model().add(cylinder(), "a").add(cylinder(), "b").choose()
     assert names(chosen) == ["a"]
-    assert "covers another one exactly" in chosen.told[0]
+    assert "covers another one exactly" in chosen.notes[0]
     loops = take_in(
         sent_surface(Model().add(cylinder()).add(cylinder()).bytes(), "a.3dm", SurfaceSettings()).sent
     )
@@ -195,7 +195,7 @@ def test_copies_in_place_count_once_and_are_told() -> None:
 def test_one_of_several_alike_is_taken_unless_their_names_differ() -> None:
     chosen = Model().add(mesh_at()).add(mesh_at(50)).add(mesh_at(100)).choose()
     assert len(chosen.used) == 1
-    assert "Taken: object" in chosen.told[-1]
+    assert "Taken: object" in chosen.notes[-1]
     with pytest.raises(SeveralObjectsError):
         Model().add(mesh_at(), "a").add(mesh_at(50), "b").choose()
 
@@ -214,8 +214,15 @@ def test_neither_ground_nor_a_small_tube_stands_for_a_building(side: float) -> N
 
 def test_a_file_without_surfaces_names_what_it_holds() -> None:
     line = rhino3dm.LineCurve(rhino3dm.Point3d(0, 0, 0), rhino3dm.Point3d(1, 0, 0))
-    with pytest.raises(UnreadableFileError, match="1 LineCurve"):
+    with pytest.raises(UnreadableFileError, match="1 curves"):
         Model().add(line).choose()
+
+
+def test_smaller_pieces_of_the_mesh_that_is_taken_are_told_with_their_place() -> None:
+    n = len(VERTICES)
+    far = np.array([500.0, 0, 0])
+    model = Model().add(rhino_mesh(np.vstack([VERTICES, 0.4 * VERTICES + far]), [*QUADS, *(QUADS + n)]))
+    assert "1 other piece of the same object left out, at (" in " ".join(model.choose().notes)
 
 
 def test_strays_are_left_out_and_told_with_their_place() -> None:
@@ -225,8 +232,8 @@ def test_strays_are_left_out_and_told_with_their_place() -> None:
     chosen = model.choose()
     assert isinstance(chosen.geometry, SentMesh)
     assert len(surface_from_mesh(chosen.geometry).loops) == 2
-    assert "1 stray piece of 1 face" in chosen.told[0]
-    assert "(500.1, 500.1, 0)" in chosen.told[0]
+    assert "1 stray piece of 1 face" in chosen.notes[0]
+    assert "(500.1, 500.1, 0)" in chosen.notes[0]
 
 
 @pytest.mark.parametrize("at", [0, len(VERTICES) // 2])
@@ -240,7 +247,7 @@ def test_a_fin_is_called_one(at: int) -> None:
     sent = sent_surface("\n".join(lines).encode(), "fin.obj", SurfaceSettings(), 10_000).sent
     assert sent.mesh is not None
     assert len(surface_from_mesh(sent.mesh).loops) == 2
-    assert sent.told[0].startswith("1 fin of 1 face in all left out, at (")
+    assert sent.notes[0].startswith("1 fin of 1 face in all left out, at (")
 
 
 def parts(shift: float) -> Model:
@@ -257,21 +264,21 @@ def test_meshes_whose_edges_meet_become_one() -> None:
     assert isinstance(chosen.geometry, SentMesh)
     assert names(chosen) == ["a", "b"]
     assert len(surface_from_mesh(chosen.geometry).loops) == 2
-    assert "2 objects were joined along their edges: the greatest gap closed was 0.0004" in chosen.told[0]
+    assert "2 objects were joined along their edges: the greatest gap closed was 0.0004" in chosen.notes[0]
 
 
 def test_edges_that_nearly_meet_are_told_with_where_and_how_far() -> None:
     model = parts(4e-3)
     with pytest.raises(SeveralObjectsError, match=r"comes within 0.004 of the surface at .* not joined"):
         model.choose()
-    told = model.add(mesh_at(80), "tower").choose("[at]*").told
+    told = model.add(mesh_at(80), "tower").choose("[at]*").notes
     assert any("'tower'" in sentence for sentence in told)
     ring = (
         Model()
         .add(mesh_at(), "tower")
         .add(plane(VERTICES[:, 0].max() + 0.02, 0.5, VERTICES[:, 2].max()), "sill")
     )
-    (nearly, _) = ring.choose().told
+    (nearly, _) = ring.choose().notes
     assert "'sill' comes within 0.02" in nearly or "was not joined" in nearly
 
 
@@ -287,7 +294,7 @@ def test_surfaces_whose_edges_meet_become_one() -> None:
     chosen = Model().add(arcs[0], "a").add(arcs[1], "b").choose()
     assert isinstance(chosen.geometry, Brep)
     assert names(chosen) == ["a", "b"]
-    assert "2 objects were joined" in chosen.told[0]
+    assert "2 objects were joined" in chosen.notes[0]
 
 
 def nested(*transforms: rhino3dm.Transform) -> SentMesh:
@@ -352,7 +359,7 @@ def test_a_seam_open_by_less_than_the_tolerance_closes() -> None:
         surface.Points[last, j] = rhino3dm.Point4d(point.X + 5e-4, point.Y, point.Z, point.W)
     read = sent_surface(Model().add(surface).bytes(), "a.3dm", SurfaceSettings())
     assert len(take_in(read.sent).loops) == 2
-    assert "up to 0.0005 apart" in read.sent.told[0]
+    assert "up to 0.0005 apart" in read.sent.notes[0]
 
 
 @pytest.mark.parametrize(("double", "told"), [(False, 1), (True, 0)])
@@ -365,7 +372,7 @@ def test_single_precision_far_from_the_origin_is_told(double: bool, told: int) -
     for quad in QUADS.tolist():
         far.Faces.AddFace(*quad)
     chosen = Model().add(far, "tower").choose()
-    assert len([x for x in chosen.told if "single precision, exact to 0.5" in x]) == told
+    assert len([x for x in chosen.notes if "single precision, exact to 0.5" in x]) == told
     assert isinstance(chosen.geometry, SentMesh)
     assert np.array_equal(chosen.geometry.vertices, points) == double
 

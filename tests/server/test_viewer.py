@@ -225,41 +225,62 @@ def obj_surface(text: str) -> dict[str, Any]:
     }
 
 
-def test_sample_solves_and_panels_can_be_picked_and_read(browser, server: Server) -> None:
-    with opened(browser, server) as page:
-        page.select_option("#sample", "tower")
-        job = shown(page)
-        result = fetched(server, f"/v1/jobs/{job}/result")
-        i = facing_panel(page)
-        page.mouse.click(*on_screen(page, "panels.center", i))
-        label = page.locator("#card dd").first.inner_text()
-        assert label == result["panels"]["label"][i]
-        assert page.locator("#card svg.outline text").count() == len(result["panels"]["polygons"][i])
-        # the legend counts what the result counts
-        counts = [int(t.removeprefix("× ")) for t in page.locator("#legend td:last-child").all_inner_texts()]
-        assert sum(counts) == len(result["panels"]["polygons"])
-        # each way of colouring has a legend of its own
-        for mode in ("planarity", "gap", "distance", "scale"):
-            page.select_option("#mode", mode)
-            assert page.locator("#legend .ramp").count() == 1, mode
-        # brackets step from panel to panel
-        page.locator("#view3d canvas").focus()
-        page.keyboard.press("]")
-        assert (
-            page.locator("#card dd").first.inner_text()
-            == result["panels"]["label"][(i + 1) % len(result["panels"]["label"])]
-        )
-        assert page.complaints == []
-
-
-def test_hover_is_linked_between_space_and_domain(browser, server: Server) -> None:
+@pytest.fixture(scope="class")
+def tower(browser, server: Server) -> Iterator[Page]:
+    """A page that shows the tower."""
     with opened(browser, server) as page:
         page.select_option("#sample", "tower")
         shown(page)
-        page.mouse.move(*on_screen(page, "panels.center", facing_panel(page)))
-        page.wait_for_timeout(300)
+        yield page
+
+
+class TestResult:
+    """What is read off one result, all on one page."""
+
+    def test_sample_solves_and_panels_can_be_picked_and_read(self, tower: Page, server: Server) -> None:
+        job = tower.evaluate("document.documentElement.dataset.shown")
+        result = fetched(server, f"/v1/jobs/{job}/result")
+        i = facing_panel(tower)
+        tower.mouse.click(*on_screen(tower, "panels.center", i))
+        label = tower.locator("#card dd").first.inner_text()
+        assert label == result["panels"]["label"][i]
+        assert tower.locator("#card svg.outline text").count() == len(result["panels"]["polygons"][i])
+        # the legend counts what the result counts
+        counts = [int(t.removeprefix("× ")) for t in tower.locator("#legend td:last-child").all_inner_texts()]
+        assert sum(counts) == len(result["panels"]["polygons"])
+        # each way of colouring has a legend of its own
+        for mode in ("planarity", "gap", "distance", "scale"):
+            tower.select_option("#mode", mode)
+            assert tower.locator("#legend .ramp").count() == 1, mode
+        # brackets step from panel to panel
+        tower.locator("#view3d canvas").focus()
+        tower.keyboard.press("]")
+        assert (
+            tower.locator("#card dd").first.inner_text()
+            == result["panels"]["label"][(i + 1) % len(result["panels"]["label"])]
+        )
+        assert tower.complaints == []
+
+    def test_hover_is_linked_between_space_and_domain(self, tower: Page) -> None:
+        tower.mouse.move(*on_screen(tower, "panels.center", facing_panel(tower)))
+        tower.wait_for_timeout(300)
         shown_lines = f"() => {{ {INSIDE} return [space, domain].map((v) => v.layer.pointed.group.visible) }}"
-        assert page.evaluate(shown_lines) == [True, True]
+        assert tower.evaluate(shown_lines) == [True, True]
+
+    def test_files_are_downloaded(self, tower: Page) -> None:
+        with tower.expect_download() as download:
+            tower.click("#files a[download='panels.csv']")
+        lines = Path(download.value.path()).read_text(encoding="utf-8-sig").splitlines()
+        assert len(lines) == 1 + len(tower.evaluate(f"() => {{ {INSIDE} return state.result.panels.label }}"))
+
+    def test_copied_curl_request_is_the_request(self, tower: Page, server: Server) -> None:
+        tower.context.grant_permissions(["clipboard-read", "clipboard-write"])
+        tower.click("#copy-curl")
+        tower.wait_for_function("() => document.getElementById('copied').textContent !== ''")
+        text = tower.evaluate("navigator.clipboard.readText()")
+        body = json.loads(text.split(" -d '", 1)[1][:-1].replace("'\\''", "'"))
+        assert text.startswith(f"curl -s {server.url}/v1/solve")
+        assert body["pattern"]["kind"] == "hex"
 
 
 def test_choosing_a_number_of_sizes_on_the_curve_recomputes(browser, server: Server) -> None:
@@ -569,29 +590,6 @@ def test_the_page_outlives_a_restart_of_the_server(browser, server: Server) -> N
         assert len(fetched(server, f"/v1/jobs/{job}/result?include=sizes")["sizes"]) == 4
 
 
-def test_files_are_downloaded(browser, server: Server) -> None:
-    with opened(browser, server) as page:
-        page.select_option("#sample", "tower")
-        shown(page)
-        with page.expect_download() as download:
-            page.click("#files a[download='panels.csv']")
-        lines = Path(download.value.path()).read_text(encoding="utf-8-sig").splitlines()
-        assert len(lines) == 1 + len(page.evaluate(f"() => {{ {INSIDE} return state.result.panels.label }}"))
-
-
-def test_copied_curl_request_is_the_request(browser, server: Server) -> None:
-    with opened(browser, server) as page:
-        page.context.grant_permissions(["clipboard-read", "clipboard-write"])
-        page.select_option("#sample", "tower")
-        shown(page)
-        page.click("#copy-curl")
-        page.wait_for_function("() => document.getElementById('copied').textContent !== ''")
-        text = page.evaluate("navigator.clipboard.readText()")
-        body = json.loads(text.split(" -d '", 1)[1][:-1].replace("'\\''", "'"))
-        assert text.startswith(f"curl -s {server.url}/v1/solve")
-        assert body["pattern"]["kind"] == "hex"
-
-
 def test_a_failed_job_is_never_shown_on_another_surface(browser, server: Server) -> None:
     corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1]]
     fan = {"vertices": corners, "faces": [[0, 1, 2], [1, 0, 3], [0, 1, 4]]}  # three faces at an edge
@@ -650,21 +648,35 @@ def test_theme_and_keyboard(browser, server: Server) -> None:
         assert not wanted
 
 
-@pytest.mark.skipif(
-    shutil.which("npm") is None, reason="npm is not installed: the bundle cannot be built again"
-)
-def test_the_bundle_is_what_the_source_builds(tmp_path: Path) -> None:
-    copy = tmp_path / "server" / "viewer"
-    shutil.copytree(VIEWER, copy, ignore=shutil.ignore_patterns("node_modules"))
+@pytest.fixture(scope="module")
+def build(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of the source beside which the build's packages are installed."""
+    folder = tmp_path_factory.mktemp("build") / "server" / "viewer"
+    shutil.copytree(VIEWER, folder, ignore=shutil.ignore_patterns("node_modules"))
     npm = shutil.which("npm")
     done = subprocess.run(
-        [npm, "install", "--silent"], cwd=copy, capture_output=True, text=True, timeout=PATIENCE
+        [npm, "install", "--silent"], cwd=folder, capture_output=True, text=True, timeout=PATIENCE
     )
     if done.returncode:
         pytest.skip(f"npm could not install the build's packages: {done.stderr.strip()[-200:]}")
-    subprocess.run([npm, "run", "check"], cwd=copy, check=True, capture_output=True, timeout=PATIENCE)
-    subprocess.run([npm, "run", "build"], cwd=copy, check=True, capture_output=True, timeout=PATIENCE)
-    built = tmp_path / "server" / "hexwrap_server" / "static"
+    return folder
+
+
+@pytest.mark.long  # as the types of the Python code
+@pytest.mark.skipif(
+    shutil.which("npm") is None, reason="npm is not installed: the bundle cannot be built again"
+)
+def test_types_of_the_source_are_content(build: Path) -> None:
+    subprocess.run([shutil.which("npm"), "run", "check"], cwd=build, check=True, timeout=PATIENCE)
+
+
+@pytest.mark.skipif(
+    shutil.which("npm") is None, reason="npm is not installed: the bundle cannot be built again"
+)
+def test_the_bundle_is_what_the_source_builds(build: Path) -> None:
+    npm = shutil.which("npm")
+    subprocess.run([npm, "run", "build"], cwd=build, check=True, capture_output=True, timeout=PATIENCE)
+    built = build.parent / "hexwrap_server" / "static"
     for name in sorted(p.name for p in STATIC.iterdir()):
         assert (built / name).read_bytes() == (STATIC / name).read_bytes(), (
             f"{name}: run npm run build in server/viewer"

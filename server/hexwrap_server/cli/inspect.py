@@ -29,14 +29,15 @@ def print_content(console: Console, data: bytes, filename: str, settings: Surfac
     except HexwrapError as error:
         refusal = error.detail
     tolerance = f", tolerance {content.tolerance:g}" if content.tolerance else ""
-    console.print(f"{filename}: {len(content.objects)} surfaces, unit {unit or 'not known'}{tolerance}")
+    count = len(content.objects)
+    console.print(f"{filename}: {count} surface{'s' * (count != 1)}, unit {unit or 'not known'}{tolerance}")
     console.print(_table(content, chosen, unit))
     if len(content.objects) > MOST_ROWS:
         console.print(f"… and {len(content.objects) - MOST_ROWS} more")
     if content.others:
         others = ", ".join(f"{count} {kind}" for kind, count in sorted(content.others.items()))
         console.print(f"Besides: {others}")
-    for sentence in (refusal,) if refusal else chosen.told if chosen else ():
+    for sentence in (refusal,) if refusal else chosen.notes if chosen else ():
         console.print(sentence)
     return 1 if refusal else 0
 

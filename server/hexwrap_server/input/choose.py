@@ -16,6 +16,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from hexwrap_server.input.object_words import (
+    apart_from,
     coarse_numbers,
     copies,
     joint,
@@ -26,10 +27,11 @@ from hexwrap_server.input.object_words import (
     rows,
     strays,
 )
-from hexwrap_server.input.parts import Part, brep_where_needed, parts_of
+from hexwrap_server.input.parts import COARSEST, Part, brep_where_needed, parts_of
 from hexwrap_server.input.readers.errors import NoObjectError, SeveralObjectsError, UnreadableFileError
-from hexwrap_server.input.readers.found import FileContent, Found, Geometry
+from hexwrap_server.input.readers.found import LINKED, FileContent, Found, Geometry
 from hexwrap_solver.surface import SentMesh
+from hexwrap_solver.surface.weld import TOLERANCE
 
 #: Of several parts that could be meant, one that counts for this many times the next is meant.
 DOMINANT = 1.3
@@ -51,11 +53,11 @@ MOST = 300
 
 @dataclass(frozen=True)
 class Chosen:
-    """What a file stands for. told: sentences for the user. used: the objects it is made of."""
+    """What a file stands for. notes: sentences for the user. used: the objects it is made of."""
 
     geometry: Geometry
     used: tuple[Found, ...]
-    told: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 def choose(
@@ -69,8 +71,8 @@ def choose(
     if content.mesh is None and len(meant) == 1:
         geometry = meant[0].read()
         if not isinstance(geometry, SentMesh):
-            geometry, told = brep_where_needed(geometry, content.tolerance)
-            return Chosen(geometry, tuple(meant), (*told, *others(content, meant)))
+            geometry, notes = brep_where_needed(geometry, content.tolerance)
+            return Chosen(geometry, tuple(meant), (*notes, *others(content, meant)))
     meant = sorted(meant, key=lambda item: -max(item.size))[:MOST]
     found = parts_of(content, meant)
     if not found.parts:
@@ -92,13 +94,14 @@ def choose(
         raise several(content, [meant[i] for part in near for i in part.members], len(near), unit, gaps, fins)
     part = next((other for other in alike if _is_exact(other, meant)), best)
     used = [meant[i] for i in part.members]
-    geometry, told = brep_where_needed(part.make(), content.tolerance)
+    geometry, notes = brep_where_needed(part.make(), content.tolerance)
     if len(used) > 1 or len(meant) == 1:
-        told += joint(part.joint, content.tolerance or 0.0, len(used))
-    told += strays([piece for members, piece in found.strays if members & set(part.members)])
-    told += list(apart.values())[:SHOWN]
-    told += coarse_numbers(geometry, content.tolerance)
-    return Chosen(geometry, tuple(used), (*told, *copies(len(found.copies)), *others(content, used)))
+        notes += joint(part.joint, content.tolerance, len(used))
+    notes += apart_from([other.box for other in found.parts if other is not part and _shares(other, part)])
+    notes += strays([piece for members, piece in found.strays if members & set(part.members)])
+    notes += list(apart.values())[:SHOWN]
+    notes += coarse_numbers(geometry, content.tolerance)
+    return Chosen(geometry, tuple(used), (*notes, *copies(len(found.copies)), *others(content, used)))
 
 
 def _weight(part: Part) -> float:
@@ -123,6 +126,11 @@ def _is_alike(one: Part, other: Part, meant: Sequence[Found]) -> bool:
     return bool(near and (in_place or abs(one.area - other.area) <= ALIKE * one.area))
 
 
+def _shares(one: Part, other: Part) -> bool:
+    """Whether both are of one object."""
+    return bool(set(one.members) & set(other.members))
+
+
 def _is_exact(part: Part, meant: Sequence[Found]) -> bool:
     """Whether it is a surface rather than the mesh of one."""
     return all(meant[i].kind != "mesh" for i in part.members)
@@ -135,7 +143,9 @@ def named(content: FileContent, object: str | None, layer: str | None) -> list[F
         held = ", ".join(f"{count} {kind}" for kind, count in sorted(content.others.items()))
         raise UnreadableFileError(
             f"The file holds no mesh, surface, polysurface, extrusion or SubD ({held or 'nothing at all'}): "
-            "in Rhino, make one with Loft, ExtrudeCrv or NetworkSrf, or run ExtractSrf on a solid."
+            "in Rhino, "
+            + ("embed linked blocks with BlockManager, or " if LINKED in content.others else "")
+            + "make one with Loft, ExtrudeCrv or NetworkSrf, and save it with the file."
         )
     if object is None and layer is None:
         seen = [found for found in objects if found.visible and not found.locked]
@@ -188,25 +198,28 @@ def _nearly(
     part: Part, others: Sequence[Part], meant: Sequence[Found], content: FileContent
 ) -> dict[int, str]:
     """Where edges of other parts come near, but not within the tolerance: a sentence by id of the part."""
-    tolerance = content.tolerance
+    size = float(np.linalg.norm(np.ptp(part.box, axis=0)))
+    tolerance = TOLERANCE * size if content.tolerance is None else content.tolerance
+    reach = COARSEST * size if content.tolerance is None else NEARLY * tolerance
+    allowed = "" if content.tolerance is None else f", more than the file's tolerance of {tolerance:g},"
     number = {id(item): i for i, item in enumerate(content.objects)}
-    if tolerance is None or not len(part.rim):
+    if not len(part.boundary):
         return {}
-    told = {}
-    tree = cKDTree(part.rim)
+    notes = {}
+    tree = cKDTree(part.boundary)
     for other in others:
-        if not len(other.rim):
+        if not len(other.boundary):
             continue
-        distance = np.asarray(tree.query(other.rim)[0])
+        distance = np.asarray(tree.query(other.boundary)[0])
         k = int(np.argmin(np.where(distance > tolerance, distance, np.inf)))
-        if tolerance < distance[k] < NEARLY * tolerance:
-            near = meant[other.members[0]]
-            told[id(other)] = (
-                f"{label(near, number[id(near)])} comes within {distance[k]:.3g} of the "
-                f"surface at {point(other.rim[k])}, more than the file's tolerance of {tolerance:g}, and was "
-                "not joined: close the gap with Rhino's MatchSrf or JoinEdge."
+        if tolerance < distance[k] < reach:
+            near = label(meant[other.members[0]], number[id(meant[other.members[0]])])
+            notes[id(other)] = (
+                f"{near[0].upper()}{near[1:]} comes within {distance[k]:.3g} of the surface at "
+                f"{point(other.boundary[k])}{allowed} and was not joined: close the gap with Rhino's "
+                "MatchSrf or JoinEdge."
             )
-    return told
+    return notes
 
 
 def several(

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from hexwrap_server.input.readers.found import FileContent, Found, Geometry
+from hexwrap_solver.arrays import Floats
 from hexwrap_solver.surface import SentMesh
 from hexwrap_solver.surface.pieces import Joint, Piece
 
@@ -17,11 +18,12 @@ SHOWN, LISTED = 5, 200
 NONE = 1e-6
 
 
-def joint(joint: Joint, tolerance: float, objects: int) -> list[str]:
-    if joint.count == 0 or (objects == 1 and joint.gap <= NONE * tolerance):
+def joint(joint: Joint, tolerance: float | None, objects: int) -> list[str]:
+    is_exact = tolerance is None or joint.gap <= NONE * tolerance
+    if objects == 1 and (joint.count == 0 or is_exact):
         return []
     what = f"{objects} objects were joined along their edges" if objects > 1 else "Open edges were joined"
-    if joint.gap <= NONE * tolerance:
+    if is_exact:
         return [f"{what}."]
     return [
         f"{what}: the greatest gap closed was {joint.gap:.3g}, at {point(joint.place)}, within the file's "
@@ -46,6 +48,16 @@ def coarse_numbers(geometry: Geometry, tolerance: float | None) -> list[str]:
 def copies(count: int) -> tuple[str, ...]:
     what = "1 object covers another one exactly" if count == 1 else f"{count} objects cover others exactly"
     return (f"{what}: left out (Rhino's SelDup selects such).",) if count else ()
+
+
+def apart_from(boxes: Sequence[Floats]) -> list[str]:
+    """About further pieces of what was taken, by their boxes (2, 3)."""
+    if not boxes:
+        return []
+    places = ", ".join(point(box.mean(axis=0)) for box in boxes[:SHOWN])
+    more = f" and {len(boxes) - SHOWN} more" if len(boxes) > SHOWN else ""
+    count = "1 other piece" if len(boxes) == 1 else f"{len(boxes)} other pieces"
+    return [f"{count} of the same object left out, at {places}{more} (Rhino's SplitDisjointMesh parts them)."]
 
 
 def strays(strays: Sequence[Piece]) -> list[str]:

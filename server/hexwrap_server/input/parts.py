@@ -32,13 +32,13 @@ COARSEST = 1e-3
 class Part:
     """Something that hangs together. members: places of its objects. area: of a mesh, or of control nets.
 
-    make: its geometry. rim: (k, 3) points on its boundary. box: (2, 3) its lowest and highest coordinates.
+    make: its geometry. boundary: (k, 3) points on it. box: (2, 3) its lowest and highest coordinates.
     """
 
     members: tuple[int, ...]
     loops: int
     area: float
-    rim: Floats
+    boundary: Floats
     box: Floats
     make: Callable[[], Geometry]
     joint: Joint
@@ -142,7 +142,7 @@ def _add_meshes(mesh: SentMesh, owner: Ints, tolerance: float | None, found: Par
                     tuple(members),
                     piece.loops,
                     piece.area,
-                    piece.rim,
+                    piece.boundary,
                     np.array([piece.low, piece.high]),
                     partial(only, mesh, piece.faces),
                     joint,
@@ -169,11 +169,11 @@ def _add_breps(objects: list[tuple[int, NurbsSurface | Brep]], tolerance: float 
     for faces in _connected(whole):
         members = tuple(np.unique(owner[faces]).tolist())
         own = [geometry for i, geometry in objects if i in members]
-        rim, loops = _naked(whole, faces)
+        boundary, loops = _naked(whole, faces)
         make = partial(_same, own[0]) if len(own) == 1 else partial(_some, whole, faces)
         nets = np.concatenate([whole.faces[f].surface.control_points[..., :3].reshape(-1, 3) for f in faces])
         box = np.array([nets.min(axis=0), nets.max(axis=0)])
-        found.parts.append(Part(members, loops, _net_area(whole, faces), rim, box, make, joint))
+        found.parts.append(Part(members, loops, _net_area(whole, faces), boundary, box, make, joint))
 
 
 def _same(geometry: Geometry) -> Geometry:
@@ -200,13 +200,13 @@ def brep_where_needed(geometry: Geometry, tolerance: float | None) -> tuple[Geom
     brep = brep_of_surface(geometry, exact if is_tube else wide)
     if is_tube and all(trim.edge >= 0 for loop in brep.faces[0].loops for trim in loop):
         return geometry, []
-    told = [
+    notes = [
         f"The ends of the surface in {'uv'[d]} are up to {end_gap(geometry, d):.3g} apart and were made one "
         f"seam, within the file's tolerance of {wide:g}."
         for d in (0, 1)
         if closed_within(geometry, wide)[d] and not closed_within(geometry, exact)[d]
     ]
-    return brep, told
+    return brep, notes
 
 
 def _some(brep: Brep, faces: Iterable[int]) -> Brep:

@@ -17,7 +17,7 @@ class SentSurface:
     """A surface as it was sent: a mesh, a NURBS surface or a Brep.
 
     settings: how to take it in, for requests that say nothing of that beside its id. unit, tolerance, origin:
-    of the file it is from. told: what was found and done when that was read, a sentence each.
+    of the file it is from. notes: what was found and done when that was read, a sentence each.
     """
 
     mesh: SentMesh | None = None
@@ -27,7 +27,7 @@ class SentSurface:
     unit: str | None = None
     tolerance: float | None = None
     origin: Origin = field(default_factory=Origin)
-    told: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

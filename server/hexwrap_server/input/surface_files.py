@@ -94,7 +94,7 @@ def sent_surface(
         unit=settings.unit or content.unit,
         tolerance=content.tolerance,
         origin=Origin(first.name, first.layer, tuple(sorted(first.attributes.items()))),
-        told=chosen.told,
+        notes=chosen.notes,
     )
     return FromFile(sent, rows(content.objects, chosen.used))
 

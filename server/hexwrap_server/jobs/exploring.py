@@ -52,12 +52,12 @@ async def explore(
     order: Order,
     name: str,
     identify: Callable[[Any], Work],
-    told: Callable[[str, float], None],
+    report: Callable[[str, float], None],
     found: Callable[[int, dict[str, Any]], None],
 ) -> Outcome:
-    """told: stage and share of the whole. found: number of a variant and its document, when it is foreseen
+    """report: stage and share of the whole. found: number of a variant and its document, when it is foreseen
     and again when it is measured. Raises HexwrapError."""
-    told("plan", 0.0)
+    report("plan", 0.0)
     groups = await hands.call(STEPS + "plan", order, hands.caching)
     done = 0
 
@@ -65,10 +65,10 @@ async def explore(
         nonlocal done
         seen = await hands.call(STEPS + "look", order, hands.caching, group)
         done += 1
-        told("foresee", LOOKING + (SOLVING - LOOKING) * done / len(groups))
+        report("foresee", LOOKING + (SOLVING - LOOKING) * done / len(groups))
         return seen
 
-    told("foresee", LOOKING)
+    report("foresee", LOOKING)
     looks = await _at_most(hands.at_once, [partial(look, group) for group in groups])
     candidates = [one for seen in looks for one in seen]
     documents, picked, refused = await hands.errand(STEPS + "begin", order, name, candidates)
@@ -86,10 +86,10 @@ async def explore(
         except HexwrapError as error:
             documents[i] |= {"problem": error.detail}
         done += 1
-        told("solve", SOLVING + (1 - SOLVING) * done / len(picked))
+        report("solve", SOLVING + (1 - SOLVING) * done / len(picked))
         found(i, documents[i])
 
-    told("solve", SOLVING)
+    report("solve", SOLVING)
     await _at_most(hands.at_once, [partial(measure, i, wanted) for i, wanted in picked])
     outcome: Outcome = await hands.errand(STEPS + "finish", order, documents, refused)
     return outcome

@@ -426,7 +426,7 @@ class JobManager:
         start = time.monotonic()
         begun: dict[str, float] = {}
 
-        def told(stage: str, fraction: float) -> None:
+        def report(stage: str, fraction: float) -> None:
             begun.setdefault(stage, time.monotonic() - start)
             self._change(item, stage=stage, progress=round(fraction, 4))
 
@@ -442,7 +442,7 @@ class JobManager:
         seconds = self._settings.explore_seconds
         try:
             async with asyncio.timeout(seconds):
-                outcome = await explore(self, order, name, identify, told, found)
+                outcome = await explore(self, order, name, identify, report, found)
         except TimeoutError:
             raise TimeLimitError(
                 f"The exploration was stopped after {seconds:g} s, the limit of this server; ask for fewer "

@@ -104,9 +104,9 @@ def take_in(sent: SentSurface, asked: SurfaceSettings | None = None) -> Surface:
         surface = with_lines(surface, settings.features.lines)
     surface = with_openings(surface, settings.openings)
     unit = settings.unit or sent.unit
-    if (unit, sent.origin, sent.told) == (None, Origin(), ()):
+    if (unit, sent.origin, sent.notes) == (None, Origin(), ()):
         return surface
-    repairs = (*sent.told, *surface.repairs)
+    repairs = (*sent.notes, *surface.repairs)
     return replace(surface, unit=unit, origin=sent.origin, repairs=repairs).knowing(surface)
 
 

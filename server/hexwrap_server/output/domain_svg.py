@@ -26,6 +26,9 @@ SIDE, MARGIN = 1400.0, 90.0
 MAX_FACES = 30_000
 #: More corners than this are marked, but not named.
 MAX_NAMES = 40
+#: Names of loops, pixels: openings up to five times ROOM take theirs in their middle, in letters from
+#: SMALLEST to LARGEST, a letter being CHARACTER times as wide as high.
+ROOM, SMALLEST, LARGEST, CHARACTER = 34, 8.0, 20.0, 0.6
 #: The apex is shown where it is not further from the domain than this many times the domain's size.
 APEX_REACH = 0.6
 
@@ -189,12 +192,16 @@ def _loops(cmap: ConformalMap, frame: Frame, unrolled: Unrolled) -> list[str]:
     for number, (loop, sides) in enumerate(zip(cmap.surface.loops, unrolled.loops, strict=True)):
         parts.append(_path(_polylines(frame, unrolled.lines(sides)), f"loop loop{number}"))
         places = unrolled.start[sides]
+        name = _name_inside(frame, places, unrolled.end[sides], f"loop {number}")
+        if name:
+            parts.append(name)
+            continue
         # The name stands where no corner's angle does, and away from the cut.
         taken = np.append(places[np.isin(loop, marked)], unrolled.end[unrolled.cut])
         free = np.abs(places[:, None] - taken).min(axis=1, initial=np.inf)
         middle = sides[int(np.argmax(free)) if len(taken) else len(sides) // 2]
         along = unrolled.end[middle] - unrolled.start[middle]
-        away = along / abs(along) * -1j * 34 / frame.scale
+        away = along / abs(along) * -1j * ROOM / frame.scale
         x, y = frame.at(unrolled.start[middle] + away)
         turn = -np.degrees(np.angle(along))
         arrow, turn = ("→", turn) if abs(turn) <= 90 else ("←", turn - np.copysign(180, turn))
@@ -204,6 +211,25 @@ def _loops(cmap: ConformalMap, frame: Frame, unrolled: Unrolled) -> list[str]:
             f'transform="translate({x:.2f} {y:.2f}) rotate({turn:.2f})">{words}</text>'
         )
     return parts
+
+
+def _name_inside(frame: Frame, start: Complexes, end: Complexes, name: str) -> str:
+    """The name in the middle of an opening that a name along its side would be too long for; else nothing.
+    start, end: (k,) of the loop's sides."""
+    middle = (start + end) / 2
+    width, height = np.ptp(middle.real) * frame.scale, np.ptp(middle.imag) * frame.scale
+    closed = np.abs(end - np.roll(start, -1)).max() * frame.scale < 1
+    inside_out = float((np.conj(start) * end).imag.sum()) < 0  # the domain lies around it
+    if not (closed and inside_out and max(width, height) < 5 * ROOM):
+        return ""
+    x, y = frame.at(
+        (middle.real.max() + middle.real.min() + 1j * (middle.imag.max() + middle.imag.min())) / 2
+    )
+    size = float(np.clip(0.9 * width / (CHARACTER * len(name)), SMALLEST, LARGEST))
+    return (
+        f'<text class="named halo" style="font-size:{size:.1f}px" text-anchor="middle" '
+        f'dominant-baseline="central" x="{x:.2f}" y="{y:.2f}">{name}</text>'
+    )
 
 
 def _corner_marks(cmap: ConformalMap, frame: Frame, unrolled: Unrolled) -> list[str]:

@@ -7,7 +7,7 @@ from typing import TypeVar
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.csgraph import breadth_first_order
+from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
 
 from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints
 from hexwrap_solver.conformal.cut import Cut, cut_open
@@ -23,6 +23,8 @@ Numbers = TypeVar("Numbers", Floats, Complexes)
 #: An apex further away than this many times the size of the domain is not made the origin: coordinates would
 #: lose the digits in which they agree.
 FAR = 100.0
+#: Shorter edges, relative to the longest one, count as so long where squares of lengths are weights.
+FINEST = 1e-100
 #: A translation shorter than this, relative to the domain, is none (flat rings that close up by themselves).
 NO_TRANSLATION = 1e-10
 
@@ -37,12 +39,17 @@ class Layout:
 
 
 def lay_out(
-    surface: Surface, lengths: Floats, metric: Corners, curvature: Floats, cones: Ints | None = None
+    surface: Surface,
+    lengths: Floats,
+    metric: Corners,
+    curvature: Floats,
+    cones: Ints | None = None,
+    rounding: Floats | None = None,
 ) -> Layout:
     """Develops the triangles over a breadth-first tree of the faces and closes the result along the cut.
 
     lengths, metric: (3, m) of the flat metric (row k: corner k, and the edge opposite to it).
-    curvature: (b + c,) Σκ of every loop, and of the vertices ``cones`` (c,).
+    curvature: (b + c,) Σκ of every loop, and of the vertices ``cones`` (c,). rounding: see ``FaceTree.of``.
 
     Annuli: g is one turn around the surface in the direction of loop 0 (surface on its left). On a
     cylinder it moves along +x, and loop 0 lies around y = 0 with the surface above. Cone: the apex is the
@@ -52,10 +59,10 @@ def lay_out(
     """
     nothing = np.zeros(0, dtype=np.int64)
     cut = cut_open(surface, nothing if cones is None else cones)
-    place = develop(FaceTree.of(cut.twin), lengths, metric)
+    place = develop(FaceTree.of(cut.twin, rounding), lengths, metric)
     # The holonomy of what lies beyond a piece, seen from its right, is a rotation by minus its curvature.
     angle = -(cut.beyond @ curvature)
-    glued = _glue(surface, place, cut, angle)
+    glued = _glue(surface, place, lengths / lengths.max(), cut, angle)
     if len(surface.loops) != 2 or len(curvature) != 2:
         net = _upright_net(_net(surface, cut, glued, angle))
         size = abs(net.corners).max()
@@ -80,13 +87,17 @@ class FaceTree:
     there: Ints
 
     @classmethod
-    def of(cls, twin: Ints) -> FaceTree:
-        """twin: (3m,) half-edges across, −1 where there is none; face 0 is the root."""
+    def of(cls, twin: Ints, rounding: Floats | None = None) -> FaceTree:
+        """twin: (3m,) half-edges across, −1 where there is none; face 0 is the root. rounding: (3m,) of the
+        direction of each half-edge in its face, in any unit; the tree avoids the largest."""
         m = len(twin) // 3
         neighbour = np.where(twin >= 0, twin, np.arange(3 * m)) // 3  # itself, where there is none
         starts = np.arange(0, 3 * m + 1, 3)
-        graph = sparse.csr_matrix((np.ones(3 * m, dtype=np.int8), neighbour, starts), shape=(m, m))
-        found, before = breadth_first_order(graph, 0)
+        weight = np.ones(3 * m, dtype=np.int8) if rounding is None else np.maximum(rounding, rounding[twin])
+        graph = sparse.csr_matrix((weight, neighbour, starts), shape=(m, m))
+        if rounding is not None:
+            graph = sparse.csr_matrix(minimum_spanning_tree(graph))
+        found, before = breadth_first_order(graph, 0, directed=rounding is None)
         order, parent = found.astype(np.int64), before.astype(np.int64)
         parent[0] = 0
         place = np.empty(m, dtype=np.int64)
@@ -153,7 +164,7 @@ class _Glued:
     disagreement: float
 
 
-def _glue(surface: Surface, corners: Complexes, cut: Cut, angle: Floats) -> _Glued:
+def _glue(surface: Surface, corners: Complexes, lengths: Floats, cut: Cut, angle: Floats) -> _Glued:
     """Motions across the cut, and one place for every vertex.
 
     The left side of each piece is M(right side), M rotates by a known ``angle`` (p,); its translation is
@@ -163,8 +174,10 @@ def _glue(surface: Surface, corners: Complexes, cut: Cut, angle: Floats) -> _Glu
     flat = surface.faces.T.ravel()
     fan = cut.fan.reshape(-1, 3).T.ravel()
     away = fan > 0
-    home = _mean_position(flat[~away], corners.ravel()[~away], n)
-    copies = _mean_position(fan, corners.ravel(), fans)
+    # Ends of a short edge are taken from the same triangles, so that it keeps its direction.
+    weight = np.tile(np.maximum(lengths.min(axis=0), FINEST) ** -2.0, 3)
+    home = _mean_position(flat[~away], corners.ravel()[~away], n, weight[~away])
+    copies = _mean_position(fan, corners.ravel(), fans, weight)
     if not len(cut.left):
         return _Glued(home, np.ones(1, complex), np.zeros(1, complex), np.zeros(0, complex), 0.0)
     right = surface.twin[cut.left]
@@ -181,7 +194,9 @@ def _glue(surface: Surface, corners: Complexes, cut: Cut, angle: Floats) -> _Glu
     at_left = np.where(one > 0, copies[one], home[vertex])
     at_right = np.where(other > 0, copies[other], home[vertex])
     offset = at_left - turn[piece] * at_right
-    translation = _mean_position(piece, offset, len(angle))
+    finest = np.zeros(n)
+    np.maximum.at(finest, flat, weight)
+    translation = _mean_position(piece, offset, len(angle), finest[vertex])
     disagreement = float(np.abs(offset - translation[piece]).max())
     rotation, shift = _from_home(one, other, turn[piece], translation[piece], fans)
     return _Glued(home, rotation, shift, translation, disagreement)
@@ -235,11 +250,12 @@ def _upright_net(net: Net) -> Net:
     return net.moved(turn, -turn * middle)
 
 
-def _mean_position(vertex: Ints, position: Complexes, n: int) -> Complexes:
-    count = np.maximum(np.bincount(vertex, minlength=n), 1)
-    real = np.bincount(vertex, weights=position.real, minlength=n)
-    imaginary = np.bincount(vertex, weights=position.imag, minlength=n)
-    return np.asarray((real + 1j * imaginary) / count)
+def _mean_position(vertex: Ints, position: Complexes, n: int, weight: Floats | None = None) -> Complexes:
+    weight = np.ones(len(vertex)) if weight is None else weight
+    total = np.bincount(vertex, weights=weight, minlength=n)
+    real = np.bincount(vertex, weights=weight * position.real, minlength=n)
+    imaginary = np.bincount(vertex, weights=weight * position.imag, minlength=n)
+    return np.asarray((real + 1j * imaginary) / np.where(total > 0, total, 1.0))
 
 
 def normalise(
@@ -268,7 +284,7 @@ def normalise(
 
 def _loop_length(surface: Surface, uv: Complexes, sheet: Ints, deck: Deck) -> float:
     """Geometric mean of the two loops' lengths in the domain; it does not depend on the cut."""
-    start, end, first = _rim(surface, uv, sheet, deck)
+    start, end, first = _boundary_edges(surface, uv, sheet, deck)
     edge = np.abs(end - start)
     return float(np.sqrt(edge[first].sum()) * np.sqrt(edge[~first].sum()))
 
@@ -276,20 +292,22 @@ def _loop_length(surface: Surface, uv: Complexes, sheet: Ints, deck: Deck) -> fl
 def _runs_around(apex: complex, surface: Surface, uv: Complexes, sheet: Ints, deck: Deck) -> bool:
     """Whether both loops turn about the apex by K. Where K is near 2πm, m ≠ 0, they may lie beside it, and
     turn by K − 2πm only."""
-    start, end, first = _rim(surface, uv, sheet, deck)
+    start, end, first = _boundary_edges(surface, uv, sheet, deck)
     turn = np.angle((end - apex) / (start - apex))
     swept = turn[first].sum(), -turn[~first].sum()
     return bool(max(abs(angle - deck.angle) for angle in swept) < np.pi)
 
 
-def _rim(surface: Surface, uv: Complexes, sheet: Ints, deck: Deck) -> tuple[Complexes, Complexes, Bools]:
+def _boundary_edges(
+    surface: Surface, uv: Complexes, sheet: Ints, deck: Deck
+) -> tuple[Complexes, Complexes, Bools]:
     """(k,) where the boundary edges start and end in some sheet, and which of them belong to loop 0."""
-    rim = np.flatnonzero(surface.twin < 0)
+    boundary = np.flatnonzero(surface.twin < 0)
     flat, sheets = surface.faces.ravel(), sheet.ravel()
-    start, end = (deck.apply(uv[flat[h]], sheets[h]) for h in (rim, next_half_edge(rim)))
+    start, end = (deck.apply(uv[flat[h]], sheets[h]) for h in (boundary, next_half_edge(boundary)))
     first = np.zeros(len(uv), dtype=bool)
     first[surface.loops[0]] = True
-    return start, end, first[flat[rim]]
+    return start, end, first[flat[boundary]]
 
 
 def _upright(uv: Complexes, deck: Deck, foot: complex) -> tuple[Complexes, Deck]:

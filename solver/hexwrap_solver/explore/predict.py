@@ -22,7 +22,7 @@ from hexwrap_solver.domain.locate import barycentric
 from hexwrap_solver.panels.sizes import partition_by_area
 from hexwrap_solver.pattern.lattice import LATTICES, Lattice
 from hexwrap_solver.pattern.lay.nodes import lattice_points_in_triangles
-from hexwrap_solver.pattern.place.choose import Placing
+from hexwrap_solver.pattern.place.choose import PlacementFamily
 from hexwrap_solver.pattern.place.rotation import with_rotation
 from hexwrap_solver.pattern.types import Kind, PatternSettings
 
@@ -35,7 +35,7 @@ DIRECTIONS = 360
 #: Cells that a boundary cuts, per cell of area that is left of them: those whose middle is nearer to it than
 #: they reach, on either side, of which half the area is inside.
 TRIMMED = 2.0
-#: Points on each edge of the boundary from which distances are taken.
+#: Points on each edge of the boundary, and of features, from which distances are taken.
 FINE = 4
 #: Middles are taken this far beside where they stand, in periods of the lattice, so that hardly one lies on
 #: an edge between triangles; they lie in a triangle to within rounding.
@@ -74,11 +74,13 @@ class Outlook:
     limit: Floats
     special: int = 0
     trimmed: int = 0
+    folded: int = 0
+    kinds: int = 0
     rest: float = 0.0
 
     def foresee(self, sizes: int | None, joint: float = 0.0) -> Foreseen:
         """With so many size classes (None: a length for each panel) and joints at least so wide."""
-        others = self.special + self.trimmed
+        others = self.special + self.trimmed + self.folded
         types = panels = 0
         area = perimeter = cells = 0.0
         for sides, outline in self.lattice.centred.items():
@@ -105,7 +107,7 @@ class Outlook:
         return Foreseen(
             1 - (area + self.rest) / (cells + self.rest),
             panels + others,
-            types + others,
+            types + self.special + self.trimmed + self.kinds,
             area + self.rest,
             perimeter + around,
         )
@@ -118,7 +120,7 @@ def outlook(cmap: ConformalMap, settings: PatternSettings, progress: Progress = 
     """
     lattice = LATTICES[settings.kind]
     settings, _ = with_rotation(cmap, lattice, settings)
-    placing = Placing.of(cmap, lattice, settings)
+    placing = PlacementFamily.of(cmap, lattice, settings)
     progress(0.5, "placing the lattice")
     placement = placing.at(settings)
     surface = cmap.surface
@@ -149,14 +151,21 @@ def outlook(cmap: ConformalMap, settings: PatternSettings, progress: Progress = 
     whole = regular.copy()
     for i, loop in enumerate(surface.loops):
         least: Floats = ROW.get(lattice.kind, HALVED) * size if i in placing.loops else reach
-        whole &= _distance(middle, surface.vertices[loop]) > least
-    beside, cut = ~regular, 0
+        whole &= _distance(middle, surface.vertices[np.append(loop, loop[0])]) > least
+    bent = np.zeros(len(face), dtype=bool)
+    for i in placing.features:
+        least = HALVED * size if i in placement.straight else reach
+        bent |= _distance(middle, surface.vertices[surface.features[i].vertices]) <= least
+    bent &= whole
+    whole &= ~bent
+    beside, cut = ~regular | bent, 0
     if settings.boundary == "trim":
-        beside, cut = ~whole, round(TRIMMED * float((regular & ~whole).sum()))
+        beside, cut = ~whole, round(TRIMMED * float((regular & ~whole & ~bent).sum()))
     rest = float((unit_area[sides] * size**2)[beside].sum())
     shorter = np.minimum(lost[sides] * slope * size, 1.0)
+    folded, kinds = 2 * int(bent.sum()), 2 * len(_levels(size[bent])[0]) if bent.any() else 0
     size, shorter, sides = size[whole], shorter[whole], sides[whole]
-    return Outlook(lattice, sides, size, size * (1 - shorter), alone, cut, rest)
+    return Outlook(lattice, sides, size, size * (1 - shorter), alone, cut, folded, kinds, rest)
 
 
 def floor(outline: Complexes) -> float:
@@ -198,10 +207,9 @@ def _middles(lattice: Lattice, corners: Complexes) -> tuple[Ints, Floats, Ints]:
     return face, weight, corner
 
 
-def _distance(points: Floats, rim: Floats) -> Floats:
-    """(n,) to a closed polyline, all but."""
-    along = np.roll(rim, -1, axis=0) - rim
-    fine = rim[:, None] + np.linspace(0, 1, FINE, endpoint=False)[:, None] * along[:, None]
+def _distance(points: Floats, line: Floats) -> Floats:
+    """(n,) to a polyline, all but."""
+    fine = line[:-1, None] + np.linspace(0, 1, FINE)[:, None] * np.diff(line, axis=0)[:, None]
     return np.asarray(cKDTree(fine.reshape(-1, 3)).query(points)[0])
 
 

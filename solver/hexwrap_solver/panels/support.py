@@ -23,8 +23,8 @@ TORSION_TOLERANCE = 1e-13
 #: Steps of the iteration; it converges quadratically where a torsion-free structure exists.
 MOST_STEPS = 30
 
-#: Axes tilted further than this tangent are of no use; the search ends before.
-STEEPEST = 1.0
+#: Axes tilted from the normal by more than this tangent are of no use; the search ends before.
+MOST_TILT = 1.0
 
 #: Added to the constraints' Gram matrix (entries of order 1), for patterns with more edges than freedom.
 REGULARIZATION = 1e-12
@@ -47,7 +47,7 @@ def support(pattern: Pattern, depth: float, progress: Progress = no_progress) ->
     for step in range(MOST_STEPS):
         axes = pattern.normals + np.einsum("pe,ped->pd", shift, frame)
         twist = _twist(along, axes, edges)
-        if np.abs(shift).max(initial=0.0) > STEEPEST:
+        if np.abs(shift).max(initial=0.0) > MOST_TILT:
             break
         if np.abs(twist).max(initial=0.0) < least:
             best, least = shift, float(np.abs(twist).max(initial=0.0))

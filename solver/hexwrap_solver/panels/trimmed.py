@@ -72,12 +72,12 @@ def flatten_and_clear(
 @dataclass(frozen=True)
 class _Outlines:
     """Polygons in their own planes. corner: (h, 2), the plane of the edge that begins there being the line
-    side · x = reach, side (h, 2) of length 1; row, offsets: as in Ragged; across: as above. origin (q, 3) and
-    axes (q, 2, 3) lead back to space."""
+    side · x = support, side (h, 2) of length 1; row, offsets: as in Ragged; across: as above. origin (q, 3)
+    and axes (q, 2, 3) lead back to space."""
 
     corner: Floats
     side: Floats
-    reach: Floats
+    support: Floats
     across: Ints
     row: Ints
     offsets: Ints
@@ -99,8 +99,8 @@ class _Outlines:
         corner = in_planes(polygons, origin, axes)
         side = np.einsum("hed,hd->he", axes[row], direction)
         length = np.maximum(np.linalg.norm(side, axis=1), ROUNDING)
-        reach = (offset - dot(direction, origin[row])) / length
-        return cls(corner, side / length[:, None], reach, across, row, polygons.offsets, origin, axes)
+        support = (offset - dot(direction, origin[row])) / length
+        return cls(corner, side / length[:, None], support, across, row, polygons.offsets, origin, axes)
 
     @property
     def count(self) -> Ints:
@@ -139,7 +139,7 @@ def _mitred(flat: _Outlines) -> _Outlines:
     before = flat.after(-1)
     u, v = flat.side[before], flat.side
     excess_u, excess_v = (
-        flat.reach[k] - dot(flat.side[k], flat.corner) for k in (before, np.arange(len(flat.row)))
+        flat.support[k] - dot(flat.side[k], flat.corner) for k in (before, np.arange(len(flat.row)))
     )
     sine = cross_2d(u, v)
     rim = (flat.across < 0) & (flat.across[before] < 0)
@@ -194,7 +194,7 @@ def _clipped(flat: _Outlines, binding: Bools) -> _Outlines:
     slack, start, count = ROUNDING * flat.sizes(), flat.offsets[:-1], flat.count
     for step in range(int(count.max(initial=0))):
         line = (start + np.minimum(step, count - 1))[flat.row]
-        height = dot(flat.side[line], corner) - flat.reach[line]
+        height = dot(flat.side[line], corner) - flat.support[line]
         over = _any(binding[line] & (height > slack[flat.row]), flat.offsets)
         beyond = over[flat.row] & (height > -slack[flat.row])
         gone = ~_any(~beyond, flat.offsets)[flat.row]
@@ -249,8 +249,8 @@ def _enters(flat: _Outlines, wedge: Ints, multiple: Bools) -> Bools:
         low, high = np.zeros(len(flat.row)), np.where(concerned, 1.0, -1.0)
         for step in steps:
             line = flat.after(step)
-            side, reach = flat.side[line], flat.reach[line]
-            start, end = (dot(side, flat.corner[k]) - reach for k in (slice(None), following))
+            side, support = flat.side[line], flat.support[line]
+            start, end = (dot(side, flat.corner[k]) - support for k in (slice(None), following))
             crossing = np.divide(slack - start, end - start, out=np.zeros(len(slack)), where=start != end)
             outside, leaves, comes = (
                 (start <= slack) & (end <= slack),

@@ -7,7 +7,7 @@ import numpy as np
 from hexwrap_solver.arrays import Bools, Ints, Ragged
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.pattern.lay.cells import Cells
-from hexwrap_solver.pattern.place.choose import Placing
+from hexwrap_solver.pattern.place.choose import PlacementFamily
 from hexwrap_solver.pattern.place.deform import derivatives
 from hexwrap_solver.pattern.place.placement import Placement
 from hexwrap_solver.pattern.trim.folds import Seams
@@ -17,7 +17,7 @@ from hexwrap_solver.surface.features import FeatureEdges
 
 def on_features(
     cmap: ConformalMap,
-    placing: Placing,
+    placing: PlacementFamily,
     placement: Placement,
     seams: Seams | None,
     cells: Cells,

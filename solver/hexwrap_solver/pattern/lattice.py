@@ -198,7 +198,7 @@ class Lattice:
         return offsets
 
     @cached_property
-    def reach(self) -> float:
+    def largest_offset(self) -> float:
         """How far a node stands from its point at most."""
         return 0.0 if self._offsets is None else float(abs(self._offsets).max())
 

@@ -34,7 +34,7 @@ from hexwrap_solver.pattern.lay.labels import azimuth, first_on_net, places, row
 from hexwrap_solver.pattern.lay.layout import Layout
 from hexwrap_solver.pattern.lay.nodes import Nodes, find_nodes
 from hexwrap_solver.pattern.pieces import fold_pieces
-from hexwrap_solver.pattern.place.choose import Placing
+from hexwrap_solver.pattern.place.choose import PlacementFamily
 from hexwrap_solver.pattern.place.placement import Placement, anchor_vertex, edge_angle
 from hexwrap_solver.pattern.place.rotation import with_rotation
 from hexwrap_solver.pattern.place.sense import check_edge, too_many
@@ -74,7 +74,7 @@ def lay_pattern(cmap: ConformalMap, settings: PatternSettings, progress: Progres
     check_edge(cmap, settings)
     lattice = LATTICES[settings.kind]
     settings, notes = with_rotation(cmap, lattice, settings)
-    placing = Placing.of(cmap, lattice, settings)
+    placing = PlacementFamily.of(cmap, lattice, settings)
     pattern, finer = _laid(cmap, placing, settings, progress)
     notes += finer
     if settings.around is not None and pattern.around != settings.around and cmap.fitted is None:
@@ -102,7 +102,7 @@ class _CoarseError(PatternError):
 
 
 def _laid(
-    cmap: ConformalMap, placing: Placing, settings: PatternSettings, progress: Progress
+    cmap: ConformalMap, placing: PlacementFamily, settings: PatternSettings, progress: Progress
 ) -> tuple[Pattern, list[str]]:
     """In cells small enough to close up, where no size is asked for; and a note if the default is not."""
     try:
@@ -124,7 +124,9 @@ def _laid(
     ]
 
 
-def _lay(cmap: ConformalMap, placing: Placing, settings: PatternSettings, progress: Progress) -> Pattern:
+def _lay(
+    cmap: ConformalMap, placing: PlacementFamily, settings: PatternSettings, progress: Progress
+) -> Pattern:
     lattice = placing.lattice
     placement = placing.at(settings)
     progress(0.1, "placing the lattice")
@@ -146,13 +148,17 @@ def _lay(cmap: ConformalMap, placing: Placing, settings: PatternSettings, progre
         edges = ending_at_tips(layout, nodes, edges, boundary)
     whole = whole_cells(lattice, edges)
     met = met_by_pattern(layout, nodes, edges, boundary)
-    met[boundary.loop[boundary.rim < 0]] = True  # where folds meet the boundary, cells are cut anyway
+    # Where folds meet the boundary, cells are cut anyway.
+    met[boundary.loop[boundary.surface_loop < 0]] = True
     if cmap.kind != "net":
-        met[boundary.loop[(boundary.rim == 0) | (boundary.rim == 1)]] = True  # it would go around the surface
+        # It would go around the surface.
+        met[boundary.loop[(boundary.surface_loop == 0) | (boundary.surface_loop == 1)]] = True
     if len(boundary.face) and (settings.boundary == "trim" or len(features)):
         folded = Folded(surface.faces, placement.glued, features) if len(features) else None
         try:
-            cut = trim(layout, boundary, met, nodes, edges, whole, folded, rim=settings.boundary == "trim")
+            cut = trim(
+                layout, boundary, met, nodes, edges, whole, folded, keep_cut=settings.boundary == "trim"
+            )
         except TooCoarse:
             raise _too_coarse(cmap, settings, placement) from None
     else:
@@ -223,7 +229,7 @@ def _check_count(cmap: ConformalMap, layout: Layout, settings: PatternSettings) 
 def _finish(
     cmap: ConformalMap,
     settings: PatternSettings,
-    placing: Placing,
+    placing: PlacementFamily,
     placement: Placement,
     layout: Layout,
     cut: Trimmed,

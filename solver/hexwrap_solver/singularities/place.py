@@ -30,7 +30,7 @@ REACHES, SPACING, ROUNDS = (1.5, 0.8, 0.4), 0.4, 20
 
 
 @dataclass(frozen=True)
-class Placing:
+class Proposals:
     """proposals: the best with each number of singularities that is possible, ascending. chosen: index of
     the one to take. symmetry: of the surface, which they keep to; empty where that is not asked for.
     others: those that will do where it cannot be closed, best first. may_be_none: a map without any will
@@ -49,7 +49,7 @@ class Placing:
 
 def place(
     surface: Surface, rules: Rules, count: int | Literal["auto"] = "auto", tube: Tube | None = None
-) -> Placing:
+) -> Proposals:
     """The whole curve over the number of singularities, up to ``rules.most``, and the number to take: with
     "auto" as many as pay, else at most ``count``, whatever leaves least uncovered.
 
@@ -71,7 +71,7 @@ def place(
         for i in np.argsort([one.uncovered for one in proposals], kind="stable")
         if i != chosen and proposals[i].count > 0 and (count == "auto" or proposals[i].count <= count)
     ]
-    return Placing(tuple(proposals), chosen, symmetry, others=tuple(int(i) for i in others))
+    return Proposals(tuple(proposals), chosen, symmetry, others=tuple(int(i) for i in others))
 
 
 def _curve(known: Responses, patience: int | None, group: Group | None = None) -> list[Proposal]:

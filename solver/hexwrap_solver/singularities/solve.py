@@ -31,7 +31,7 @@ from hexwrap_solver.pattern.types import Kind, PatternSettings
 from hexwrap_solver.singularities.close import Chart, Closed, Closing, Line
 from hexwrap_solver.singularities.drag import refined, rims
 from hexwrap_solver.singularities.linear import Tube, vertex_areas
-from hexwrap_solver.singularities.place import Placing, given, place
+from hexwrap_solver.singularities.place import Proposals, given, place
 from hexwrap_solver.singularities.types import End, Proposal, Rules, SingularitySettings
 from hexwrap_solver.surface.holes import fill_openings
 from hexwrap_solver.surface.types import Surface
@@ -178,7 +178,7 @@ class Seated:
     """What was chosen, and what for."""
 
     frame: Frame
-    placing: Placing
+    placing: Proposals
 
 
 def seated(
@@ -249,10 +249,10 @@ def _line(lattice: Lattice, angle: float, boundary: str) -> Line:
     return Line(step, rows.first / abs(e1), rows.period / abs(e1))
 
 
-def chosen(surface: Surface, frame: Frame, settings: SingularitySettings) -> Placing:
+def chosen(surface: Surface, frame: Frame, settings: SingularitySettings) -> Proposals:
     """Where singularities are to stand. Raises SingularitiesError."""
     if settings.at:
-        return Placing((given(surface, frame.rules, settings.at),), 0)
+        return Proposals((given(surface, frame.rules, settings.at),), 0)
     count: int | Literal["auto"] = "auto" if settings.count is None else settings.count
     placing = place(surface, frame.rules, count, frame.tube)
     return replace(placing, may_be_none=settings.count == "auto")
@@ -261,7 +261,7 @@ def chosen(surface: Surface, frame: Frame, settings: SingularitySettings) -> Pla
 def closed_map(
     surface: Surface,
     frame: Frame,
-    placing: Placing,
+    placing: Proposals,
     boundary: BoundaryCondition,
     progress: Progress = no_progress,
 ) -> ConformalMap:
@@ -285,7 +285,7 @@ def closed_map(
         return replace(plain, notes=(*plain.notes, note + error.detail))
 
 
-def first_that_closes(surface: Surface, frame: Frame, placing: Placing, progress: Progress) -> ConformalMap:
+def first_that_closes(surface: Surface, frame: Frame, placing: Proposals, progress: Progress) -> ConformalMap:
     """With other singularities, and smaller cells where no size is asked for, if those chosen do not close:
     the smaller the cells, the less they have to move. Raises ConvergenceError, that of the first."""
     failed: ConvergenceError | None = None
@@ -308,7 +308,7 @@ def first_that_closes(surface: Surface, frame: Frame, placing: Placing, progress
     raise failed
 
 
-def _changes(frame: Frame, placing: Placing, chosen: int, part: int) -> Iterator[str]:
+def _changes(frame: Frame, placing: Proposals, chosen: int, part: int) -> Iterator[str]:
     best, kind = placing.proposal, frame.lattice.kind
     if chosen != placing.chosen:
         yield (
@@ -398,7 +398,7 @@ def _nearest_inside(surface: Surface, places: Floats) -> Ints:
     return np.asarray(corner)
 
 
-def as_map(frame: Frame, chart: Chart, found: Closed, placing: Placing, before: Surface) -> ConformalMap:
+def as_map(frame: Frame, chart: Chart, found: Closed, placing: Proposals, before: Surface) -> ConformalMap:
     seen, quantum = found.unstretched, frame.lattice.quantum
     surface = seen.surface
     sums = chart.energy.angle_sums(seen.metric)
@@ -461,7 +461,7 @@ def in_words(kind: Kind, index: Ints) -> str:
     return ", ".join(parts[:-1]) + (" and " if len(parts) > 1 else "") + parts[-1]
 
 
-def _notes(frame: Frame, found: Closed, placing: Placing) -> Iterator[str]:
+def _notes(frame: Frame, found: Closed, placing: Proposals) -> Iterator[str]:
     proposal, kind = placing.proposal, frame.lattice.kind
     yield (
         f"{in_words(kind, proposal.index)}: moved by at most {found.moves.max():.2f} cells, so that the "

@@ -18,6 +18,7 @@ from scipy.sparse.csgraph import connected_components
 
 from hexwrap_solver.arrays import Bools, Floats, Ints
 from hexwrap_solver.geometry import angles_between, face_normals, normalize
+from hexwrap_solver.surface.orient import is_inside_out
 from hexwrap_solver.surface.topology import boundary_loops, face_graph, half_edges, sum_rows
 from hexwrap_solver.surface.types import Triangles
 
@@ -57,8 +58,8 @@ class Cap:
 def caps_of(mesh: Triangles) -> tuple[list[Cap], str]:
     """The caps to be taken off so that a tube or a dome is left, and a sentence about them; or none.
 
-    The mesh must be oriented, with at most two faces per edge. With two boundary loops or more nothing is
-    taken off: it is a tube already.
+    The mesh must be oriented, with at most two faces per edge; one that is inside out has the same caps. With
+    two boundary loops or more nothing is taken off: it is a tube already.
     """
     rim = np.flatnonzero(mesh.twin < 0)
     start, _ = half_edges(mesh.faces)
@@ -67,6 +68,8 @@ def caps_of(mesh: Triangles) -> tuple[list[Cap], str]:
     loops = boundary_loops(mesh.faces, mesh.twin) if len(rim) else []
     if len(loops) > 1:
         return [], ""
+    if is_inside_out(mesh.vertices, mesh.faces, mesh.twin):
+        mesh = Triangles(mesh.vertices, mesh.faces[:, [0, 2, 1]])
     found = _regions(mesh)
     pairs = [pair for pair in combinations(found, 2) if _is_pair(*pair)]
     upright = [pair for pair in pairs if all(abs(cap.normal[2]) > UPRIGHT for cap in pair)]

@@ -114,7 +114,7 @@ def chained(vertices: Floats, edges: Ints, fold: Floats, stops: Bools) -> tuple[
         closed = len(tips) == 0
         among = nodes if closed else tips
         start = int(among[np.argmin(incident[among])])
-        line = incident[_walk(beside, start)]
+        line = incident[_path(beside, start)]
         out.append(Feature(np.append(line, line[0]) if closed else line, float(fold[mine].mean()), closed))
     return tuple(sorted(out, key=lambda f: (int(f.vertices.min()), len(f.vertices), f.vertices.tolist())))
 
@@ -130,7 +130,7 @@ def _neighbours(tail: Ints, head: Ints, n: int) -> Ints:
     return beside
 
 
-def _walk(beside: Ints, start: int) -> Ints:
+def _path(beside: Ints, start: int) -> Ints:
     """Nodes of a path from one end to the other, or of a cycle once around. Its steps are those of the chain
     alone, so that any number of chains takes no longer than their edges."""
     path, before, at = [start], start, int(beside[start, 0])

@@ -27,7 +27,7 @@ CLEARANCE = 0.6
 #: hole would ask for millions.
 MOST_PER_VERTEX = 40
 #: Cotangents are cut off here: the fairest fill must not hang on needles.
-STEEPEST = 50.0
+MOST_COTANGENT = 50.0
 
 
 def fill_openings(surface: Surface) -> Surface:
@@ -141,7 +141,7 @@ def _cotangents(points: Floats, faces: Ints) -> csr_array:
         cotangent = dot(one, other) / np.maximum(area, TINY)
         rows.append(a)
         columns.append(b)
-        weights.append(0.5 * np.clip(cotangent, -STEEPEST, STEEPEST))
+        weights.append(0.5 * np.clip(cotangent, -MOST_COTANGENT, MOST_COTANGENT))
     i, j, w = (np.concatenate(parts) for parts in (rows, columns, weights))
     both = coo_array((np.tile(w, 2), (np.concatenate([i, j]), np.concatenate([j, i]))), shape=(n, n)).tocsr()
     degree = coo_array((np.asarray(both.sum(axis=1)).ravel(), (np.arange(n), np.arange(n))), shape=(n, n))

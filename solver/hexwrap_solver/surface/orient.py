@@ -46,3 +46,11 @@ def _parity(disagree: Bools, twin: Ints) -> Bools:
         odd = odd ^ odd[before]
         before = before[before]
     return odd
+
+
+def is_inside_out(vertices: Floats, faces: Ints, twin: Ints) -> bool:
+    """Whether faces enclose a negative volume, a boundary loop counting as filled by a cone to its middle."""
+    rim = np.unique(half_edges(faces)[0][twin < 0])
+    middle = vertices[rim if len(rim) else np.unique(faces)].mean(axis=0)
+    a, b, c = (vertices[corner] - middle for corner in faces.T)
+    return float(np.einsum("kd,kd->", a, np.cross(b, c))) < 0

@@ -26,7 +26,7 @@ ROUNDS = 16
 class Piece:
     """Faces that hang together across edges, ascending; loops: the number of their boundary curves.
 
-    rim: (k, 3) the vertices on these. is_fin: whether it shares a vertex with a larger piece.
+    boundary: (k, 3) the vertices on these. is_fin: whether it shares a vertex with a larger piece.
     """
 
     faces: Ints
@@ -34,7 +34,7 @@ class Piece:
     area: float
     low: Floats
     high: Floats
-    rim: Floats
+    boundary: Floats
     is_fin: bool = False
 
 

@@ -17,7 +17,7 @@ from hexwrap_solver.surface.closest import TriangleTree
 from hexwrap_solver.surface.topology import edge_groups, edge_lengths, half_edges, twins_of
 
 #: Least cosine of the angle between the normal at a place and that of the triangle it lies in.
-STEEPEST = 0.17
+LEAST_COSINE = 0.17
 #: Of all drawn lines together.
 MOST_POINTS = 20_000
 
@@ -281,15 +281,15 @@ class Surface(Triangles):
 
     def normals_at(self, face: Ints, weights: Floats) -> Floats:
         """(k, 3) unit normals on the outside at barycentric coordinates (k, 3) of faces (k,): interpolated
-        between those of the vertices, and nowhere steeper than ``STEEPEST`` to the face itself, as they would
-        be beside edges where a coarse mesh folds back."""
+        between those of the vertices, and nowhere further than ``LEAST_COSINE`` from the face's own, as they
+        would be beside edges where a coarse mesh folds back."""
         corner = self.faces[face]
         normal = normalize(np.einsum("kc,kcd->kd", weights, self.normals[corner]))
         own = normalize(face_normals(self.vertices, corner))
         rise = dot(normal, own)
-        low = np.flatnonzero((rise < STEEPEST) & own.any(axis=1))
+        low = np.flatnonzero((rise < LEAST_COSINE) & own.any(axis=1))
         along = normalize(normal[low] - rise[low, None] * own[low])
-        normal[low] = normalize(STEEPEST * own[low] + np.sqrt(1 - STEEPEST**2) * along)
+        normal[low] = normalize(LEAST_COSINE * own[low] + np.sqrt(1 - LEAST_COSINE**2) * along)
         return normal
 
     @cached_property

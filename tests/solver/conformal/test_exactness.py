@@ -298,6 +298,19 @@ def test_cones_that_are_nearly_cylinders_keep_their_digits(angle: float) -> None
     assert cmap.circumference == pytest.approx(cylinder.circumference, rel=10 * abs(angle))
 
 
+@pytest.mark.parametrize("slant", [1e-6, 1e-9, 1.3e-10, -1.3e-10, 1e-12])
+def test_isometric_cone_angles_that_are_nearly_zero_are_mapped(slant: float) -> None:
+    """Symmetric ends but for a slant: the cone angle comes out as about −5 slant, the apex as far away as
+    that says, and the drawn angles are right all the same."""
+    belly = lambda s: 1 + 0.4 * np.sin(np.pi * s) + slant * (2 * s - 1)  # noqa: E731
+    surface = grid(20, 10, revolution(belly, lambda s: 3 * s))
+    cmap = conformal_map(surface, BoundaryCondition("isometric", quantum="none"))
+    assert np.abs(cmap.log_scale[surface.boundary]).max() < 1e-12
+    sums = [float((np.pi - angles).sum()) for angles in cmap.boundary_angles]
+    assert abs(sums[0] + sums[1]) < 1e-12
+    assert_honest(cmap)
+
+
 def test_optimal_spreading_has_less_dirichlet_energy_than_the_even_one() -> None:
     """In the smooth limit u constant on each loop is the Dirichlet minimiser for the given cone angle."""
     tower = irregular(48, 16, BULGE)

@@ -15,7 +15,7 @@ from hexwrap_solver.pattern import lay_pattern
 from hexwrap_solver.pattern.lattice import LATTICES
 from hexwrap_solver.pattern.place import choose, size
 from hexwrap_solver.pattern.place.align import Straightening
-from hexwrap_solver.pattern.place.choose import Placing, loops_to_align, place_lattice
+from hexwrap_solver.pattern.place.choose import PlacementFamily, loops_to_align, place_lattice
 from hexwrap_solver.pattern.place.deform import distortion_of
 from hexwrap_solver.pattern.place.glued import Glued
 from hexwrap_solver.pattern.place.rows import rows_along
@@ -182,7 +182,7 @@ def test_far_too_many_cells_around_are_refused_at_once(size):
 
 def test_what_sizes_share_serves_every_number_around():
     first = PatternSettings(around=60)
-    placing = Placing.of(MAPS["entrance"], LATTICES["hex"], first)
+    placing = PlacementFamily.of(MAPS["entrance"], LATTICES["hex"], first)
     for around in (60, 96):
         wanted = replace(first, around=around)
         once, fresh = placing.at(wanted), place_lattice(MAPS["entrance"], LATTICES["hex"], wanted)
@@ -206,7 +206,7 @@ def test_of_one_pattern_every_loop_is_straightened_once(monkeypatch):
     of = Straightening.of.__func__
     monkeypatch.setattr(Straightening, "of", lambda *a: (made.append(a[-1]), of(Straightening, *a))[1])
     monkeypatch.setattr(choose, "BEARABLE", 0.0)
-    placing = Placing.of(MAPS["entrance"], LATTICES["hex"], PatternSettings(around=60))
+    placing = PlacementFamily.of(MAPS["entrance"], LATTICES["hex"], PatternSettings(around=60))
     for around in (60, 72, 96):
         placing.at(PatternSettings(around=around))
     assert made == [[0, 1], [0], [1]]

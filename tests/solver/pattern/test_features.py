@@ -14,7 +14,7 @@ from hexwrap_solver.panels.polygons import best_plane_distances, fan_areas
 from hexwrap_solver.pattern import lay_pattern
 from hexwrap_solver.pattern.lattice import LATTICES
 from hexwrap_solver.pattern.place import choose
-from hexwrap_solver.pattern.place.choose import Placing
+from hexwrap_solver.pattern.place.choose import PlacementFamily
 from hexwrap_solver.pattern.place.deform import distortion_of
 from hexwrap_solver.pattern.place.features import least_where_they_meet
 from hexwrap_solver.pattern.place.placement import cost_of
@@ -59,7 +59,7 @@ def test_creases_lie_on_lines_and_cut_cells_into_exact_parts(kind: Kind, rotatio
     cmap = solved("box")
     settings = PatternSettings(kind, around=60, rotation=rotation, boundary="trim")
     lattice = LATTICES[kind]
-    placement = Placing.of(cmap, lattice, settings).at(settings)
+    placement = PlacementFamily.of(cmap, lattice, settings).at(settings)
     assert placement.straight == {0, 1, 2, 3}
     assert np.isfinite(distortion_of(cmap, placement.glued, placement.place))  # no triangle turned over
     assert placement.distortion < 0.012
@@ -223,7 +223,7 @@ def test_corners_that_no_lines_of_the_pattern_have_are_named_with_the_least_they
     surface = surface_from_mesh(grid(rings), SurfaceSettings(caps="keep"))
     cmap = conformal_map(surface, BoundaryCondition("straight"))
     settings = PatternSettings("quad", around=30, boundary="trim")
-    placing = Placing.of(cmap, LATTICES["quad"], settings)
+    placing = PlacementFamily.of(cmap, LATTICES["quad"], settings)
     vertex, least = least_where_they_meet(cmap, LATTICES["quad"], placing.chains)
     assert len(vertex) == 8
     at = abs(cmap.surface.vertices[vertex, 0])

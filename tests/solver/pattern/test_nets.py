@@ -28,7 +28,7 @@ from hexwrap_solver.pattern.place.rows import rows_along
 from hexwrap_solver.pattern.types import Pattern, PatternSettings
 from hexwrap_solver.surface import surface_from_mesh
 from hexwrap_solver.surface.topology import next_half_edge
-from hexwrap_solver.surface.types import STEEPEST
+from hexwrap_solver.surface.types import LEAST_COSINE
 from tests.solver.pattern import annuli, nets
 from tests.solver.pattern.folded import grid
 
@@ -311,8 +311,8 @@ def test_on_coarse_meshes_that_fold_back_every_cell_looks_outward(seed):
     rise = np.einsum("kd,kd->k", every, np.repeat(own, 3, axis=0))
     at_vertices = np.einsum("mcd,md->mc", surface.normals[surface.faces], own).ravel()
     assert at_vertices.min() < 0
-    assert rise.min() >= STEEPEST - 1e-12
-    np.testing.assert_allclose(rise[at_vertices > STEEPEST], at_vertices[at_vertices > STEEPEST])
+    assert rise.min() >= LEAST_COSINE - 1e-12
+    np.testing.assert_allclose(rise[at_vertices > LEAST_COSINE], at_vertices[at_vertices > LEAST_COSINE])
     assert (np.einsum("kd,kd->k", surface.normals_at(np.arange(len(own)), middle), own) > 0).all()
     pattern = lay_pattern(conformal_map(surface, BoundaryCondition("straight")), PatternSettings(around=60))
     area = area_vectors(pattern.vertices, pattern.faces)

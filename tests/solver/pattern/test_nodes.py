@@ -11,7 +11,7 @@ from hexwrap_solver.errors import PatternError
 from hexwrap_solver.pattern.lattice import LATTICES
 from hexwrap_solver.pattern.lay import nodes
 from hexwrap_solver.pattern.lay_pattern import layout_of
-from hexwrap_solver.pattern.place.choose import Placing
+from hexwrap_solver.pattern.place.choose import PlacementFamily
 from hexwrap_solver.pattern.types import PatternSettings
 from tests.solver.pattern import annuli
 
@@ -19,7 +19,7 @@ CMAP = annuli.revolution(np.cosh, np.linspace(-1, 1.5, 5), 12)
 LAYOUT = layout_of(
     CMAP,
     LATTICES["hex"],
-    Placing.of(CMAP, LATTICES["hex"], PatternSettings(around=12)).at(PatternSettings(around=12)),
+    PlacementFamily.of(CMAP, LATTICES["hex"], PatternSettings(around=12)).at(PatternSettings(around=12)),
 )
 
 

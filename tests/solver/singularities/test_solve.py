@@ -16,7 +16,7 @@ from hexwrap_solver.pattern.lattice import LATTICES
 from hexwrap_solver.pattern.types import PatternSettings
 from hexwrap_solver.pipeline import SolveSettings, solve
 from hexwrap_solver.singularities import solve as module
-from hexwrap_solver.singularities.place import Placing
+from hexwrap_solver.singularities.place import Proposals
 from hexwrap_solver.singularities.types import Proposal, SingularityAt, SingularitySettings
 from hexwrap_solver.surface import with_openings
 from tests.solver.singularities import shapes
@@ -306,7 +306,7 @@ def first_that_closes(monkeypatch, sized, fewest, failing):
         Proposal(np.arange(n), np.ones(n, dtype=np.int64), (), 0.1, 0.1, 1.0) for n in (fewest, 12, 14)
     )
     frame = module.Frame(LATTICES["hex"], None, 1.0, None, (), None, 0.05, sized)
-    placing = Placing(proposals, 1, others=(2, 0))
+    placing = Proposals(proposals, 1, others=(2, 0))
     return module.first_that_closes(None, frame, placing, no_progress), asked
 
 
@@ -344,7 +344,7 @@ def test_without_singularities_loops_keep_the_curvatures_that_were_chosen():
         surface, BoundaryCondition("isometric", quantum="hex"), SingularitySettings(1), None, 11
     )
     none = np.zeros(0, dtype=np.int64)
-    placing = Placing((Proposal(none, none, (2, -2, -6), 0.1, 0.1, 2.0),), 0)
+    placing = Proposals((Proposal(none, none, (2, -2, -6), 0.1, 0.1, 2.0),), 0)
     cmap = module.closed_map(surface, frame, placing, BoundaryCondition("isometric", quantum="hex"))
     for loop, angles, quanta in zip(surface.loops, cmap.boundary_angles, (2, -2, -6), strict=True):
         assert np.ptp(cmap.log_scale[loop]) < 1e-9

@@ -22,7 +22,7 @@ from hexwrap_solver.surface.brep import (
     together,
 )
 from hexwrap_solver.surface.brep.pull import follow, patch_of
-from hexwrap_solver.surface.brep.surface import surface_from_brep
+from hexwrap_solver.surface.brep.surface import INSIDE_OUT, surface_from_brep
 from hexwrap_solver.surface.errors import NurbsDataError, TooFineError, TrimError
 from hexwrap_solver.surface.nurbs import evaluate_points
 from hexwrap_solver.surface.projection import project
@@ -351,3 +351,12 @@ def test_meshes_that_came_with_a_polysurface_are_taken_where_a_face_cannot_be_me
         assert len(surface.loops) == 2
         assert "own render meshes of 4 faces" in surface.repairs[0]
     assert np.ptp(surface.vertices[:, 1]) == pytest.approx(18)
+
+
+def test_a_closed_polysurface_that_is_inside_out_is_turned_and_loses_its_caps() -> None:
+    outward = box()
+    faces = tuple(replace(face, reversed=not face.reversed) for face in outward.faces)
+    one, other = surface_from_brep(outward), surface_from_brep(replace(outward, faces=faces))
+    assert other.repairs == (INSIDE_OUT, *one.repairs)
+    assert len(one.loops) == len(other.loops) == 2
+    np.testing.assert_allclose(one.normals, other.normals, atol=1e-12)

@@ -176,3 +176,11 @@ def test_creases_of_meshes_are_their_sharp_folds_split_at_junctions() -> None:
     assert [f.closed for f in ring.features] == [True]
     assert ring.features[0].vertices[0] == ring.features[0].vertices[-1]
     assert len(np.unique(ring.features[0].vertices)) == 64
+
+
+def test_a_mass_that_is_inside_out_loses_the_same_caps() -> None:
+    outward = prism()
+    inward = SentMesh(outward.vertices, Ragged.from_table(outward.faces.values.reshape(-1, 3)[:, ::-1]))
+    one, other = surface_from_mesh(outward), surface_from_mesh(inward)
+    assert one.repairs == other.repairs
+    assert len(other.loops) == 2

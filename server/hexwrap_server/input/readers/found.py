@@ -18,6 +18,9 @@ from hexwrap_solver.surface.pieces import only, pieces
 #: A piece of an object with less than this part of its largest piece's area is a stray.
 STRAY = 0.01
 
+#: What stands for blocks whose content lies in another file.
+LINKED = "blocks that are linked or empty"
+
 Geometry = SentMesh | NurbsSurface | Brep
 
 

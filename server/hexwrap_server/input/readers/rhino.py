@@ -10,7 +10,7 @@ import numpy as np
 import rhino3dm
 
 from hexwrap_server.input.readers.errors import UnreadableFileError
-from hexwrap_server.input.readers.found import FileContent, Found, Geometry
+from hexwrap_server.input.readers.found import LINKED, FileContent, Found, Geometry
 from hexwrap_server.input.readers.rhino_brep import brep_of, nurbs_surface, rhino_mesh, subd_mesh
 from hexwrap_server.input.readers.rhino_model import MOST_OBJECTS, Model, Placed, TooManyObjectsError
 from hexwrap_solver.arrays import Floats
@@ -18,6 +18,17 @@ from hexwrap_solver.surface import NurbsSurface
 
 #: Rhino's geometry types that are surfaces; curves, points, lights and texts beside them do no harm.
 SURFACES = (rhino3dm.Mesh, rhino3dm.Brep, rhino3dm.Surface, rhino3dm.SubD)
+#: Words for what is no surface. Blocks are resolved: one that is left is linked to a file that is not there.
+OTHERS = {
+    rhino3dm.Curve: "curves",
+    rhino3dm.Point: "points",
+    rhino3dm.PointCloud: "point clouds",
+    rhino3dm.Light: "lights",
+    rhino3dm.Hatch: "hatches",
+    rhino3dm.AnnotationBase: "texts or dimensions",
+    rhino3dm.TextDot: "text dots",
+    rhino3dm.InstanceReference: LINKED,
+}
 #: Rhino's unit systems that are carried.
 UNITS = {"Meters": "m", "Centimeters": "cm", "Millimeters": "mm", "Feet": "ft", "Inches": "in"}
 
@@ -40,7 +51,7 @@ def read_3dm(data: bytes) -> FileContent:
         tuple(_found(item, tolerance) for item in placed if isinstance(item.geometry, SURFACES)),
         UNITS.get(str(settings.ModelUnitSystem).rpartition(".")[2]),
         tolerance if 0 < tolerance < np.inf else None,
-        Counter(type(item.geometry).__name__ for item in placed if not isinstance(item.geometry, SURFACES)),
+        Counter(_other_kind(item.geometry) for item in placed if not isinstance(item.geometry, SURFACES)),
     )
 
 
@@ -71,6 +82,14 @@ def _kind(geometry: Any) -> str:
             return "closed polysurface" if geometry.IsSolid else "polysurface"
         return "surface" if geometry.IsSurface else "trimmed surface"
     return "surface"
+
+
+def _other_kind(geometry: Any) -> str:
+    """Of what is no surface."""
+    for kind, word in OTHERS.items():
+        if isinstance(geometry, kind):
+            return word
+    return str(type(geometry).__name__)
 
 
 def _size(placed: Placed) -> tuple[float, float, float]:

@@ -41,6 +41,7 @@ from hexwrap_solver.conformal.span import (
 from hexwrap_solver.conformal.types import Cones, ConformalMap, Deck, Targets, Unrolled
 from hexwrap_solver.errors import ConvergenceError
 from hexwrap_solver.surface.types import Surface
+from hexwrap_solver.tolerances import TINY
 
 #: Rounds of refinement; meshes seen so far need up to a handful.
 MAX_ROUNDS = 40
@@ -311,7 +312,9 @@ def _draw_net(problem: Problem, flat: Flat, cones: Cones) -> tuple[ConformalMap 
     wound = (np.abs(drawn - expected) > np.pi)[surface.faces].any(axis=1)
     if wound.any():
         return None, np.flatnonzero(wound)
-    layout = lay_out(surface, lengths, corners, flat.curvature, cones.vertex)
+    # Vectors are good to roundings of their triangle's longest one.
+    rounding = (abs(side).max(axis=1)[:, None] / np.maximum(abs(side), TINY)).ravel()
+    layout = lay_out(surface, lengths, corners, flat.curvature, cones.vertex, rounding)
     found = ConformalMap(
         surface=surface,
         log_scale=u,

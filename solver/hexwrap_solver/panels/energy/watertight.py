@@ -5,6 +5,7 @@ What is minimised, lengths relative to the edges:
     E =   the paper's functionals, as they are weighted
         + anchor · ½ ‖x − x₀‖²                      movement from the pattern on the surface
         + evenness · ½ Σ ‖change of the movement from one edge of a cell to the opposite one‖²
+        + ½ Σ d⁴ / worst²                           distances d from the surface, the greatest first
 
 subject to flat faces. The last term keeps away waves from row to row, like bellows, by which nets of quads
 become flat near any surface; of opposite edges, because nodes that a translation of the pattern takes to
@@ -12,44 +13,41 @@ each other lie there, whereas flat hexagons on a saddle need neighbouring corner
 
 Faces stay clear of collapsing, folding over and crossing themselves by a barrier, see ``guard``.
 
-Gauss–Newton steps with the distances from the faces' best planes as a penalty, hundredfold from stage to
-stage, lead near the minimum; Newton's method on the planes alone then makes them flat to rounding, along the
-shortest way in the sense of E. Where the surface is hardly curved in one direction corners may slide far for
-little, so that steps which had to be shortened are damped afterwards (Levenberg 1944, Marquardt 1963). All
-matrices have the same pattern of entries and are analysed once.
+Gauss–Newton steps with the heights above the faces' best planes as a penalty, tenfold from stage to stage,
+lead near the minimum; Newton's method on the planes alone then makes them flat to rounding, along a short
+way. Where the surface is hardly curved in one direction corners may slide far for little, so that steps which
+had to be shortened are damped afterwards (Levenberg 1944, Marquardt 1963). Only the planes' equations are
+factorised, see ``flat_steps``.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from hexwrap_solver.arrays import Floats, Ints, Progress, no_progress
-from hexwrap_solver.panels.energy.cell_matrix import CellMatrix
+from hexwrap_solver.panels.energy.flat_steps import FlatSteps, summed
 from hexwrap_solver.panels.energy.guard import Guard, free_corners
-from hexwrap_solver.panels.energy.residuals import (
-    bounded,
-    jacobian,
-    plane_distances,
-    plane_slopes,
-    residuals,
-)
+from hexwrap_solver.panels.energy.residuals import bounded, jacobian, residuals
+from hexwrap_solver.panels.energy.seen import Seen
 from hexwrap_solver.panels.polygons import mean_edges
 from hexwrap_solver.panels.types import Weights
 from hexwrap_solver.pattern.types import Pattern
 from hexwrap_solver.surface.types import Surface
 
 #: Weights of the plane distances, stage by stage; the surface weighs 1.
-FLATNESS: tuple[float, ...] = (1e2, 1e4, 1e6, 1e8)
+FLATNESS: tuple[float, ...] = (1e2, 1e3, 1e4, 1e5, 1e6, 1e8)
 
 #: After so many stages Newton's method is tried; the others follow only where it makes no headway.
-USUAL = 3
+USUAL = 5
 
 #: Most Gauss–Newton steps, and the fraction of its energy that a step takes away if another one is to follow
 #: in its stage: what is left undone, the next stage does along with its own work. A heavier weight is no help
 #: where the planes are most of the energy; there it is less. The first stage has one step.
-MOST_STEPS, ENOUGH, LITTLE = 25, 0.35, 0.1
+MOST_STEPS, ENOUGH, LITTLE = 25, 0.6, 0.5
 
 #: The same where nothing is to become flat, and so nothing comes after.
 ONLY_STEPS, ONLY_ENOUGH = 15, 1e-4
@@ -86,32 +84,45 @@ PROJECTIONS, INSIDE, ALIKE = 3, 1e-9, 0.8
 #: fraction of the energy; and at most so many of Newton's steps follow each other.
 CORRECTIONS, CHORDS, WORTH = 4, 8, 0.6
 
+#: Rounds for a step end after so many, or when one changes it by less than this fraction. Eigenvalues of the
+#: preconditioned matrix are taken to lie between this and 1; smaller ones are solved for with less.
+MOST_ROUNDS, EXACT = 30, 0.1
+SLOWEST = 0.2
+
+#: As long as vertices moved less than this / ℓ (root of the mean square), all see the same planes of the
+#: surface as before.
+NEAR = 0.05
+
 #: A step is halved at most down to this fraction.
 SHORTEST = 1e-3
 
 
 @dataclass(frozen=True)
 class Aims:
-    """What is asked of the mesh, see the head of this module. flat: whether faces must become flat."""
+    """What is asked of the mesh, see the head of this module. worst: distances from the surface / ℓ from
+    which on their fourth powers count more than their squares. flat: whether faces must become flat."""
 
     weights: Weights
     anchor: float
     evenness: float
+    worst: float
     flat: bool
 
 
 #: As near to the surface, and to the pattern on it, as flat faces can be. A movement along the surface costs
 #: a tenth of one off it.
-NEAREST = Aims(Weights(planarity=0.0, angle=0.0, edge=0.0, surface=1.0), anchor=0.1, evenness=0.1, flat=True)
+NEAREST = Aims(
+    Weights(planarity=0.0, angle=0.0, edge=0.0, surface=1.0), anchor=0.1, evenness=0.1, worst=0.1, flat=True
+)
 
 
 def functionals(weights: Weights) -> Aims:
     """The paper's. They know shapes only, and would move the mesh by whole edges without a stronger anchor.
     Faces become flat where planarity has a weight."""
-    return Aims(weights, anchor=10.0, evenness=0.1, flat=weights.planarity > 0)
+    return Aims(weights, anchor=10.0, evenness=0.1, worst=np.inf, flat=weights.planarity > 0)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Group:
     """Cells with the same number of corners. corner: (q, p) pattern vertices; length: (q,) target lengths;
     across: (m, p), applied to corners, those on one edge minus those on the opposite one."""
@@ -123,13 +134,28 @@ class _Group:
     guard: Guard
 
 
+class _Soft(NamedTuple):
+    """Derivatives (q, r, 3p) of residuals of cells (q,) of a group by their corners (q, p)."""
+
+    cell: Ints
+    corner: Ints
+    slope: Floats
+
+    def spread(self, residual: Floats, n: int) -> Floats:
+        """(n, 3) derivative of half the sum of the squares of residuals (q, r)."""
+        share = (residual[:, None] @ self.slope)[:, 0]
+        return summed(share.reshape(-1, 3), self.corner.ravel(), n)
+
+
 @dataclass(frozen=True)
 class _State:
-    """points: (n, 3). residual: of each part, see ``_Problem``; pull: (n, 3) the anchor's. asked, planes:
-    energy of what was asked for, and of the plane distances, at the stage's weight."""
+    """points: (n, 3). heights: of each bent group, above the cells' planes / ℓ; shapes: residuals of each
+    group; pull: (n, 3) gradient of what holds single vertices and of evenness. asked, planes:
+    energy of what was asked for, and of the heights, at the stage's weight."""
 
     points: Floats
-    residual: tuple[Floats, ...]
+    heights: list[Floats]
+    shapes: list[Floats]
     pull: Floats
     asked: float
     planes: float
@@ -260,11 +286,10 @@ def _nudges(pattern: Pattern) -> Floats:
 
 
 class _Problem:
-    """Residuals of all cells over the shared vertices.
+    """Energies of all cells over the shared vertices, and steps that lower them.
 
-    Its parts are the groups of cells with the same number p of corners, whose last p residuals are the
-    distances from their planes; and the vertices' distances from the surface, which between two
-    linearisations is seen as the plane through each vertex' nearest point. unit: mean target length.
+    The distance from the surface is seen, between two linearisations, as that from the plane through each
+    vertex' nearest point. unit: mean target length.
     """
 
     def __init__(self, pattern: Pattern, length: Floats, aims: Aims, surface: Surface) -> None:
@@ -273,86 +298,117 @@ class _Problem:
         self._surface = surface
         self._start = pattern.vertices
         self._unit = float(length.mean())
-        self._corners = [group.corner for group in self._groups]
-        if aims.weights.surface:
-            self._corners.append(np.arange(len(pattern.vertices))[:, None])
-        self._matrix = CellMatrix(pattern.vertices, self._corners)
+        self._even = _evenness(self._groups, len(self._start), aims.evenness / self._unit**2)
+        self._bent = [g for g in self._groups if aims.flat and g.corner.shape[1] > 3]
+        self._matrix = FlatSteps(pattern.vertices, [g.corner for g in self._bent])
         self._flatness = 0.0
-        self._from = pattern.vertices
-        self._slopes: list[Floats] = []
-        self._away: Floats = np.zeros((0, 1))
+        self._soft: list[_Soft] = []
+        self._bases: list[Floats] = []
+        self._soft_blocks: Floats = np.zeros((0, 3, 3))
+        n = len(self._start)
+        self._from = np.full((n, 3), np.inf)
+        self._away, self._direction = np.zeros(n), np.zeros((n, 3))
 
     def linearise(
         self, points: Floats, flatness: float, damping: float = 0.0, *, guarded: bool = True
     ) -> _State:
         """Takes the derivatives there, with that weight of the planes, and gives the state. damping: of
         steps, as the anchor's weight. guarded: whether they feel the barrier."""
-        self._flatness, self._from, self._slopes = flatness, points, []
+        n = len(points)
+        self._flatness, self._soft, self._bases, normals = flatness, [], [], []
+        squares = np.zeros((n, 9))
         for g in self._groups:
             corner = points[g.corner]
-            shape = self._shape_slopes(g, corner, guarded)
-            plane = np.sqrt(flatness) * plane_slopes(corner, g.length)
-            slope = np.concatenate([shape, plane], axis=1)
-            self._slopes.append(slope.reshape(*slope.shape[:2], -1))
+            seen = Seen.of(corner)
+            if g in self._bent:
+                normals.append(seen.normal / g.length[:, None])
+                self._bases.append(seen.basis())
+            cell, slope = self._shape_slopes(g, corner, seen, guarded)
+            # (Σ sᵢ·xᵢ)² ≤ Σ|sⱼ| Σ (sᵢ·xᵢ)² / |sᵢ|
+            size = np.sqrt(np.einsum("qrpd,qrpd->qrp", slope, slope))
+            share = size.sum(axis=2, keepdims=True) / np.where(size > 0, size, np.inf)
+            square = np.einsum("qrp,qrpd,qrpe->qpde", share, slope, slope, optimize=True)
+            at = g.corner[cell]
+            squares += summed(square.reshape(-1, 9), at.ravel(), n)
+            self._soft.append(_Soft(cell, at, slope.reshape(*slope.shape[:2], 3 * g.corner.shape[1])))
+        self._soft_blocks = blocks = squares.reshape(n, 3, 3)
         weight = self._aims.weights.surface
         if weight:
-            away, direction = _beside(points, self._surface)
-            self._away = np.sqrt(weight) / self._unit * away[:, None]
-            self._slopes.append(np.sqrt(weight) / self._unit * direction[:, None])
-        self._matrix.factorise(self._slopes, (self._aims.anchor + damping) / self._unit**2)
+            self._look_at_surface(points)
+            away = self._heights_above_surface(points)
+            stiffness = weight / self._unit**2 * (1 + 4 * (away / self._aims.worst) ** 2)
+            along = self._direction
+            blocks = blocks + stiffness[:, None, None] * along[:, :, None] * along[:, None]
+        free = (self._aims.anchor + damping) / self._unit**2 + 2 * self._even.diagonal()
+        blocks = blocks + free[:, None, None] * np.eye(3)
+        self._matrix.factorise(blocks, normals, self._bases, flatness)
         return self.at(points)
 
-    def at(self, points: Floats) -> _State:
-        """The energy is ∞ where a step went so far that squares overflow."""
-        with np.errstate(all="ignore"):
-            return self._at(points)
+    def _look_at_surface(self, points: Floats) -> None:
+        """Where vertices hardly moved, the planes seen last serve again; for all or none, so that what is
+        symmetric stays so."""
+        if not np.linalg.norm(points - self._from) < NEAR * self._unit * np.sqrt(len(points)):
+            self._away, self._direction = _beside(points, self._surface)
+            self._from = points
 
-    def _at(self, points: Floats) -> _State:
-        pull = np.sqrt(self._aims.anchor) / self._unit * (points - self._start)
-        root = np.sqrt(self._flatness)
-        residual, asked, planes = [], _square(pull), 0.0
-        try:
+    def at(self, points: Floats) -> _State:
+        """The energy is ∞ or no number where a step went so far that squares overflow."""
+        with np.errstate(all="ignore"):
+            moved = points - self._start
+            pull = self._aims.anchor / self._unit**2 * moved + self._even @ moved
+            asked, planes = 0.5 * float(np.vdot(pull, moved)), 0.0
+            heights, shapes = [], []
             for g in self._groups:
                 corner = points[g.corner]
-                shape = self._shape(g, corner)
-                plane = root * plane_distances(corner, g.length)
-                residual.append(np.concatenate([shape, plane], axis=1))
-                asked, planes = asked + _square(shape), planes + _square(plane)
-        except np.linalg.LinAlgError:
-            return _State(points, (), pull, np.inf, np.inf)
-        if self._aims.weights.surface:
-            slope = self._slopes[-1][:, 0]
-            away = self._away + np.einsum("nd,nd->n", slope, points - self._from)[:, None]
-            residual.append(away)
-            asked += _square(away)
-        return _State(points, tuple(residual), pull, asked, planes)
+                seen = Seen.of(corner)
+                if g in self._bent:
+                    heights.append(seen.heights() / g.length[:, None])
+                    planes += self._flatness * _square(heights[-1])
+                shapes.append(self._shape(g, corner, seen))
+                asked += _square(shapes[-1])
+            if self._aims.weights.surface:
+                away = self._heights_above_surface(points)
+                steep = away**2 / self._aims.worst
+                asked += self._aims.weights.surface * (_square(away) + _square(steep))
+                pull += (
+                    self._aims.weights.surface
+                    / self._unit
+                    * ((away + 2 * away * steep / self._aims.worst)[:, None] * self._direction)
+                )
+            return _State(points, heights, shapes, pull, asked, planes)
 
-    def _shape(self, g: _Group, corner: Floats) -> Floats:
+    def _heights_above_surface(self, points: Floats) -> Floats:
+        """(n,) / ℓ."""
+        moved = np.einsum("nd,nd->n", self._direction, points - self._from)
+        return np.asarray((self._away + moved) / self._unit)
+
+    def _shape(self, g: _Group, corner: Floats, seen: Seen) -> Floats:
         """(q, r) what is asked of the cells' shapes."""
-        moved = corner - self._start[g.corner]
-        change = (np.sqrt(self._aims.evenness) / self._unit) * (g.across @ moved)
         shape = residuals(corner, g.length, self._aims.weights, angles=g.regular)
-        guard = [g.guard.residuals(corner)] if self._aims.flat else []
-        return np.concatenate([change.reshape(len(change), -1), shape, *guard], axis=1)
+        return np.concatenate([shape, g.guard.residuals(seen)], axis=1) if self._aims.flat else shape
 
-    def _shape_slopes(self, g: _Group, corner: Floats, guarded: bool) -> Floats:
-        """(q, r, p, 3) derivatives of it by the corners."""
-        q, p, _ = corner.shape
-        change = np.einsum("kc,xy->kxcy", g.across, np.eye(3)).reshape(-1, p, 3)
-        change = np.broadcast_to(np.sqrt(self._aims.evenness) / self._unit * change, (q, *change.shape))
+    def _shape_slopes(self, g: _Group, corner: Floats, seen: Seen, guarded: bool) -> tuple[Ints, Floats]:
+        """(k,) cells, and (k, r, p, 3) derivatives of it by their corners: of the others they are 0."""
         shape = jacobian(corner, g.length, self._aims.weights, angles=g.regular)
-        guard = [g.guard.slopes(corner) * guarded] if self._aims.flat else []
-        return np.concatenate([change, shape, *guard], axis=1)
+        every = np.arange(len(corner))
+        if not self._aims.flat:
+            return every, shape
+        cell, guard = g.guard.slopes(seen)
+        guard = guard * guarded
+        if not shape.shape[1]:
+            return cell, guard
+        whole = np.zeros((len(corner), *guard.shape[1:]))
+        whole[cell] = guard
+        return every, np.concatenate([shape, whole], axis=1)
 
     def bend(self, points: Floats) -> float:
         """Greatest distance of a corner from its face's plane / ℓ; ∞ where points are no numbers."""
         with np.errstate(all="ignore"):
-            try:
-                return float(
-                    max(np.abs(plane_distances(points[g.corner], g.length)).max() for g in self._groups)
-                )
-            except np.linalg.LinAlgError:
-                return np.inf
+            found = [
+                np.abs(Seen.of(points[g.corner]).heights() / g.length[:, None]).max() for g in self._bent
+            ]
+        worst = float(max(found, default=0.0))
+        return worst if np.isfinite(worst) else np.inf
 
     def flat(self, points: Floats) -> bool:
         """But for rounding, which far from the origin is more."""
@@ -360,19 +416,46 @@ class _Problem:
         return self.bend(points) < max(FLAT, rounding)
 
     def step(self, state: _State, *, planes_only: bool = False) -> Floats:
-        """(n, 3) Gauss–Newton step from a state with the derivatives taken last."""
-        gradient = np.zeros(state.points.size)
-        if not planes_only:
-            gradient += np.sqrt(self._aims.anchor) / self._unit * state.pull.ravel()
-        parts = len(self._groups) if planes_only else len(self._corners)
-        for corner, slope, residual in zip(self._corners[:parts], self._slopes, state.residual, strict=False):
-            some = slice(-corner.shape[1] if planes_only else 0, None)
+        """(n, 3) Gauss–Newton step from a state with the derivatives taken last.
+
+        What couples vertices beside the planes (evenness and the barrier) stands in the preconditioner M
+        vertex by vertex, and large enough for M to be an upper bound of the matrix; Chebyshev's iteration
+        does the rest. Conjugate gradients take fewer rounds, but find polynomials for what is symmetric that
+        magnify the rounding in everything else. As M z = r, the matrix times z is r + rest · z.
+        """
+        heights = [np.einsum("qpr,qp->qr", b, h) for b, h in zip(self._bases, state.heights, strict=True)]
+        if planes_only:
+            return self._matrix.solve(np.zeros_like(state.points), heights)
+        gradient = state.pull.copy()
+        for soft, shape in zip(self._soft, state.shapes, strict=True):
             # Beyond the barrier residuals are ∞ and slopes 0.
-            pull = np.where(np.isfinite(residual), residual, 0.0)
-            share = (pull[:, None, some] @ slope[:, some]).ravel()
-            at = 3 * corner[..., None] + np.arange(3)
-            gradient += np.bincount(at.ravel(), weights=share, minlength=gradient.size)
-        return -self._matrix.solve(gradient).reshape(-1, 3)
+            pull = np.where(np.isfinite(shape), shape, 0.0)[soft.cell]
+            gradient += soft.spread(pull, len(gradient))
+        step = self._matrix.solve(gradient, heights)
+        left = -self._rest(step)
+        middle, half = (1 + SLOWEST) / 2, (1 - SLOWEST) / 2
+        way, image, again, fresh = np.zeros_like(step), np.zeros_like(step), 0.0, 1 / middle
+        ratio = half / middle
+        for _ in range(MOST_ROUNDS):
+            better = self._matrix.solve(-left)
+            way = again * way + fresh * better
+            image = again * image + fresh * (left + self._rest(better))
+            step, left = step + way, left - image
+            if np.linalg.norm(way) < EXACT * np.linalg.norm(step):
+                break
+            before, ratio = ratio, 1 / (2 * middle / half - ratio)
+            again, fresh = ratio * before, 2 * ratio / half
+        return step
+
+    def _rest(self, moved: Floats) -> Floats:
+        """(n, 3) the matrix less the preconditioner, times what moved."""
+        result = self._even @ moved - 2 * self._even.diagonal()[:, None] * moved
+        result -= np.einsum("nde,ne->nd", self._soft_blocks, moved)
+        for soft in self._soft:
+            q, p = soft.corner.shape
+            along = (soft.slope @ moved[soft.corner].reshape(q, 3 * p, 1))[..., 0]
+            result += soft.spread(along, len(moved))
+        return np.asarray(result)
 
 
 def _beside(points: Floats, surface: Surface) -> tuple[Floats, Floats]:
@@ -458,3 +541,16 @@ def _across(p: int) -> Floats:
     if p % 2:
         return np.zeros((0, p))
     return np.asarray((np.roll(np.eye(p), p // 2 - 1, axis=1) - np.eye(p)) / np.sqrt(2))
+
+
+def _evenness(groups: list[_Group], n: int, weight: float) -> csr_array:
+    """(n, n) matrix of the energy that changes from edges of cells to the opposite ones cost."""
+    rows, columns, values = [], [], []
+    for g in groups:
+        q, p = g.corner.shape
+        square = weight * g.across.T @ g.across
+        rows.append(np.repeat(g.corner, p, axis=1).ravel())
+        columns.append(np.tile(g.corner, (1, p)).ravel())
+        values.append(np.tile(square.ravel(), q))
+    at = (np.concatenate(rows), np.concatenate(columns))
+    return csr_array((np.concatenate(values), at), shape=(n, n))

@@ -133,7 +133,7 @@ def _points_in_faces(layout: Layout) -> tuple[Ints, Ints]:
     """Every face with every node that stands in it; those that stand off their points are looked for farther
     around."""
     lattice, tolerance = layout.lattice, layout.tolerance
-    far = lattice.reach / lattice.unit.imag  # in lattice coordinates
+    far = lattice.largest_offset / lattice.unit.imag  # in lattice coordinates
     face, point = lattice_points_in_triangles(lattice.coordinates(layout.corners), tolerance + far)
     wanted = lattice.is_node(point)
     face, point = face[wanted], point[wanted]

@@ -58,7 +58,7 @@ MOST_NAMED, MOST_PLACES = 4, 8
 
 def place_lattice(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings) -> Placement:
     """The way of placing that suits the domain and what is to be aligned."""
-    return Placing.of(cmap, lattice, settings).at(settings)
+    return PlacementFamily.of(cmap, lattice, settings).at(settings)
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ class _Way:
 
 
 @dataclass(frozen=True)
-class Placing:
+class PlacementFamily:
     """Ways of placing that differ in the size of the cells alone: what they share is computed once.
 
     loops: those to align. features: numbers of those that cells are cut along. shape: settings whose sizes do
@@ -96,7 +96,7 @@ class Placing:
     notes: list[str]
 
     @classmethod
-    def of(cls, cmap: ConformalMap, lattice: Lattice, settings: PatternSettings) -> Placing:
+    def of(cls, cmap: ConformalMap, lattice: Lattice, settings: PatternSettings) -> PlacementFamily:
         check_phase(settings)
         cmap = as_sheet(cmap) if cmap.kind == "net" else quantized(cmap, lattice)
         loops, notes = loops_to_align(cmap, lattice, settings)

@@ -39,7 +39,7 @@ class Points:
 class HalfEdges:
     """tail, head: points. isometry: (h, 4) from the head's own coordinates to the tail's. key: order around
     the tail. twin: the same edge the other way. outer: runs along the boundary outside of the domain. name:
-    number of a pattern edge from a node, −1 for others. rim: runs along the boundary of the surface."""
+    number of a pattern edge from a node, −1 for others. on_boundary: of the surface."""
 
     tail: Ints
     head: Ints
@@ -48,7 +48,7 @@ class HalfEdges:
     twin: Ints
     outer: Bools
     name: Ints
-    rim: Bools
+    on_boundary: Bools
 
     def without(self, gone: Bools) -> HalfEdges:
         keep = ~gone
@@ -200,7 +200,9 @@ def _along_boundary(layout: Layout, boundary: Boundary, on: BoundaryPoints) -> H
         np.full(k, BACK),
         np.full(k, -1),
     )
-    return replace(halves, outer=np.repeat([False, True], k), rim=np.tile(boundary.rim[edge] >= 0, 2))
+    return replace(
+        halves, outer=np.repeat([False, True], k), on_boundary=np.tile(boundary.surface_loop[edge] >= 0, 2)
+    )
 
 
 def _join(parts: list[HalfEdges]) -> HalfEdges:

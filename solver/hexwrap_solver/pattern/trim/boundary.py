@@ -29,8 +29,8 @@ class Boundary:
     """Boundary edges, loop after loop in their order, the domain on the left.
 
     face, edge: (b,) where each lies. number: (m, 3) the boundary edge at a face's edge, −1 inside.
-    loop: (b,) number of its loop. rim: (b,) loop of the surface that it is of, −1 along a fold. following:
-    (b,) the next boundary edge. step: (b, 4) isometry from the coordinates of the next edge's face to those
+    loop: (b,) number of its loop. surface_loop: (b,) that of the surface, −1 along a fold. following: (b,)
+    the next boundary edge. step: (b, 4) isometry from the coordinates of the next edge's face to those
     of this one's. tail, head: (b,) complex, in the face's coordinates.
     """
 
@@ -38,7 +38,7 @@ class Boundary:
     edge: Ints
     number: Ints
     loop: Ints
-    rim: Ints
+    surface_loop: Ints
     following: Ints
     step: Ints
     tail: Complexes

@@ -73,7 +73,7 @@ def seams(
     face, edge = boundary.face[on.edge], boundary.edge[on.edge]
     half_edge = 3 * face + edge
     at_vertex = on.t == 0
-    folded = boundary.rim[on.edge] < 0
+    folded = boundary.surface_loop[on.edge] < 0
     twin = np.where(folded, layout.twin[half_edge], half_edge)
     lower = half_edge <= twin
     place = np.where(lower, on.t, 1 - on.t)

@@ -40,10 +40,10 @@ def tips_of(layout: Layout, boundary: Boundary) -> Tips:
     lattice, near = layout.lattice, 4 * layout.tolerance
     before = np.argsort(boundary.following)
     half_edge = 3 * boundary.face + boundary.edge
-    edge = np.flatnonzero((boundary.rim < 0) & (layout.twin[half_edge] == half_edge[before]))
+    edge = np.flatnonzero((boundary.surface_loop < 0) & (layout.twin[half_edge] == half_edge[before]))
     place, along = boundary.tail[edge], (boundary.head - boundary.tail)[edge]
     # Nodes about each tip, with the edges that leave them.
-    margin = int(np.ceil(lattice.edge / lattice.unit.imag + lattice.reach)) + 2
+    margin = int(np.ceil(lattice.edge / lattice.unit.imag + lattice.largest_offset)) + 2
     window = np.stack(np.meshgrid(np.arange(-margin, margin + 1), np.arange(-margin, margin + 1)), axis=-1)
     start = np.rint(lattice.coordinates(place)).astype(np.int64)[:, None] + window.reshape(-1, 2)
     ways = np.where(lattice.is_node(start)[..., None], lattice.ways[lattice.residue(start)], -1)

@@ -89,11 +89,11 @@ def trim(
     cells: WholeCells,
     folded: Folded | None = None,
     *,
-    rim: bool = True,
+    keep_cut: bool = True,
 ) -> Trimmed:
     """Whole cells and the cells that the boundary cuts.
 
-    met: (loops,) those that the pattern meets, or that no cell may enclose. folded: with features. rim:
+    met: (loops,) those that the pattern meets, or that no cell may enclose. folded: with features. keep_cut:
     whether cells that the boundary of the surface cuts are kept, too, and not only those along folds.
 
     Raises TooCoarse where a face goes around the surface.
@@ -106,8 +106,8 @@ def trim(
     if folded is not None:
         seam = seams(layout, folded.faces, folded.glued, folded.features, boundary, on, len(points.face))
     faces = _trace(layout, half_edges, used)
-    if not rim:
-        faces = faces.without_rim(half_edges)
+    if not keep_cut:
+        faces = faces.without_cut(half_edges)
     area = _areas(layout, points, faces)
     nothing, sliver = NOTHING * layout.tolerance * lattice.edge, SLIVER * lattice.cell_area
     gone = _slivers(half_edges, faces, area, (nothing, sliver), _lengths(layout, points, half_edges))
@@ -116,8 +116,8 @@ def trim(
         joined = int(((area > nothing) & (area < sliver)).sum())
         half_edges = half_edges.without(gone)
         faces = _trace(layout, half_edges, used)
-        if not rim:
-            faces = faces.without_rim(half_edges)
+        if not keep_cut:
+            faces = faces.without_cut(half_edges)
         linked = np.bincount(half_edges.tail[~half_edges.outer], minlength=len(points.face)) > 1
         if seam is not None:
             linked = seam.any_of(linked)
@@ -171,16 +171,16 @@ class _Faces:
         half_edge = Ragged(self.half_edge.values[entry], offsets)
         return _Faces(half_edge, self.isometry[entry], self.corner[entry])
 
-    def without_rim(self, edges: HalfEdges) -> _Faces:
+    def without_cut(self, edges: HalfEdges) -> _Faces:
         """Those that do not come to the boundary of the surface."""
-        at_rim = np.zeros(self.half_edge.n_rows, dtype=bool)
-        at_rim[self.half_edge.row[edges.rim[self.half_edge.values]]] = True
-        return self.part(~at_rim)
+        at_boundary = np.zeros(self.half_edge.n_rows, dtype=bool)
+        at_boundary[self.half_edge.row[edges.on_boundary[self.half_edge.values]]] = True
+        return self.part(~at_boundary)
 
     def along_folds(self, edges: HalfEdges) -> Bools:
         """(f,) faces with a side along a fold."""
         outside = edges.twin[self.half_edge.values]
-        on_fold = edges.outer[outside] & ~edges.rim[outside]
+        on_fold = edges.outer[outside] & ~edges.on_boundary[outside]
         return np.bincount(self.half_edge.row[on_fold], minlength=self.half_edge.n_rows) > 0
 
     def entries(self, keep: Bools) -> _Faces:

@@ -13,7 +13,7 @@ import numpy as np
 from hexwrap_solver.arrays import Ragged
 from hexwrap_solver.errors import SurfaceError
 from hexwrap_solver.surface.brep.kinks import is_smooth
-from hexwrap_solver.surface.brep.mesh import mesh_brep
+from hexwrap_solver.surface.brep.mesh import BrepMesh, mesh_brep
 from hexwrap_solver.surface.brep.types import Brep
 from hexwrap_solver.surface.brep.whole import brep_of_surface
 from hexwrap_solver.surface.errors import (
@@ -26,8 +26,13 @@ from hexwrap_solver.surface.errors import (
 from hexwrap_solver.surface.intake import surface_from_mesh
 from hexwrap_solver.surface.meshing import surface_from_nurbs
 from hexwrap_solver.surface.nurbs_checks import TOLERANCE, check_data, check_pinches, checked
+from hexwrap_solver.surface.orient import is_inside_out
 from hexwrap_solver.surface.pieces import joined, together
+from hexwrap_solver.surface.topology import twins
 from hexwrap_solver.surface.types import NurbsSurface, SentMesh, Surface, SurfaceSettings
+
+#: Rhino turns closed polysurfaces outwards when they are drawn; other programs' files hold what they hold.
+INSIDE_OUT = "The closed polysurface was inside out and was turned, as Rhino does."
 
 
 def surface_from_brep(brep: Brep, settings: SurfaceSettings | None = None) -> Surface:
@@ -35,14 +40,19 @@ def surface_from_brep(brep: Brep, settings: SurfaceSettings | None = None) -> Su
     that came with them are taken, which repairs says. Raises SurfaceError."""
     settings = settings or SurfaceSettings()
     try:
-        return surface_from_mesh(sent_of_brep(brep, settings), settings)
+        mesh = mesh_brep(brep, settings.mesh)
+        twin = twins(mesh.faces, len(mesh.vertices))
+        if len(brep.faces) > 1 and (twin >= 0).all() and is_inside_out(mesh.vertices, mesh.faces, twin):
+            surface = surface_from_mesh(_sent(mesh, turned=True), settings)
+            return replace(surface, repairs=(INSIDE_OUT, *surface.repairs)).knowing(surface)
+        return surface_from_mesh(_sent(mesh), settings)
     except (TrimError, NonManifoldEdgeError, NonManifoldVertexError) as error:
         render = [face.render for face in brep.faces if face.render is not None]
         if len(render) < len(brep.faces):
             raise
         try:
-            mesh, _, joint = joined(together(render)[0], brep.tolerance)
-            surface = surface_from_mesh(mesh, settings)
+            sent, _, joint = joined(together(render)[0], brep.tolerance)
+            surface = surface_from_mesh(sent, settings)
         except SurfaceError:
             raise error from None
         reason = error.detail.partition(": ")[0]
@@ -76,7 +86,7 @@ def surface_from_patch(
     return surface_from_brep(brep_of_surface(nurbs, max(tolerance or 0.0, TOLERANCE * size)), settings)
 
 
-def sent_of_brep(brep: Brep, settings: SurfaceSettings) -> SentMesh:
-    mesh = mesh_brep(brep, settings.mesh)
-    faces = Ragged.from_table(mesh.faces)
-    return SentMesh(mesh.vertices, faces, mesh.normals, mesh.creases, np.asarray(mesh.fold))
+def _sent(mesh: BrepMesh, turned: bool = False) -> SentMesh:
+    turn, sign = ([0, 2, 1], -1.0) if turned else ([0, 1, 2], 1.0)
+    faces = Ragged.from_table(mesh.faces[:, turn])
+    return SentMesh(mesh.vertices, faces, sign * mesh.normals, mesh.creases, np.asarray(mesh.fold))
