@@ -4,8 +4,9 @@
     python -m benchmarks.rhino --write table.json ...
 
 Takes every .3dm in the folders through the pipeline with default settings, each in a process of its own with
-bounded time and memory; results are judged by ``tests/contract.py``. Seconds are processor time. With
-``--pictures`` the panels of what is solved are drawn; ``--write`` puts tables into docs/results.md.
+bounded time and memory; results are judged by ``tests/contract.py``. Seconds are processor time; covered is
+the area of the panels over that of the surface. With ``--pictures`` the panels of what is solved are drawn;
+``--write`` puts tables into docs/results.md.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ from hexwrap_server.jobs.work import take_in
 from hexwrap_server.output import wire
 from hexwrap_server.output.writers import Meta, write
 from hexwrap_solver.errors import HexwrapError
+from hexwrap_solver.panels.polygons import fan_areas
 
 NO_SURFACE = "holds no mesh, surface"
 PAGE = Path(__file__).parent.parent / "docs" / "results.md"
@@ -152,7 +154,9 @@ def whole_row(asked: Task, file: Path, options: argparse.Namespace) -> dict[str,
     solution, timings = solve_here(asked, lambda *_: None)
     result = json.loads(wire.result_json(solution, timings))
     wrong = violations(result)
-    quality = result["quality"]
+    cells = solution.pattern
+    area = float(solution.map.surface.areas.sum())
+    covered = result["quality"]["coverage"] * float(fan_areas(cells.cells).sum()) / area if cells else 0.0
     if options.pictures:
         options.pictures.mkdir(parents=True, exist_ok=True)
         picture = write("panels.png", solution, Meta(file.stem, timings))
@@ -160,13 +164,13 @@ def whole_row(asked: Task, file: Path, options: argparse.Namespace) -> dict[str,
     return {
         "verdict": "wrong" if wrong else "solved",
         "told": "; ".join(wrong)
-        or f"{len(result['panels']['polygons'])} panels, {100 * quality['coverage']:.0f} % covered, "
+        or f"{len(result['panels']['polygons'])} panels, {100 * covered:.0f} % covered, "
         f"{len(result['mesh']['loops'])} loops | "
         + " ".join(result["mesh"]["repairs"]),
         "panels": len(result["panels"]["polygons"]),
-        "covered": quality["coverage"],
+        "covered": covered,
         "loops": len(result["mesh"]["loops"]),
-        "notes": quality["notes"],
+        "notes": result["quality"]["notes"],
     }
 
 

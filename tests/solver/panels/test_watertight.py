@@ -115,13 +115,13 @@ def test_no_panel_collapses_or_crosses_itself(make, chart, low):
 
 
 def test_flat_faces_are_convex_on_a_saddle_where_four_meet():
-    """Three cannot: the honeycomb is flat, too, but hardly a cell of it is convex."""
+    """320 hexagons. Three cannot: the honeycomb is flat, too, but hardly a cell of it is convex."""
     cmap = grid_map(catenoid, 96, 60, -1.2, 2.2)
     pattern = trihexagonal_pattern(catenoid, 32, 10, -0.8)
     quality = measured(pattern, cmap)
     assert quality.planarity.max() < 1e-9
     assert quality.convex.all()
-    assert quality.surface_distance.max() < 0.1 * pattern.edge_length  # of corners and centres
+    assert quality.surface_distance.max() < 0.05 * pattern.edge_length  # of corners and centres
     assert quality.movement < 0.1 * pattern.edge_length
     honeycomb = measured(hex_pattern(catenoid, 32, 10, -0.8), cmap)
     assert honeycomb.planarity.max() < 1e-9

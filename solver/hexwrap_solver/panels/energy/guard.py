@@ -22,7 +22,7 @@ from hexwrap_solver.panels.energy.seen import Seen
 from hexwrap_solver.pattern.types import Pattern
 
 FAN, HOLD = 0.4, 0.1
-EAR, BULGE = 0.2, 1.0
+EAR, BULGE = 0.2, 4.0
 
 #: Triangles smaller than this fraction of the mean of their cell's fan, as trimmed cells have, do not count.
 LEAST = 0.05

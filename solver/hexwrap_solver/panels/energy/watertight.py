@@ -89,7 +89,8 @@ CORRECTIONS, CHORDS, WORTH = 4, 8, 0.6
 MOST_ROUNDS, EXACT = 30, 0.1
 SLOWEST = 0.2
 
-#: As long as no vertex moved by this / ℓ, all see the same planes of the surface as before.
+#: As long as vertices moved less than this / ℓ (root of the mean square), all see the same planes of the
+#: surface as before.
 NEAR = 0.05
 
 #: A step is halved at most down to this fraction.
@@ -344,9 +345,9 @@ class _Problem:
         return self.at(points)
 
     def _look_at_surface(self, points: Floats) -> None:
-        """Where nothing moved far, the planes seen last serve again; for all or none, so that what is
+        """Where vertices hardly moved, the planes seen last serve again; for all or none, so that what is
         symmetric stays so."""
-        if not np.abs(points - self._from).max(initial=0.0) < NEAR * self._unit:
+        if not np.linalg.norm(points - self._from) < NEAR * self._unit * np.sqrt(len(points)):
             self._away, self._direction = _beside(points, self._surface)
             self._from = points
 
