@@ -16,10 +16,13 @@ from hexwrap_solver.pattern.lattice import LATTICES
 from hexwrap_solver.pattern.place import choose
 from hexwrap_solver.pattern.place.choose import PlacementFamily
 from hexwrap_solver.pattern.place.deform import distortion_of
+from hexwrap_solver.pattern.place.features import least_where_they_meet
 from hexwrap_solver.pattern.place.placement import cost_of
 from hexwrap_solver.pattern.types import Kind, Pattern, PatternSettings
+from hexwrap_solver.surface import surface_from_mesh
 from hexwrap_solver.surface.drawn import with_lines
-from tests.solver.pattern.folded import ELL, RECTANGLE, plan, prism
+from hexwrap_solver.surface.types import SurfaceSettings
+from tests.solver.pattern.folded import ELL, RECTANGLE, grid, plan, prism
 
 PLANS = {"box": RECTANGLE, "ell": ELL}
 
@@ -175,3 +178,56 @@ def test_a_number_that_suits_the_folds_better_is_told_and_the_one_asked_for_kept
     better = lay_pattern(solved("box"), replace(settings, around=int(note.split()[0])))
     assert better.distortion < 0.5 * pattern.distortion
     assert not any("would fit the folds better" in note for note in better.notes)
+
+
+def worst(notes: tuple[str, ...]) -> float:
+    (note,) = (note for note in notes if note.startswith("Folds meet at"))
+    return float(note.split("distort cells by ")[1].split()[0])
+
+
+def test_a_pattern_that_is_aligned_nowhere_winds_along_with_folds_that_lean() -> None:
+    settings = PatternSettings("hex", around=60, rotation="vertex", boundary="trim")
+    cmap = solved("box", np.deg2rad(20.0))
+    aligned = lay_pattern(cmap, settings)
+    assert any('With align "none"' in note and "lean by 4.0°" in note for note in aligned.notes)
+    wound = lay_pattern(cmap, replace(settings, align="none"))
+    assert all(feature.straight for feature in wound.features)
+    assert wound.distortion < 0.03 < aligned.distortion
+    assert euler(wound) == 0
+
+
+def test_a_pattern_winds_where_rows_along_the_boundary_cost_too_much() -> None:
+    """Folds of a tower that turns by 50°: 10° off, at 0.19 or more with both ends on rows of cells."""
+    cmap = solved("box", np.deg2rad(50.0))
+    settings = PatternSettings("quad", around=40, boundary="trim")
+    wound = lay_pattern(cmap, settings)
+    assert all(feature.straight for feature in wound.features)
+    assert wound.distortion < 0.05
+    assert any("so that the pattern winds along with them" in note for note in wound.notes)
+    whole = lay_pattern(cmap, replace(settings, boundary="whole"))  # ends would be ragged
+    assert not any(feature.straight for feature in whole.features)
+    assert any('With align "none" and boundary "trim"' in note for note in whole.notes)
+
+
+def test_corners_that_no_lines_of_the_pattern_have_are_named_with_the_least_they_cost(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """At the outer corners of a ledge three right angles make 270°, at the inner ones two of 90° and one of
+    270° make 450°: √2 and √(3/2) at least, with targets of 90° and 180°."""
+    outer = plan(RECTANGLE, 2.5) - (15, 10)
+    inner = 0.6 * outer
+    rows = [(outer, z) for z in range(0, 25, 2)]
+    rows += [(outer + t * (inner - outer), 24) for t in (0.25, 0.5, 0.75)]
+    rows += [(inner, z) for z in range(24, 49, 2)]
+    rings = np.stack([np.column_stack([xy, np.full(len(xy), float(z))]) for xy, z in rows])
+    surface = surface_from_mesh(grid(rings), SurfaceSettings(caps="keep"))
+    cmap = conformal_map(surface, BoundaryCondition("straight"))
+    settings = PatternSettings("quad", around=30, boundary="trim")
+    placing = PlacementFamily.of(cmap, LATTICES["quad"], settings)
+    vertex, least = least_where_they_meet(cmap, LATTICES["quad"], placing.chains)
+    assert len(vertex) == 8
+    at = abs(cmap.surface.vertices[vertex, 0])
+    assert least[at > 14] == pytest.approx(2**0.5 - 1, abs=0.06)
+    assert least[at < 14] == pytest.approx(1.5**0.5 - 1, abs=0.06)
+    monkeypatch.setattr(choose, "MOST_GIVEN_UP", 1)
+    assert worst(placing.at(settings).notes) == pytest.approx(least.max(), abs=0.005)

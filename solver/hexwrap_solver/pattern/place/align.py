@@ -285,13 +285,22 @@ def frame_of(
 def _common(
     cmap: ConformalMap, lattice: Lattice, turn: Complexes, zero: complex, chains: list[Chain]
 ) -> complex:
-    """The turn common to all sides; of features alone, that of one turn around, or of the longest one."""
+    """The turn common to all sides. Of features alone, that of one turn around, or of the longest one; but
+    where none of them closes around the surface, the one nearest to that at which they lean least on the
+    whole: the pattern then winds along with them."""
     if len(turn):
         return complex(turn.mean() / abs(turn.mean()))
     along = cmap.deck.translation if cmap.deck.apex is None else 0j
     if along == 0:
         along = max(chains, key=lambda chain: chain.length).axis
-    return zero * abs(along) / along if along else zero  # a ring on a disk has no direction
+    if not along:  # a ring on a disk has no direction
+        return zero
+    unit = zero * abs(along) / along
+    if not any(chain.closed for chain in chains):
+        fold = 4 * np.pi / lattice.quantum  # of lines: turned by half a quantum, they may lie on others
+        lean = sum(chain.length * (chain.axis * unit / zero) ** fold for chain in chains)
+        unit *= np.exp(-1j * np.angle(lean) / fold)
+    return complex(unit)
 
 
 def trials_at(frame: _Frame, strain: Strain, scale: complex, cost_of_size: float) -> list[_Trial]:

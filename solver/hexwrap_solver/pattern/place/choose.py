@@ -18,7 +18,14 @@ from hexwrap_solver.pattern.place.align import (
 )
 from hexwrap_solver.pattern.place.cone import place_on_cone, place_on_flat_ring
 from hexwrap_solver.pattern.place.cylinder import place_on_cylinder
-from hexwrap_solver.pattern.place.features import Chain, chains_of, narrow, worth_following
+from hexwrap_solver.pattern.place.features import (
+    Chain,
+    FeatureLines,
+    chains_of,
+    least_where_they_meet,
+    narrow,
+    worth_following,
+)
 from hexwrap_solver.pattern.place.net import as_sheet, place_on_net
 from hexwrap_solver.pattern.place.placement import (
     BEARABLE,
@@ -39,17 +46,37 @@ from hexwrap_solver.pattern.types import PatternSettings
 #: predicted, and than that at the worst; above FINE, a number of cells around at which they cost less than
 #: half as much is told.
 P99, MOST_PREDICTED, MOST_DISTORTED, FINE = 0.99, 0.15, 1.5, 0.005
+#: Where one leans by more than this (radians), a pattern that winds along with them is compared.
+LEANING = np.deg2rad(2.0)
 #: Features are given up, the costliest first, in so many rounds.
 MOST_GIVEN_UP = 8
 #: So many, the longest, are tried: each is an unknown of its own in every round.
 MOST_FOLLOWED = 64
-#: More are not named one by one.
-MOST_NAMED = 4
+#: More folds, and more places where they meet, are not named one by one.
+MOST_NAMED, MOST_PLACES = 4, 8
 
 
 def place_lattice(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings) -> Placement:
     """The way of placing that suits the domain and what is to be aligned."""
     return PlacementFamily.of(cmap, lattice, settings).at(settings)
+
+
+@dataclass(frozen=True)
+class _Way:
+    """Of laying lines along features. ratio: (m,) predicted ratios of singular values − 1. around: cells."""
+
+    straightening: Straightening
+    ratio: Floats
+    around: int
+
+    @property
+    def cost(self) -> float:
+        return float(np.quantile(self.ratio, P99))
+
+    @property
+    def features(self) -> FeatureLines:
+        assert self.straightening.features is not None
+        return self.straightening.features
 
 
 @dataclass(frozen=True)
@@ -96,12 +123,13 @@ class PlacementFamily:
             placement = self._by_sides(settings)
         else:
             placement = self._freely(settings)
+        corners = self._corner_notes(placement.straight)
         if len(sentences) > MOST_NAMED:
             sentences = [
                 *sentences[:MOST_NAMED],
                 f"The same holds of {len(sentences) - MOST_NAMED} further folds.",
             ]
-        return replace(placement, notes=(*self.notes, *sentences, *placement.notes))
+        return replace(placement, notes=(*self.notes, *corners, *sentences, *placement.notes))
 
     @cached_property
     def chains(self) -> list[Chain]:
@@ -137,42 +165,61 @@ class PlacementFamily:
         for _ in range(MOST_GIVEN_UP):
             if not chains:
                 return None, sentences
-            straightening = self._straightened(tuple(chains))
-            ratio, _ = predicted(straightening, settings)
-            if np.quantile(ratio, P99) <= MOST_PREDICTED:
-                placed = place_by_sides(straightening, settings)
+            aligned = self._way(chains, self.loops, settings)
+            winding = self._winding(chains, aligned, settings)
+            way = aligned
+            if winding is not None and aligned.cost > MOST_PREDICTED and settings.boundary == "trim":
+                way = winding
+            if way.cost <= MOST_PREDICTED:
+                placed = place_by_sides(way.straightening, settings)
                 if placed.distortion <= MOST_DISTORTED:
-                    assert straightening.features is not None
-                    return replace(placed, straight=straightening.features.straight), [
+                    return replace(placed, straight=way.features.straight), [
                         *sentences,
-                        *self._number_notes(straightening, settings, ratio, placed.around),
-                        *(
-                            self._third_note(c)
-                            for c in chains
-                            if c.feature not in straightening.features.straight
-                        ),
+                        *self._winding_notes(aligned, winding, taken=way is winding),
+                        *self._number_notes(way, settings, placed.around),
+                        *(self._third_note(c) for c in chains if c.feature not in way.features.straight),
                     ]
-            left = self._without_worst(chains, ratio)
-            sentences += [
-                self._costly_note(chain, straightening, ratio) for chain in chains if chain not in left
-            ]
+            left = self._without_worst(chains, aligned.ratio)
+            if winding is not None and winding.cost <= MOST_PREDICTED:
+                sentences += self._winding_notes(aligned, winding, taken=False)
+            sentences += [self._costly_note(chain, aligned) for chain in chains if chain not in left]
             chains = left
         return None, sentences
 
-    def _number_notes(
-        self, straightening: Straightening, settings: PatternSettings, ratio: Floats, around: int
-    ) -> list[str]:
-        """Which number of cells around would suit the features better than the size asked for."""
-        own = float(np.quantile(ratio, P99))
-        if own <= FINE or size_spread(settings) >= FREE:
+    def _way(self, chains: list[Chain], loops: list[int], settings: PatternSettings) -> _Way:
+        straightening = self._straightened(chains, loops)
+        return _Way(straightening, *predicted(straightening, settings))
+
+    def _winding(self, chains: list[Chain], aligned: _Way, settings: PatternSettings) -> _Way | None:
+        """Aligned with the features alone, which lean: where that costs less than half as much."""
+        lean = abs(aligned.features.lean).max()
+        if not self.loops or not self.is_cylinder or lean <= LEANING or any(c.closed for c in chains):
+            return None
+        winding = self._way(chains, [], settings)
+        return winding if winding.cost < 0.5 * aligned.cost else None
+
+    def _winding_notes(self, aligned: _Way, winding: _Way | None, *, taken: bool) -> list[str]:
+        if winding is None:
             return []
-        free, number = predicted(straightening, settings, FREE)
-        other = float(np.quantile(free, P99))
-        if number == around or other > 0.5 * own:
+        lean = np.rad2deg(abs(aligned.features.lean))
+        angle = f"{lean.max():.1f}°" if np.ptp(lean) < 0.1 else f"{lean.min():.1f}° to {lean.max():.1f}°"
+        cost = cost_of(aligned.cost)
+        said = f"The folds lean by {angle}: to follow them from rows along the boundary would {cost}"
+        way = f"winds along with them, at {winding.cost:.2g}, and is cut at its ends."
+        if taken:
+            return [f"{said}, so that the pattern {way}"]
+        return [f'{said}. With align "none" and boundary "trim" the pattern {way}']
+
+    def _number_notes(self, way: _Way, settings: PatternSettings, around: int) -> list[str]:
+        """Which number of cells around would suit the features better than the size asked for."""
+        if way.cost <= FINE or size_spread(settings) >= FREE:
+            return []
+        free = _Way(way.straightening, *predicted(way.straightening, settings, FREE))
+        if free.around == around or free.cost > 0.5 * way.cost:
             return []
         return [
-            f"{number} cells around, instead of {around}, would fit the folds better: a distortion of about "
-            f"{other:.2g} instead of {own:.2g}."
+            f"{free.around} cells around, instead of {around}, would fit the folds better: a distortion of "
+            f"about {free.cost:.2g} instead of {way.cost:.2g}."
         ]
 
     def _wide_note(self, chain: Chain) -> str:
@@ -189,11 +236,9 @@ class PlacementFamily:
             "it falls."
         )
 
-    def _costly_note(self, chain: Chain, straightening: Straightening, ratio: Floats) -> str:
-        features = straightening.features
-        assert features is not None
-        lean = float(features.lean_of(chain.feature))
-        worst = float(np.quantile(ratio[self._beside(chain)], P99))
+    def _costly_note(self, chain: Chain, way: _Way) -> str:
+        lean = float(way.features.lean_of(chain.feature))
+        worst = float(np.quantile(way.ratio[self._beside(chain)], P99))
         least = 1 / np.tan(np.pi / 4 - abs(lean) / 2) - 1
         law = (
             f"; it leans by {abs(np.rad2deg(lean)):.1f}° against the lattice, which alone costs {least:.2f}"
@@ -205,13 +250,30 @@ class PlacementFamily:
             f"there{law}: cells are cut where it falls."
         )
 
+    def _corner_notes(self, straight: frozenset[int]) -> list[str]:
+        """Where folds that are not followed meet others at angles that no lines of the pattern have."""
+        vertex, least = least_where_they_meet(self.cmap, self.lattice, self.chains)
+        missed = [chain.vertex for chain in self.chains if chain.feature not in straight]
+        bad = (least > MOST_PREDICTED) & np.isin(vertex, np.concatenate([vertex[:0], *missed]))
+        if not bad.any():
+            return []
+        worst = float(least[bad].max())
+        places = [self._at(v) for v in vertex[bad].tolist()]
+        more = f" and at {len(places) - MOST_PLACES} more places" if len(places) > MOST_PLACES else ""
+        return [
+            f"Folds meet at {', '.join(places[:MOST_PLACES])}{more} at angles that lines of the pattern do "
+            f"not have: to follow them all would {cost_of(worst)} there at least, however it is deformed."
+        ]
+
     def _ends(self, chain: Chain) -> str:
-        points = self.cmap.surface.vertices[chain.vertex[[0, -1]]]
-        size = float(np.ptp(self.cmap.surface.vertices, axis=0).max())
-        first, last = (
-            "(" + ", ".join(f"{x:.4g}" for x in np.where(abs(p) < 1e-9 * size, 0.0, p)) + ")" for p in points
-        )
+        first, last = (self._at(int(v)) for v in chain.vertex[[0, -1]])
         return f"through {first}" if chain.closed else f"from {first} to {last}"
+
+    def _at(self, vertex: int) -> str:
+        points = self.cmap.surface.vertices
+        size = float(np.ptp(points, axis=0).max())
+        point = points[vertex]
+        return "(" + ", ".join(f"{x:.4g}" for x in np.where(abs(point) < 1e-9 * size, 0.0, point)) + ")"
 
     @cached_property
     def cell(self) -> float:
@@ -226,17 +288,15 @@ class PlacementFamily:
         on[chain.vertex] = True
         return np.asarray(on[self.cmap.surface.faces].any(axis=1))
 
-    def _straightened(self, chains: tuple[Chain, ...]) -> Straightening:
+    def _straightened(self, chains: list[Chain], loops: list[int]) -> Straightening:
         known = self._straightenings
-        key = frozenset(chain.feature for chain in chains)
+        key = frozenset(chain.feature for chain in chains), tuple(loops)
         if key not in known:
-            known[key] = Straightening.of(
-                self.cmap, self.lattice, self.shape, self.cone_index, self.loops, list(chains)
-            )
+            known[key] = Straightening.of(self.cmap, self.lattice, self.shape, self.cone_index, loops, chains)
         return known[key]
 
     @cached_property
-    def _straightenings(self) -> dict[frozenset[int], Straightening]:
+    def _straightenings(self) -> dict[tuple[frozenset[int], tuple[int, ...]], Straightening]:
         return {}
 
     def _without_worst(self, chains: list[Chain], ratio: Floats) -> list[Chain]:

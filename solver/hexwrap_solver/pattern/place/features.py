@@ -8,7 +8,7 @@ import numpy as np
 
 from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints
 from hexwrap_solver.conformal.types import ConformalMap
-from hexwrap_solver.pattern.lattice import Isometry
+from hexwrap_solver.pattern.lattice import Isometry, Lattice
 from hexwrap_solver.pattern.place.sides import Sides
 from hexwrap_solver.surface.features import FeatureEdges
 from hexwrap_solver.surface.types import Feature, Surface
@@ -255,3 +255,40 @@ def _united(chains: list[Chain], rotation: Isometry, own: Complexes, taken: Bool
                     stack.append(b)
         number += 1
     return line, sheet
+
+
+def least_where_they_meet(cmap: ConformalMap, lattice: Lattice, chains: list[Chain]) -> tuple[Ints, Floats]:
+    """Vertices inside at which three or more pieces of chains meet, and the least distortion, σ₁/σ₂ − 1,
+    there once each chain lies along a line of the lattice, whatever the deformation: with r = target / actual
+    angle of each sector between them, σ₁/σ₂ ≥ √(max r / min r); infinite where two would be one. Of
+    cylinders; none elsewhere."""
+    none = np.zeros(0, dtype=np.int64), np.zeros(0)
+    along = cmap.deck.translation if cmap.deck.apex is None else 0j
+    if not along or not chains:
+        return none
+    fold = 4 * np.pi / lattice.quantum
+    vertex, actual, target = [], [], []
+    for chain in chains:
+        step = np.diff(chain.place)
+        lean = np.angle((chain.axis / along * abs(along)) ** fold) / fold
+        for heading, end in ((step, slice(None, -1)), (-step, slice(1, None))):
+            line = chain.axis * np.exp(-1j * lean)
+            line = np.where((heading * np.conj(line)).real < 0, -line, line)
+            vertex.append(chain.vertex[end])
+            actual.append(heading)
+            target.append(np.angle(line / heading))
+    at, heading, off = np.concatenate(vertex), np.concatenate(actual), np.concatenate(target)
+    inner = np.bincount(at, minlength=len(cmap.uv))[at] > 2
+    inner &= ~np.isin(at, cmap.surface.boundary)
+    order = np.lexsort((np.angle(heading), at))
+    order = order[inner[order]]
+    at, heading, off = at[order], heading[order], off[order]
+    found, first, count = np.unique(at, return_index=True, return_counts=True)
+    if not len(found):
+        return none
+    following = np.arange(1, len(at) + 1)
+    following[first + count - 1] = first
+    sector = np.angle(heading[following] / heading) % (2 * np.pi)
+    ratio = np.maximum(sector + off[following] - off, 0.0) / np.maximum(sector, 1e-9)
+    high, low = np.maximum.reduceat(ratio, first), np.minimum.reduceat(ratio, first)
+    return found, np.where(low > 1e-6, np.sqrt(high / np.maximum(low, 1e-12)) - 1, np.inf)
