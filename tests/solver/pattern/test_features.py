@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import importlib
 from dataclasses import replace
 from functools import cache
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -13,11 +15,16 @@ from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap
 from hexwrap_solver.panels.polygons import best_plane_distances, fan_areas
 from hexwrap_solver.pattern import lay_pattern
 from hexwrap_solver.pattern.lattice import LATTICES
+from hexwrap_solver.pattern.lay.edges import PatternEdges
+from hexwrap_solver.pattern.lay.layout import Layout
+from hexwrap_solver.pattern.lay.nodes import Nodes
 from hexwrap_solver.pattern.place import choose
 from hexwrap_solver.pattern.place.choose import PlacementFamily
 from hexwrap_solver.pattern.place.deform import distortion_of
 from hexwrap_solver.pattern.place.features import least_where_they_meet
 from hexwrap_solver.pattern.place.placement import cost_of
+from hexwrap_solver.pattern.trim.boundary import Boundary
+from hexwrap_solver.pattern.trim.tips import ending_at_tips
 from hexwrap_solver.pattern.types import Kind, Pattern, PatternSettings
 from hexwrap_solver.surface import surface_from_mesh
 from hexwrap_solver.surface.drawn import with_lines
@@ -121,6 +128,27 @@ def test_folds_that_end_inside_lose_no_cell(kind: Kind, around: int, rotation: f
     pattern = lay_pattern(slit(), settings)
     assert euler(pattern) == 0
     assert not any("touch themselves" in note or "share no edge" in note for note in pattern.notes)
+
+
+@pytest.mark.parametrize(("kind", "rotation"), [("quad", "edge"), ("hex", "vertex")])
+def test_every_edge_is_that_of_its_other_end_where_folds_end(
+    kind: Kind, rotation: Literal["edge", "vertex"], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An edge of the pattern that runs along a fold over its end is found from both sides of it."""
+    module = importlib.import_module("hexwrap_solver.pattern.lay_pattern")
+
+    def unmatched(edges: PatternEdges) -> int:
+        back, there = edges.back.ravel(), np.flatnonzero(edges.head.ravel() >= 0)
+        return int((back[back[there]] != there).sum())
+
+    def ending(layout: Layout, nodes: Nodes, edges: PatternEdges, boundary: Boundary) -> PatternEdges:
+        assert unmatched(edges) > 0
+        ended = ending_at_tips(layout, nodes, edges, boundary)
+        assert unmatched(ended) == 0
+        return ended
+
+    monkeypatch.setattr(module, "ending_at_tips", ending)
+    lay_pattern(slit(), PatternSettings(kind, around=37, rotation=rotation, boundary="trim"))
 
 
 def test_edges_through_a_vertex_of_a_fold_are_found_once() -> None:
