@@ -86,7 +86,7 @@ def cases() -> None:
         solution = solved(name)
         draw_domain(domain, solution)
         domain.set_title(title, fontsize=13, color="#23262b", loc="left", pad=10)
-        surface.imshow(np.clip(render(panels_scene(solution)), 0, 1), interpolation="lanczos")
+        surface.imshow(render(panels_scene(solution)), interpolation="lanczos")
         surface.set_axis_off()
     figure.savefig(HERE / "cases.png")
 
@@ -131,13 +131,13 @@ def singularities() -> Figure:
         seats = seated(surface, wanted.boundary.adapted("hex"), SingularitySettings(6), wanted.pattern, sizes)
         found = seats.placing.proposals
         curve.plot([one.count for one in found], [100 * one.uncovered for one in found], "o-", color=colour)
-        curve.annotate(f" {sizes} sizes", (0, 100 * found[0].uncovered), xytext=(6, 0), color=colour,
-                       textcoords="offset points", va="center", fontsize=11)  # fmt: skip
-    curve.set(xlabel="singularities", ylabel="uncovered, %", ylim=(0, None))
+        curve.annotate(f"{sizes} sizes", (found[-1].count, 100 * found[-1].uncovered), xytext=(8, 0),
+                       color=colour, textcoords="offset points", va="center", fontsize=11)  # fmt: skip
+    curve.set(xlabel="singularities", ylabel="uncovered, %", ylim=(0, None), xlim=(-0.3, 7.4))
     curve.spines[["top", "right"]].set_visible(False)
     solution = solved("singular")
     draw_domain(domain, solution)
-    space.imshow(np.clip(render(panels_scene(solution)), 0, 1), interpolation="lanczos")
+    space.imshow(render(panels_scene(solution)), interpolation="lanczos")
     space.set_axis_off()
     figure.subplots_adjust(left=0.05, right=0.99, bottom=0.12, top=0.97)
     return figure

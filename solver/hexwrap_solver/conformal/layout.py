@@ -175,7 +175,8 @@ def _glue(surface: Surface, corners: Complexes, lengths: Floats, cut: Cut, angle
     fan = cut.fan.reshape(-1, 3).T.ravel()
     away = fan > 0
     # Ends of a short edge are taken from the same triangles, so that it keeps its direction.
-    weight = np.tile(np.maximum(lengths.min(axis=0), FINEST) ** -2.0, 3)
+    finest = np.maximum(lengths.min(axis=0), FINEST)
+    weight = np.tile((finest.min() / finest) ** 2, 3)
     home = _mean_position(flat[~away], corners.ravel()[~away], n, weight[~away])
     copies = _mean_position(fan, corners.ravel(), fans, weight)
     if not len(cut.left):

@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import Annotated, Literal
 
 import numpy as np
-from scipy.interpolate import NdBSpline
+import scipy
 
 from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged
 from hexwrap_solver.errors import SettingError
@@ -173,9 +173,9 @@ class NurbsSurface:
     closed: tuple[bool, bool]
 
     @cached_property
-    def spline(self) -> NdBSpline:
+    def spline(self) -> scipy.interpolate.NdBSpline:
         """Of homogeneous coordinates (x·w, y·w, z·w, w)."""
-        return NdBSpline(self.knots, premultiplied(self.control_points), self.degree)
+        return scipy.interpolate.NdBSpline(self.knots, premultiplied(self.control_points), self.degree)
 
 
 @dataclass(frozen=True)

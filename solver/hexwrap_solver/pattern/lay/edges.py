@@ -181,10 +181,6 @@ class _Found:
         self._many += len(self._rows[-1])
 
     def edges(self) -> PatternEdges:
-        # Where a fold ends within an edge of the pattern, nodes on both sides of it see the edge: one has it.
-        number = np.flatnonzero(self.head.ravel() >= 0)
-        lone = number[self.back.ravel()[self.back.ravel()[number]] != number]
-        self.head.ravel()[lone] = self.back.ravel()[lone] = -1
         different, row = np.unique(np.concatenate(self._rows), axis=0, return_inverse=True)
         row = row.ravel()
         identity = row[0]  # moves to the front

@@ -225,14 +225,14 @@ class PlacementFamily:
     def _wide_note(self, chain: Chain) -> str:
         cells = chain.width / self.cell
         return (
-            f"The fold {self._ends(chain)} strays from a straight line of the domain by "
+            f"The {self._name(chain)} strays from a straight line of the domain by "
             f"{chain.width / self.cmap.circumference:.1%} of the circumference, {cells:.1f} cells: "
             "cells are cut where it falls."
         )
 
     def _third_note(self, chain: Chain) -> str:
         return (
-            f"The fold {self._ends(chain)} comes to where two other lines meet already: cells are cut where "
+            f"The {self._name(chain)} comes to where two other lines meet already: cells are cut where "
             "it falls."
         )
 
@@ -246,7 +246,7 @@ class PlacementFamily:
             else ""
         )
         return (
-            f"To lay a line of the pattern along the fold {self._ends(chain)} would {cost_of(worst)} "
+            f"To lay a line of the pattern along the {self._name(chain)} would {cost_of(worst)} "
             f"there{law}: cells are cut where it falls."
         )
 
@@ -265,9 +265,10 @@ class PlacementFamily:
             f"not have: to follow them all would {cost_of(worst)} there at least, however it is deformed."
         ]
 
-    def _ends(self, chain: Chain) -> str:
-        first, last = (self._at(int(v)) for v in chain.vertex[[0, -1]])
-        return f"through {first}" if chain.closed else f"from {first} to {last}"
+    def _name(self, chain: Chain) -> str:
+        what = "line" if self.cmap.surface.features[chain.feature].given else "fold"
+        first, last = (self._at(v) for v in chain.vertex[[0, -1]].tolist())
+        return f"{what} through {first}" if chain.closed else f"{what} from {first} to {last}"
 
     def _at(self, vertex: int) -> str:
         points = self.cmap.surface.vertices

@@ -1,7 +1,7 @@
 """Where a fold ends inside the surface, on a line of the pattern that runs along it.
 
 Cut open there, the domain has the fold twice, and both sides meet at its tip. An edge of the pattern that
-passes the tip would run along both:
+passes the tip would run along both, and is found from both:
 
                    left
         ═══════════════•─────────── ahead      The one that is ahead of the tip ends there, as at any other

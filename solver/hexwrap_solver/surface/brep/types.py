@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.interpolate import BSpline
+import scipy
 
 from hexwrap_solver.arrays import Floats
 from hexwrap_solver.surface.types import NurbsSurface, SentMesh, premultiplied
@@ -28,9 +28,9 @@ class NurbsCurve:
         return float(self.knots[self.degree]), float(self.knots[len(self.knots) - 1 - self.degree])
 
     @cached_property
-    def spline(self) -> BSpline:
+    def spline(self) -> scipy.interpolate.BSpline:
         """Of homogeneous coordinates (x·w, y·w, z·w, w)."""
-        return BSpline(self.knots, premultiplied(self.control_points), self.degree)
+        return scipy.interpolate.BSpline(self.knots, premultiplied(self.control_points), self.degree)
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.interpolate import BSpline
+import scipy
 
 from hexwrap_solver.arrays import Floats
 from hexwrap_solver.surface.brep.curves import evaluate_curve
@@ -52,7 +52,7 @@ def brep_of_surface(nurbs: NurbsSurface, tolerance: float) -> Brep:
 def isocurve(nurbs: NurbsSurface, direction: int, at: float) -> NurbsCurve:
     """The curve on which the parameter of direction is constant."""
     net = premultiplied(np.moveaxis(nurbs.control_points, direction, 0))
-    made = np.asarray(BSpline(nurbs.knots[direction], net, nurbs.degree[direction])(at))
+    made = np.asarray(scipy.interpolate.BSpline(nurbs.knots[direction], net, nurbs.degree[direction])(at))
     made[:, :3] /= made[:, 3:]
     return NurbsCurve(nurbs.degree[1 - direction], nurbs.knots[1 - direction], made)
 
