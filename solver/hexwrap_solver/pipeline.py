@@ -26,11 +26,15 @@ from hexwrap_solver.setting import Setting
 from hexwrap_solver.singularities.outlook import ProspectKey, outlook, outlook_note, prospects, worth_a_look
 from hexwrap_solver.singularities.solve import SIZES, closed_map, needs_singularities, seated
 from hexwrap_solver.singularities.types import Choices, SingularitySettings
+from hexwrap_solver.surface.curvature import saddle_share
 from hexwrap_solver.surface.holes import fill_openings
 from hexwrap_solver.surface.types import Surface
 from hexwrap_solver.threads import one_blas_thread
 
 T = TypeVar("T")
+
+#: A smaller share of the surface curved like a saddle may be noise of the mesh.
+SADDLE = 0.02
 
 
 class StageRunner(Protocol):
@@ -111,8 +115,9 @@ def solve(
 def _solve(
     take_in: Callable[[], Surface], settings: SolveSettings, run: StageRunner, source: Any
 ) -> Solution:
-    pattern, panels = settings.pattern, settings.panels
+    panels = settings.panels
     cmap, choices = mapped(take_in, settings, run, source=source)
+    pattern, note = decided(settings, cmap.surface)
     if pattern is None:
         return Solution(
             cmap,
@@ -127,6 +132,7 @@ def _solve(
         made = run("panels", SizeKey.of(panels), lambda progress: quantize(fitted, panels, curve))
         wanted = panels.components or (ComponentSettings() if settings.support else None)
     quality = run("quality", None, lambda progress: measure(cmap, laid, made, progress))
+    quality = replace(quality, notes=note + quality.notes)  # not in the stage, which any request may share
     quality = _with_choices(quality, cmap, laid, made, panels, choices, run)
     parts, frame = None, None
     if made is not None and wanted is not None:
@@ -141,9 +147,28 @@ def mapped(
     take_in: Callable[[], Surface], settings: SolveSettings, run: StageRunner, *, source: Any = None
 ) -> tuple[ConformalMap, Choices | None]:
     """The first stages alone, as ``solve`` runs them. Raises HexwrapError."""
-    pattern = settings.pattern
     surface = run("surface", source, lambda progress: take_in())
-    return _map(surface, settings, settings.boundary.adapted(pattern.kind if pattern else None), run)
+    pattern, _ = decided(settings, surface)
+    boundary = settings.boundary.adapted(pattern.cell_kind if pattern else None)
+    return _map(surface, replace(settings, pattern=pattern), boundary, run)
+
+
+def decided(settings: SolveSettings, surface: Surface) -> tuple[PatternSettings | None, tuple[str, ...]]:
+    """The pattern with a kind where ``auto`` was asked for, and a note where that is not the usual one.
+
+    Flat convex panels, three at each node, follow no saddle (Li, Liu and Wang 2015); four can.
+    """
+    pattern, panels = settings.pattern, settings.panels
+    if pattern is None or pattern.kind != "auto":
+        return pattern, ()
+    saddle = saddle_share(surface) if panels is not None and panels.mode == "watertight" else 0.0
+    if saddle < SADDLE:
+        return replace(pattern, kind="hex"), ()
+    note = (
+        f"Pattern: trihexagonal, since {saddle:.0%} of the surface is curved like a saddle, where flat "
+        "hexagons that share their edges cannot be convex; pattern.kind chooses another."
+    )
+    return replace(pattern, kind="trihexagonal"), (note,)
 
 
 def _with_choices(

@@ -15,7 +15,7 @@ from hexwrap_solver.pattern.types import PatternSettings
 from hexwrap_solver.pipeline import PlainRunner, SolveSettings, solve
 from hexwrap_solver.surface import surface_from_mesh
 from hexwrap_solver.surface.types import SentMesh
-from tests.solver.panels.cells import catenoid, grid_map, inverted
+from tests.solver.panels.cells import catenoid, cylinder, grid_map, inverted
 
 
 def take_in():
@@ -150,3 +150,20 @@ def done(seed):
         assert found.quality.planarity[whole].max(initial=0.0) < 1e-9
         assert found.quality.edge_deviation[whole].max(initial=0.0) < 1e-9
     return True
+
+
+@pytest.mark.parametrize(("chart", "kind"), [(catenoid, "trihexagonal"), (cylinder, "hex")])
+def test_the_kind_of_watertight_panels_follows_the_curvature(chart, kind):
+    surface = grid_map(chart, 40, 12, -0.6, 0.6).surface
+
+    def solved(pattern: PatternSettings, mode: str = "watertight"):
+        return solve(lambda: surface, SolveSettings(pattern=pattern, panels=PanelSettings(mode=mode)))
+
+    chosen = solved(PatternSettings(around=12))
+    assert chosen.pattern.kind == kind
+    assert chosen.quality.convex.all()
+    assert chosen.quality.planarity.max() < 1e-9
+    asked = solved(PatternSettings(kind, around=12))
+    said = set(chosen.quality.notes) - set(asked.quality.notes)
+    assert [note.split(",")[0] for note in said] == ["Pattern: trihexagonal"] * (kind != "hex")
+    assert solved(PatternSettings(around=12), "split").pattern.kind == "hex"

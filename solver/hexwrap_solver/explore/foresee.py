@@ -44,7 +44,7 @@ def default_edge(
     pattern = settings.pattern
     if pattern.rotation in ("u", "v"):
         pattern = replace(pattern, rotation="edge")
-    lattice = LATTICES[pattern.kind]
+    lattice = LATTICES[pattern.cell_kind]
     with one_blas_thread():
         cmap, _ = mapped(take_in, SolveSettings(pattern=pattern, panels=None), run, source=source)
     return wanted_edge(cmap, lattice, pattern, edge_angle(lattice, pattern)) * mean_stretch(cmap)
@@ -105,7 +105,7 @@ def _foresee(
 
 def _seats(surface: Surface, frame: Frame, most: int) -> tuple[tuple[SingularityAt, ...], ...]:
     """The best places for each number of singularities that is possible, as a request says them."""
-    boundary, asked = frame.boundary.adapted(frame.pattern.kind), SingularitySettings(count=most)
+    boundary, asked = frame.boundary.adapted(frame.pattern.cell_kind), SingularitySettings(count=most)
     found = chosen(surface, frame_of(surface, boundary, asked, frame.pattern, None), asked)
     return tuple(
         tuple(

@@ -118,7 +118,7 @@ def outlook(cmap: ConformalMap, settings: PatternSettings, progress: Progress = 
 
     Raises NotAdaptedError, PatternError as ``lay_pattern`` does where no lattice fits.
     """
-    lattice = LATTICES[settings.kind]
+    lattice = LATTICES[settings.cell_kind]
     settings, _ = with_rotation(cmap, lattice, settings)
     placing = PlacementFamily.of(cmap, lattice, settings)
     progress(0.5, "placing the lattice")

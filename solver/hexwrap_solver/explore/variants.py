@@ -58,7 +58,8 @@ def variants(settings: ExploreSettings, edge: float) -> list[Variant]:
     joints = _between(*(vary.joint or (panels.joint, panels.joint)), JOINTS)
     sizes = range(vary.sizes[0], vary.sizes[1] + 1)
     shapes = _shapes(settings, edge)
-    kinds, rotations = vary.kind or (settings.pattern.kind,), vary.rotation or (settings.pattern.rotation,)
+    kinds = vary.kind or (settings.pattern.cell_kind,)
+    rotations = vary.rotation or (settings.pattern.rotation,)
     choices = (vary.boundary, vary.singularities, kinds, shapes, rotations, sizes, joints)
     usual = panels.sizes if isinstance(panels.sizes, int) else vary.sizes[1]
     found = {Variant(Frame(BoundaryCondition(), settings.pattern), 0, usual, panels.joint): None}

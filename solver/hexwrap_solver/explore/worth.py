@@ -33,6 +33,6 @@ def or_plain(
     left = outlook(cmap, pattern).foresee(sizes).uncovered
     if left + WORTH * len(cmap.cones) < without:
         return cmap
-    names = in_words(pattern.kind, cmap.cones.index).capitalize()
+    names = in_words(pattern.cell_kind, cmap.cones.index).capitalize()
     note = f"{names} would leave about {left:.1%} uncovered, none {without:.1%}: they are left out."
     return replace(plain, notes=(*plain.notes, note))

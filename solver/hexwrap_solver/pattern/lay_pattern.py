@@ -72,7 +72,7 @@ def lay_pattern(cmap: ConformalMap, settings: PatternSettings, progress: Progres
     cells are too many (``settings.max_cells``) or too large to close up around the surface.
     """
     check_edge(cmap, settings)
-    lattice = LATTICES[settings.kind]
+    lattice = LATTICES[settings.cell_kind]
     settings, notes = with_rotation(cmap, lattice, settings)
     placing = PlacementFamily.of(cmap, lattice, settings)
     pattern, finer = _laid(cmap, placing, settings, progress)
@@ -110,7 +110,7 @@ def _laid(
     except _CoarseError:
         if settings.around is not None or settings.edge_length is not None or cmap.fitted is not None:
             raise
-        lattice = LATTICES[settings.kind]
+        lattice = LATTICES[settings.cell_kind]
         edge = wanted_edge(cmap, lattice, settings, edge_angle(lattice, settings)) * mean_stretch(cmap)
         for part in FINER:
             with contextlib.suppress(_CoarseError):
@@ -264,7 +264,7 @@ def _finish(
     features = on_features(cmap, placing, placement, cut.seams, cells, corner, whole)
     beside = layout.lattice.carry(cells.isometry, place[corner])
     return Pattern(
-        kind=settings.kind,
+        kind=settings.cell_kind,
         vertices=vertices,
         normals=normals,
         uv=uv,
@@ -427,7 +427,7 @@ def _too_coarse(cmap: ConformalMap, settings: PatternSettings, placement: Placem
 
 def _that_fits(cmap: ConformalMap, settings: PatternSettings, placement: Placement) -> str:
     """A size that would do, where it is not that of the placement."""
-    lattice = LATTICES[settings.kind]
+    lattice = LATTICES[settings.cell_kind]
     enough, edge = fitting_number(cmap, lattice, edge_angle(lattice, settings))
     enough = placement.step * -(-enough // placement.step)
     return (

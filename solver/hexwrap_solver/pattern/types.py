@@ -23,6 +23,9 @@ Kind = Literal[
     "rhombitrihexagonal",
 ]
 
+#: ``auto``: hexagons, or what ``decided`` in the pipeline takes for them.
+KindChoice = Literal["auto", Kind]
+
 
 @dataclass(frozen=True)
 class PatternSettings:
@@ -33,7 +36,13 @@ class PatternSettings:
     Raises SettingError where both sizes are given.
     """
 
-    kind: Annotated[Kind, Setting("kind of cells")] = "hex"
+    kind: Annotated[
+        KindChoice,
+        Setting(
+            "kind of cells; auto: hex, or trihexagonal where watertight panels cover a surface curved like a "
+            "saddle"
+        ),
+    ] = "auto"
     around: Annotated[int | None, Setting("cells around the surface", ge=1, le=1_000_000, unit="cells")] = (
         None
     )
@@ -64,6 +73,11 @@ class PatternSettings:
     def __post_init__(self) -> None:
         if self.around is not None and self.edge_length is not None:
             raise SettingError("give either 'around' or 'edge_length', the other one null")
+
+    @property
+    def cell_kind(self) -> Kind:
+        """Hexagons where nothing else was decided."""
+        return "hex" if self.kind == "auto" else self.kind
 
 
 @dataclass(frozen=True)

@@ -99,7 +99,7 @@ def frame_of(
     pattern = pattern or PatternSettings()
     if pattern.rotation in ("u", "v"):
         pattern = replace(pattern, rotation="edge")
-    lattice = LATTICES[pattern.kind]
+    lattice = LATTICES[pattern.cell_kind]
     _check_kind(lattice, settings)
     ends, angles = _ends(surface, boundary, lattice)
     angle = edge_angle(lattice, pattern)
