@@ -63,6 +63,8 @@ STEEP = 12.0
 
 #: Of the layout, relative to its extent; points this near to an edge count as on it.
 ROUNDING = 1e-11
+#: Factor of that distance for a second attempt.
+WIDER = 100.0
 
 
 def lay_pattern(cmap: ConformalMap, settings: PatternSettings, progress: Progress = no_progress) -> Pattern:
@@ -125,12 +127,18 @@ def _laid(
 
 
 def _lay(
-    cmap: ConformalMap, placing: PlacementFamily, settings: PatternSettings, progress: Progress
+    cmap: ConformalMap,
+    placing: PlacementFamily,
+    settings: PatternSettings,
+    progress: Progress,
+    wider: float = 1.0,
 ) -> Pattern:
+    """wider: factor of the distance within which points are one."""
     lattice = placing.lattice
     placement = placing.at(settings)
     progress(0.1, "placing the lattice")
     layout = layout_of(placing.cmap, lattice, placement)
+    layout = replace(layout, tolerance=wider * layout.tolerance)
     _check_count(cmap, layout, settings)
     surface = placing.cmap.surface
     numbers = sorted(placing.features)
@@ -160,6 +168,9 @@ def _lay(
                 layout, boundary, met, nodes, edges, whole, folded, keep_cut=settings.boundary == "trim"
             )
         except TooCoarse:
+            # Points at just about that distance from the boundary are on it for one step and not for another.
+            if wider == 1:
+                return _lay(cmap, placing, settings, progress, WIDER)
             raise _too_coarse(cmap, settings, placement) from None
     else:
         cut = _uncut(layout, boundary, met, nodes, edges, whole)

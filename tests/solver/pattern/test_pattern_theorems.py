@@ -149,6 +149,21 @@ def test_every_pattern_closes_or_is_refused(k, kind, around, rotation, grid, pha
         assert area.sum() == pytest.approx(domain_area(cmap), rel=1e-9)
 
 
+@pytest.mark.parametrize("kind", ["hex", "triangle", "quad"])
+def test_a_pattern_hardly_off_the_boundary_is_cut_like_one_on_it(kind):
+    """At any distance, that at which points are taken for one included."""
+    cmap = annuli.revolution(wavy, np.linspace(-1, 1.5, 3), 7)
+
+    def covered(shift: float) -> float:
+        asked = PatternSettings(kind=kind, around=24, align="none", phase=(0.0, shift), boundary="trim")
+        return float(cell_areas(cmap, lay_pattern(cmap, asked)).sum())
+
+    on_it = covered(0.0)
+    assert on_it == pytest.approx(domain_area(cmap), rel=0.01)
+    for shift in np.geomspace(1e-11, 1e-6, 26):
+        assert covered(shift) == pytest.approx(on_it, rel=1e-6)
+
+
 @pytest.mark.parametrize("shift", [0.0, 0.31, 0.02])
 @pytest.mark.parametrize("turns", [1, 2])
 def test_flat_rings_close_with_the_translation_as_a_lattice_vector(shift, turns):
