@@ -127,7 +127,7 @@ def test_defaults_are_those_of_the_contract() -> None:
     assert wanted.pattern is not None
     assert wanted.panels is not None
     assert (wanted.boundary.mode, wanted.boundary.quantum) == ("auto", "auto")
-    assert (wanted.pattern.kind, wanted.pattern.around, wanted.pattern.align) == ("hex", None, "both")
+    assert (wanted.pattern.cell_kind, wanted.pattern.around, wanted.pattern.align) == ("hex", None, "both")
     assert (wanted.panels.mode, wanted.panels.sizes, wanted.panels.target) == ("split", 11, "inscribed")
     assert wanted.pattern.max_cells == 500
 

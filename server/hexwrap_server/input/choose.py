@@ -140,7 +140,7 @@ def named(content: FileContent, object: str | None, layer: str | None) -> list[F
     """Objects that are named, or those in sight. Raises NoObjectError."""
     objects = content.objects
     if not objects:
-        held = ", ".join(f"{count} {kind}" for kind, count in sorted(content.others.items()))
+        held = ", ".join(f"{kind}: {count}" for kind, count in sorted(content.others.items()))
         raise UnreadableFileError(
             f"The file holds no mesh, surface, polysurface, extrusion or SubD ({held or 'nothing at all'}): "
             "in Rhino, "

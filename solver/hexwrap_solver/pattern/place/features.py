@@ -263,9 +263,9 @@ def least_where_they_meet(cmap: ConformalMap, lattice: Lattice, chains: list[Cha
     angle of each sector between them, σ₁/σ₂ ≥ √(max r / min r); infinite where two would be one. Of
     cylinders; none elsewhere."""
     none = np.zeros(0, dtype=np.int64), np.zeros(0)
-    if not chains or cmap.kind != "cylinder":
+    along = cmap.deck.translation if cmap.kind == "cylinder" else 0j  # of disks it is 0
+    if not along or not chains:
         return none
-    along = cmap.deck.translation
     fold = 4 * np.pi / lattice.quantum
     vertex, actual, target = [], [], []
     for chain in chains:
