@@ -16,6 +16,7 @@ from hexwrap_solver.singularities.search import Search, ranked
 from hexwrap_solver.singularities.sizes import uncovered, uncovered_by
 from hexwrap_solver.singularities.solve import in_words
 from hexwrap_solver.singularities.types import Choices, End, Proposal, Rules
+from hexwrap_solver.surface.holes import fill_openings
 from hexwrap_solver.surface.types import Surface
 
 #: A coarse look: so many patches and singularities; larger meshes are not looked at.
@@ -59,7 +60,7 @@ def worth_a_look(cmap: ConformalMap, laid: Pattern, sizes: int, left: float) -> 
     if (
         lattice.fold < lattice.order
         or len(cmap.cones)
-        or not 1 <= len(surface.loops) <= 2
+        or not 1 <= len(surface.loops) - surface.openings <= 2
         or len(surface.vertices) > LARGEST
     ):
         return False
@@ -70,6 +71,7 @@ def worth_a_look(cmap: ConformalMap, laid: Pattern, sizes: int, left: float) -> 
 
 def prospects(surface: Surface, key: ProspectKey) -> Prospects:
     """By a coarse linear model. None are found where no place is allowed."""
+    surface = fill_openings(surface)
     free: End = "free"
     ends = (free,) * len(surface.loops)
     cell = float(np.sqrt(surface.areas.sum() / 2.0**key.doublings))
@@ -91,7 +93,7 @@ def outlook(found: Prospects, surface: Surface, laid: Pattern, sizes: int, left:
     ``left``. None where there is no choice."""
     if len(found.proposals) < 2 or found.proposals[0].count:
         return None
-    choices = Choices.of(found.proposals, 0, sizes, surface.vertices)
+    choices = Choices.of(found.proposals, 0, sizes, fill_openings(surface).vertices)
     then = choices.uncovered * _width(laid)
     then += found.left[:, min(sizes, CURVE) - 1]
     then[0] = left  # measured, and with the ends as they are now
