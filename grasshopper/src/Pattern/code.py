@@ -53,10 +53,14 @@ def pattern_settings():
 
 
 def solve():
-    offer(component, {"Kind": KINDS, "Align": ALIGN, "Boundary": EDGES, "Rotation": TURNS[:2]})
-    chosen = pattern_settings()
-    component.Message = chosen.get("kind", "hex")
-    return (json_text({"pattern": chosen}),)
+    words = {"Kind": KINDS, "Align": ALIGN, "Boundary": EDGES, "Rotation": TURNS[:2], "Singularities": COUNTS}
+    offer(component, words)
+    chosen = {"pattern": pattern_settings()}
+    component.Message = chosen["pattern"].get("kind", "hex")
+    most = count(Singularities, "Singularities")
+    if most is not None:
+        chosen["singularities"] = {"count": most}
+    return (json_text(chosen),)
 
 
 component = ghenv.Component

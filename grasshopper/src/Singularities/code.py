@@ -6,19 +6,6 @@ Count or Points; the server moves each by less than a panel to where the pattern
 # include: wire canvas choices
 
 
-def count(value):
-    """'auto' or a number, None for an empty input. Raises Refusal."""
-    if value is None or not TEXT(value).strip():
-        return None
-    word = TEXT(value).strip().strip('"').lower()
-    if word == "auto":
-        return word
-    most = number(word, "Count (auto, or a number)")
-    if most != int(most) or most < 0:
-        raise Refusal("Count must be auto or a whole number that is not negative, not '%s'." % value)
-    return int(most)
-
-
 def singularities(points, indices):
     """The request's own words for points and indices. Raises Refusal."""
     if len(indices) <= 1:
@@ -34,13 +21,13 @@ def singularities(points, indices):
 
 
 def solve():
-    offer(component, {"Count": ["auto", "0", "2", "4", "8"]})
+    offer(component, {"Count": COUNTS})
     points = [p for p in Points or [] if p is not None]
     if points:
         chosen = {"at": singularities(points, [i for i in Index or [] if i is not None])}
         component.Message = "%d points" % len(points)
     else:
-        most = count(Count)
+        most = count(Count, "Count")
         if most is None:
             component.Message = "none"
             remark(component, "Nothing is wired: give Count or Points.")

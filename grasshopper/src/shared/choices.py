@@ -20,6 +20,23 @@ def number(value, name):
         raise Refusal("%s must be a number, not '%s'." % (name, value))
 
 
+#: Words for a number of singularities, of which any will do.
+COUNTS = ["auto", "0", "2", "4", "8"]
+
+
+def count(value, name):
+    """'auto' or a number of singularities, None for an empty input. Raises Refusal."""
+    if value is None or not TEXT(value).strip():
+        return None
+    word = TEXT(value).strip().strip('"').lower()
+    if word == "auto":
+        return word
+    most = number(word, "%s (auto, or a number)" % name)
+    if most != int(most) or most < 0:
+        raise Refusal("%s must be auto or a whole number that is not negative, not '%s'." % (name, value))
+    return int(most)
+
+
 def offer(component, choices):
     """Fills Value Lists that were just placed and wired to an input with the words this input takes."""
     document = component.OnPingDocument()
