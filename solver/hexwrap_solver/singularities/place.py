@@ -33,8 +33,8 @@ REACHES, SPACING, ROUNDS = (1.5, 0.8, 0.4), 0.4, 20
 class Proposals:
     """proposals: the best with each number of singularities that is possible, ascending. chosen: index of
     the one to take. symmetry: of the surface, which they keep to; empty where that is not asked for.
-    others: those that will do where it cannot be closed, best first. may_be_none: a map without any will
-    do then."""
+    others: those that will do where it cannot be closed, best first. may_be_none: the finished map is taken
+    only where it leaves less uncovered than one without any."""
 
     proposals: tuple[Proposal, ...]
     chosen: int

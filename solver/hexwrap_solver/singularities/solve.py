@@ -278,7 +278,7 @@ def closed_map(
     try:
         return first_that_closes(surface, frame, placing, progress)
     except ConvergenceError as error:
-        if not placing.may_be_none or placing.proposals[0].count:
+        if placing.proposals[0].count:  # these are given, or it cannot be without
             raise
         plain = conformal_map(surface, boundary, progress)
         note = f"{in_words(frame.lattice.kind, proposal.index).capitalize()} would pay, but are left out: "

@@ -266,17 +266,20 @@ def test_what_closes_around_nothing_is_refused(kind, index, said):
         solved(shapes.waist(), "isometric", None, (SingularityAt(index, vertex=620),), kind=kind, around=24)
 
 
-def test_where_they_cannot_be_closed_there_are_none(monkeypatch):
+@pytest.mark.parametrize("count", ["auto", 4])
+def test_where_they_cannot_be_closed_there_are_none(monkeypatch, count):
+    """A number asked for is the most that there may be."""
+
     def fails(*args):
         raise ConvergenceError("It did not close.")
 
     monkeypatch.setattr(module, "closed_at", fails)
-    found = solved(shapes.waist(), count="auto", around=16)
+    found = solved(shapes.waist(), count=count, around=16)
     assert len(found.map.cones) == 0
     assert any("left out: It did not close." in note for note in found.quality.notes)
     assert found.quality.singularities.number[found.quality.singularities.taken] == 0
     with pytest.raises(ConvergenceError):
-        solved(shapes.waist(), count=4, around=16)
+        solved(shapes.waist(), count=None, at=(SingularityAt(1, vertex=200),), around=16)
 
 
 @dataclass(frozen=True)
