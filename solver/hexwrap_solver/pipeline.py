@@ -116,8 +116,9 @@ def _solve(
     take_in: Callable[[], Surface], settings: SolveSettings, run: StageRunner, source: Any
 ) -> Solution:
     panels = settings.panels
-    cmap, choices = mapped(take_in, settings, run, source=source)
-    pattern, note = decided(settings, cmap.surface)
+    surface = run("surface", source, lambda progress: take_in())
+    pattern, note = decided(settings, surface)
+    cmap, choices = _map(surface, replace(settings, pattern=pattern), run)
     if pattern is None:
         return Solution(
             cmap,
@@ -149,8 +150,7 @@ def mapped(
     """The first stages alone, as ``solve`` runs them. Raises HexwrapError."""
     surface = run("surface", source, lambda progress: take_in())
     pattern, _ = decided(settings, surface)
-    boundary = settings.boundary.adapted(pattern.cell_kind if pattern else None)
-    return _map(surface, replace(settings, pattern=pattern), boundary, run)
+    return _map(surface, replace(settings, pattern=pattern), run)
 
 
 def decided(settings: SolveSettings, surface: Surface) -> tuple[PatternSettings | None, tuple[str, ...]]:
@@ -190,17 +190,16 @@ def _with_choices(
         return quality
     key = ProspectKey.of(cmap.surface, laid)
     found = run("outlook", key, lambda progress: prospects(cmap.surface, key), after="map")
-    choices = outlook(found, cmap.surface, laid, settings.sizes, left)
+    choices = outlook(found, laid, settings.sizes, left)
     if choices is None:
         return quality
     return replace(quality, singularities=choices, notes=(*quality.notes, *outlook_note(laid, choices)))
 
 
-def _map(
-    surface: Surface, settings: SolveSettings, boundary: BoundaryCondition, run: StageRunner
-) -> tuple[ConformalMap, Choices | None]:
+def _map(surface: Surface, settings: SolveSettings, run: StageRunner) -> tuple[ConformalMap, Choices | None]:
     """With singularities where they are asked for, or needed; and what one may choose from then."""
     asked, pattern = settings.singularities, settings.pattern
+    boundary = settings.boundary.adapted(pattern.cell_kind if pattern else None)
     if asked is None and needs_singularities(surface, boundary):
         asked = SingularitySettings("auto")
     if asked is None or (asked.count in (None, 0) and not asked.at):

@@ -64,8 +64,9 @@ class Outlook:
     sides: (c,) of each whole cell; size: (c,) edge of a polygon of its kind as large as it, model units;
     limit: (c,) edge of its largest panel without a joint. Whole cells are those whose middle is as far from
     the boundary as they reach, on the average over all directions (perimeter/2π); along a loop that is a line
-    of the pattern, half a row. special: cells with another number of sides, and trimmed: cut at the boundary;
-    rest: the area of both, which their panels are taken to cover.
+    of the pattern, half a row. special: cells with another number of sides; trimmed: those cut at the
+    boundary; folded: pieces of those that features cut, of so many kinds; rest: the area of all these, which
+    their panels are taken to cover.
     """
 
     lattice: Lattice

@@ -15,7 +15,7 @@ from hexwrap_solver.singularities.place import number_of
 from hexwrap_solver.singularities.search import Search, ranked
 from hexwrap_solver.singularities.sizes import uncovered, uncovered_by
 from hexwrap_solver.singularities.solve import in_words
-from hexwrap_solver.singularities.types import Choices, End, Proposal, Rules
+from hexwrap_solver.singularities.types import Choices, End, Rules
 from hexwrap_solver.surface.holes import fill_openings
 from hexwrap_solver.surface.types import Surface
 
@@ -31,11 +31,11 @@ SAVED, SHARE = 0.01, 0.3
 class Prospects:
     """Singularities that a map could have, the best of each number from none upwards, the ends being free.
 
-    proposals: their ``uncovered`` is with a length for each cell, per width of a cell, which it grows with.
+    choices: their ``uncovered`` is with a length for each cell, per width of a cell, which it grows with.
     left: (c, CURVE) what 1 … CURVE sizes leave open then.
     """
 
-    proposals: tuple[Proposal, ...]
+    choices: Choices
     left: Floats
 
 
@@ -78,26 +78,26 @@ def prospects(surface: Surface, key: ProspectKey) -> Prospects:
     rules = Rules(LATTICES[key.kind].quantum, cell, None, ends, most=MOST)
     model = linear_model(surface, rules, patches=PATCHES, steps=False)
     if not len(model.seat):
-        return Prospects((), np.zeros((0, CURVE)))
+        return Prospects(Choices.of((), 0, CURVE, surface.vertices), np.zeros((0, CURVE)))
     search = Search(model, rules)
     best = [states[0] for states in ranked(search, starts=0, refine=False) if states]
-    proposals = [search.proposal(state) for state in best]
+    choices = Choices.of([search.proposal(state) for state in best], 0, CURVE, surface.vertices)
     return Prospects(
-        tuple(replace(one, uncovered=one.uncovered / cell) for one in proposals),
+        replace(choices, uncovered=choices.uncovered / cell, coarse=True),
         np.array([uncovered_by(search.scale(state), model.weight, CURVE) for state in best]),
     )
 
 
-def outlook(found: Prospects, surface: Surface, laid: Pattern, sizes: int, left: float) -> Choices | None:
+def outlook(found: Prospects, laid: Pattern, sizes: int, left: float) -> Choices | None:
     """What numbers of singularities would leave open with so many sizes; the first is none, which leaves
     ``left``. None where there is no choice."""
-    if len(found.proposals) < 2 or found.proposals[0].count:
+    number = found.choices.number
+    if len(number) < 2 or number[0]:
         return None
-    choices = Choices.of(found.proposals, 0, sizes, fill_openings(surface).vertices)
-    then = choices.uncovered * _width(laid)
+    then = found.choices.uncovered * _width(laid)
     then += found.left[:, min(sizes, CURVE) - 1]
     then[0] = left  # measured, and with the ends as they are now
-    return replace(choices, uncovered=then, coarse=True)
+    return replace(found.choices, sizes=sizes, uncovered=then)
 
 
 def outlook_note(laid: Pattern, found: Choices) -> tuple[str, ...]:

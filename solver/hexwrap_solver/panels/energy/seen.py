@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexwrap_solver.arrays import Floats, Ints
+from hexwrap_solver.geometry import dot, normalize
 
 
 @dataclass(frozen=True)
@@ -28,9 +29,8 @@ class Seen:
         normal = np.stack(
             [(sy * tz - sz * ty).sum(1), (sz * tx - sx * tz).sum(1), (sx * ty - sy * tx).sum(1)], axis=1
         )
-        normal = _unit(normal)
-        first = spokes[:, 0] - np.einsum("qd,qd->q", spokes[:, 0], normal)[:, None] * normal
-        first = _unit(first)
+        normal = normalize(normal)
+        first = normalize(spokes[:, 0] - dot(spokes[:, 0], normal)[:, None] * normal)
         axes = np.stack([first, np.cross(normal, first), normal], axis=1)
         x, y, z = np.moveaxis(spokes @ axes.transpose(0, 2, 1), 2, 0)
         return cls(axes, x, y, z)
@@ -66,8 +66,3 @@ class Seen:
         moves along with the corners (variable projection; Golub and Pereyra 1973)."""
         flat = np.stack([np.ones_like(self.x), self.x, self.y], axis=2)
         return np.linalg.qr(flat, mode="complete")[0][:, :, 3:]
-
-
-def _unit(vectors: Floats) -> Floats:
-    length = np.sqrt(np.einsum("qd,qd->q", vectors, vectors))
-    return np.asarray(vectors / np.maximum(length, np.finfo(float).tiny)[:, None])
