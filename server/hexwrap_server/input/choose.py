@@ -15,6 +15,7 @@ from fnmatch import fnmatchcase
 import numpy as np
 from scipy.spatial import cKDTree
 
+from hexwrap_server.errors import NoObjectError, SeveralObjectsError, UnreadableFileError
 from hexwrap_server.input.object_words import (
     apart_from,
     coarse_numbers,
@@ -28,7 +29,6 @@ from hexwrap_server.input.object_words import (
     strays,
 )
 from hexwrap_server.input.parts import COARSEST, Part, brep_where_needed, parts_of
-from hexwrap_server.input.readers.errors import NoObjectError, SeveralObjectsError, UnreadableFileError
 from hexwrap_server.input.readers.found import LINKED, FileContent, Found, Geometry
 from hexwrap_solver.surface import SentMesh
 from hexwrap_solver.surface.weld import TOLERANCE

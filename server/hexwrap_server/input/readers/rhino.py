@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import rhino3dm
 
-from hexwrap_server.input.readers.errors import UnreadableFileError
+from hexwrap_server.errors import UnreadableFileError
 from hexwrap_server.input.readers.found import LINKED, FileContent, Found, Geometry
 from hexwrap_server.input.readers.rhino_brep import brep_of, nurbs_surface, rhino_mesh, subd_mesh
 from hexwrap_server.input.readers.rhino_model import MOST_OBJECTS, Model, Placed, TooManyObjectsError
