@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -37,10 +38,13 @@ class Target:
     data: Path
     bomb: int
 
-    def send_bomb(self) -> httpx.Response:
+    @cached_property
+    def packed(self) -> bytes:
         """Numbers that take eight times as much as a list of floats."""
-        body = gzip.compress(b"[" + b"1.5," * (self.bomb * MIB // 4) + b"1]", 1)
-        return self.client.post("/v1/jobs", content=body, headers={"Content-Encoding": "gzip"})
+        return gzip.compress(b"[" + b"1.5," * (self.bomb * MIB // 4) + b"1]", 1)
+
+    def send_bomb(self) -> httpx.Response:
+        return self.client.post("/v1/jobs", content=self.packed, headers={"Content-Encoding": "gzip"})
 
     def together(self, count: int, send: Callable[[], httpx.Response]) -> Answers:
         with ThreadPoolExecutor(count) as threads:
@@ -159,6 +163,7 @@ def memory(process: Any) -> list[float]:
 
 def measured(target: Target, attack: Callable[[Target], Answers]) -> tuple[Answers, Cost]:
     """What an attack was answered, and what it cost."""
+    assert target.packed  # made before the clock runs
     cost, done = Cost(), threading.Event()
 
     def look() -> None:

@@ -44,6 +44,9 @@ GRACE = 2
 #: Connections that may wait to be accepted. Where no file handle is free, asyncio tries so many in a row, and
 #: with more all else waits.
 BACKLOG = 128
+#: Seconds that a connection stays open between requests: longer than most clients keep theirs, so that no
+#: request meets its end.
+KEEP_ALIVE = 60
 log = logging.getLogger("hexwrap.server")
 
 
@@ -113,6 +116,7 @@ def serve(settings: Settings) -> None:
             access_log=False,
             server_header=False,
             timeout_graceful_shutdown=GRACE,
+            timeout_keep_alive=KEEP_ALIVE,
             backlog=BACKLOG,
             h11_max_incomplete_event_size=64 * 1024,
         )
