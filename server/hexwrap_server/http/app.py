@@ -41,8 +41,8 @@ from hexwrap_solver.errors import HexwrapError
 
 #: Seconds that open connections get when the server stops.
 GRACE = 2
-#: Connections that may wait to be accepted. Where no file handle is free, asyncio tries so many in a row, and
-#: with more all else waits.
+#: Connections that may wait to be accepted. Where no file handle is free, asyncio tries this many in a row,
+#: and with more all else waits.
 BACKLOG = 128
 #: Seconds that a connection stays open between requests: longer than most clients keep theirs, so that no
 #: request meets its end.
