@@ -22,12 +22,15 @@ from tests.server import forked
 from hexwrap_server.http.app import serve
 from hexwrap_server.settings import Settings
 longest, run = [0.0], asyncio.Handle._run
+note = pathlib.Path(sys.argv[2], "longest").open("w")  # once: a test may leave no handle free
 def timed(handle):
     start = time.thread_time()
     run(handle)
     if time.thread_time() - start > longest[0]:
         longest[0] = time.thread_time() - start
-        pathlib.Path(sys.argv[2], "longest").write_text(str(longest[0]))
+        note.seek(0)
+        note.write(f"{longest[0]:.9f}")
+        note.flush()
 asyncio.Handle._run = timed
 forked.fork_from_here()
 serve(Settings.from_environment({"port": int(sys.argv[1]), "data": sys.argv[2], "workers": int(sys.argv[3])}))

@@ -10,10 +10,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from hexwrap_server.errors import SheetError
 from hexwrap_server.output.blocks import frames
 from hexwrap_server.output.drawing import Entities, drawing
 from hexwrap_server.output.layers import size_layers
-from hexwrap_server.output.meta import Group, Meta, SheetError, panels_of
+from hexwrap_server.output.meta import Group, Meta, panels_of
 from hexwrap_server.output.table import neighbour_labels
 from hexwrap_server.output.text import length, lengths, one_line
 from hexwrap_server.output.units import unit_of
