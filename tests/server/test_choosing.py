@@ -11,8 +11,8 @@ import pytest
 import rhino3dm
 
 from hexwrap_server.cli.main import main
+from hexwrap_server.errors import NoObjectError, SeveralObjectsError, UnreadableFileError
 from hexwrap_server.input.choose import Chosen, choose
-from hexwrap_server.input.readers.errors import NoObjectError, SeveralObjectsError, UnreadableFileError
 from hexwrap_server.input.readers.rhino_brep import control_net
 from hexwrap_server.input.surface_files import read_file, sent_surface
 from hexwrap_server.jobs.work import take_in

@@ -18,6 +18,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import cKDTree
 
+from hexwrap_server.errors import NoObjectError, SeveralObjectsError, UnreadableFileError
 from hexwrap_server.input.object_words import (
     apart_from,
     coarse_numbers,
@@ -33,7 +34,6 @@ from hexwrap_server.input.object_words import (
     strays,
 )
 from hexwrap_server.input.parts import COARSEST, Part, brep_where_needed, parts_of
-from hexwrap_server.input.readers.errors import NoObjectError, SeveralObjectsError, UnreadableFileError
 from hexwrap_server.input.readers.found import LINKED, FileContent, Found, Geometry
 from hexwrap_solver.surface.closest import TriangleTree
 from hexwrap_solver.surface.weld import TOLERANCE
@@ -42,7 +42,7 @@ from hexwrap_solver.surface.weld import TOLERANCE
 DOMINANT = 1.3
 #: A part that nearly meets the best one is left out only if that counts for this many times as much.
 TORN = 10.0
-#: The area of what is no tube counts for so much of it, of ground, and of what is flat.
+#: The area of what is not a tube counts for this part of it, that of ground, and that of what is flat.
 NO_TUBE, GROUND, PLANE = 1 / 20, 1 / 400, 1e-6
 #: Parts are alike whose sizes and areas differ by no more than this part.
 ALIKE = 0.01

@@ -23,7 +23,7 @@ from hexwrap_solver.surface.checks import check_arrays
 from hexwrap_solver.surface.nurbs_checks import TOLERANCE, closed_within, end_gap
 from hexwrap_solver.surface.pieces import Joint, Piece, joined, only, pieces, together
 
-#: Of more pieces of a mesh than these, only the largest are no strays.
+#: Of more pieces of a mesh than these, only the largest count; the rest are strays.
 MOST = 300
 #: The tolerance of a file counts up to this part of the size of what is joined.
 COARSEST = 1e-3

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from pathlib import PurePath
 from typing import Any, TypeVar
 
+from hexwrap_server.errors import FileTypeError, UnreadableFileError
 from hexwrap_server.input.choose import Chosen, choose
 from hexwrap_server.input.object_words import rows
-from hexwrap_server.input.readers.errors import FileTypeError, UnreadableFileError
 from hexwrap_server.input.readers.found import FileContent
 from hexwrap_server.input.readers.npz import read_npz
 from hexwrap_server.input.readers.obj import read_obj

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import rhino3dm
 
-from hexwrap_server.input.readers.errors import UnreadableFileError
+from hexwrap_server.errors import UnreadableFileError
 from hexwrap_server.input.readers.found import LINKED, FileContent, Found, Geometry
 from hexwrap_server.input.readers.rhino_brep import brep_of, nurbs_surface, rhino_mesh, subd_mesh
 from hexwrap_server.input.readers.rhino_model import MOST_OBJECTS, Model, Placed, TooManyObjectsError
@@ -19,7 +19,7 @@ from hexwrap_solver.surface import NurbsSurface
 
 #: Rhino's geometry types that are surfaces; curves, points, lights and texts beside them do no harm.
 SURFACES = (rhino3dm.Mesh, rhino3dm.Brep, rhino3dm.Surface, rhino3dm.SubD)
-#: Words for what is no surface. Blocks are resolved: one that is left is linked to a file that is not there.
+#: Words for what is not a surface. Blocks are resolved: one that is left is linked to a missing file.
 OTHERS = {
     rhino3dm.Curve: "curves",
     rhino3dm.Point: "points",
@@ -96,7 +96,7 @@ def _kind(geometry: Any) -> str:
 
 
 def _other_kind(geometry: Any) -> str:
-    """Of what is no surface."""
+    """Of what is not a surface."""
     for kind, word in OTHERS.items():
         if isinstance(geometry, kind):
             return word
