@@ -609,13 +609,14 @@ def test_inspect_says_what_would_be_mapped_as_the_options_ask(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "mass.3dm"
-    path.write_bytes(Model().add(cylinder(capped=True)).bytes())
+    base = [[0, 0], [4000, 0], [4000, 4000], [0, 4000]]
+    corners = np.array([[*xy, z] for z in (0, 12000) for xy in base], dtype=float)
+    sides = [[0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7], [3, 2, 1, 0], [4, 5, 6, 7]]
+    path.write_bytes(Model("Millimeters").add(rhino_mesh(corners, sides)).bytes())
     for options, walls in (((), 2), (("--caps", "keep"), 0)):
         assert main(["inspect", str(path), *options]) == 0
-        assert (
-            f"To be panelized: a surface of 2 × 2 × 4 m with {walls} boundary curves"
-            in capsys.readouterr().out
-        )
+        said = capsys.readouterr().out
+        assert f"To be panelized: a surface of 4,000 × 4,000 × 12,000 mm with {walls} boundary curves" in said
 
 
 def test_the_command_line_chooses(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
