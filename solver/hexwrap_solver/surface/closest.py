@@ -160,7 +160,7 @@ class TriangleTree:
 
     def _placed(self, points: Floats, face: Ints) -> Floats:
         """(3, k) barycentric coordinates for the second and third corner, and height above the triangle."""
-        return np.einsum("kij,kj->ik", self._frames[face], points - self.corners[face, 0])
+        return np.asarray(np.einsum("kij,kj->ik", self._frames[face], points - self.corners[face, 0]))
 
     def _distance(self, points: Floats, face: Ints, most: Floats | float = np.inf) -> Floats:
         """(k,) distance of each point from a triangle of its own; where it is not below ``most``, only
