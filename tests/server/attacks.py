@@ -196,7 +196,7 @@ def measured(target: Target, attack: Callable[[Target], Answers]) -> tuple[Answe
 ATTACKS: dict[Callable[[Target], Answers], set[int]] = {
     long_name: {422},
     flipped_bit: {422},
-    bombs: {201, 422},
+    bombs: {201, 422, 503},
     known_posts: {200, 202},
     long_list: {200},
     overflowing: {400, 422},
