@@ -65,14 +65,12 @@ def read_file(data: bytes, filename: str) -> FileContent:
 
     Raises FileTypeError for other suffixes, UnreadableFileError for files that are broken.
     """
-    return _guarded(data, filename, lambda suffix: READERS[suffix](data))
+    return _guarded(filename, lambda suffix: READERS[suffix](data))
 
 
 def read_surface(data: bytes, filename: str, settings: SurfaceSettings | None = None) -> Chosen:
     """The surface that is meant. Raises as read_file does, and NoObjectError, SeveralObjectsError."""
-    asked = settings or SurfaceSettings()
-    content = read_file(data, filename)
-    return _guarded(data, filename, lambda _: choose(content, asked.object, asked.layer, asked.unit))
+    return _chosen(read_file(data, filename), filename, settings or SurfaceSettings())
 
 
 def sent_surface(
@@ -80,9 +78,7 @@ def sent_surface(
 ) -> FromFile:
     """The surface that is meant, and how it is to be taken in. Raises as read_surface does."""
     content = read_file(data, filename)
-    chosen = _guarded(
-        data, filename, lambda _: choose(content, settings.object, settings.layer, settings.unit)
-    )
+    chosen = _chosen(content, filename, settings)
     first = chosen.used[0]
     geometry = chosen.geometry
     meshing = replace(settings.mesh or MeshSettings(), max_vertices=max_vertices)
@@ -99,7 +95,11 @@ def sent_surface(
     return FromFile(sent, rows(content.objects, chosen.used))
 
 
-def _guarded(data: bytes, filename: str, read: Callable[[str], T]) -> T:
+def _chosen(content: FileContent, filename: str, asked: SurfaceSettings) -> Chosen:
+    return _guarded(filename, lambda _: choose(content, asked.object, asked.layer, asked.unit))
+
+
+def _guarded(filename: str, read: Callable[[str], T]) -> T:
     suffix = PurePath(filename).suffix.lower()
     if suffix not in READERS:
         what = f"Files of type {suffix}" if suffix else "Files without a suffix"

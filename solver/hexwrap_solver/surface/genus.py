@@ -113,7 +113,7 @@ def loops_of(vertices: Floats, faces: Ints, twin: Ints, names: SentNames) -> tup
     loops = boundary_loops(faces, twin) if len(boundary) else []
     euler = n - (len(twin) + len(boundary)) // 2 + len(faces)
     if euler != 2 - len(loops):
-        if _umbrellas(faces, twin)[0] > n:
+        if _umbrellas(twin)[0] > n:
             raise _pinched(faces, twin, n, names)
         raise _handles(vertices, faces, twin, len(loops), euler, names)
     if len(loops) == 2:
@@ -124,7 +124,7 @@ def loops_of(vertices: Floats, faces: Ints, twin: Ints, names: SentNames) -> tup
     return tuple(loops[i] for i in np.argsort(-np.array(length), kind="stable"))
 
 
-def _umbrellas(faces: Ints, twin: Ints) -> tuple[int, Ints]:
+def _umbrellas(twin: Ints) -> tuple[int, Ints]:
     """Fans of faces around vertices: their number, and the fan of every corner."""
     h = np.flatnonzero(twin >= 0)
     k = len(twin)
@@ -134,7 +134,7 @@ def _umbrellas(faces: Ints, twin: Ints) -> tuple[int, Ints]:
 
 
 def _pinched(faces: Ints, twin: Ints, n: int, names: SentNames) -> NonManifoldVertexError:
-    _, fan = _umbrellas(faces, twin)
+    _, fan = _umbrellas(twin)
     fans = np.unique(np.stack([faces.ravel(), fan], axis=1), axis=0)[:, 0]
     pinched = np.flatnonzero(np.bincount(fans, minlength=n) > 1)
     vertices = names.vertex[pinched]
