@@ -70,7 +70,7 @@ def read_file(data: bytes, filename: str) -> FileContent:
 
 def read_surface(data: bytes, filename: str, settings: SurfaceSettings | None = None) -> Chosen:
     """The surface that is meant. Raises as read_file does, and NoObjectError, SeveralObjectsError."""
-    return _chosen(read_file(data, filename), filename, settings or SurfaceSettings())
+    return chosen_of(read_file(data, filename), filename, settings or SurfaceSettings())
 
 
 def sent_surface(
@@ -78,11 +78,26 @@ def sent_surface(
 ) -> FromFile:
     """The surface that is meant, and how it is to be taken in. Raises as read_surface does."""
     content = read_file(data, filename)
-    chosen = _chosen(content, filename, settings)
+    chosen = chosen_of(content, filename, settings)
+    return FromFile(as_sent(content, chosen, settings, max_vertices), rows(content.objects, chosen.used))
+
+
+def chosen_of(content: FileContent, filename: str, settings: SurfaceSettings) -> Chosen:
+    """The surface that is meant of what was read. Raises NoObjectError, SeveralObjectsError."""
+    return _guarded(filename, lambda _: choose(content, settings.object, settings.layer, settings.unit))
+
+
+def as_sent(
+    content: FileContent,
+    chosen: Chosen,
+    settings: SurfaceSettings,
+    max_vertices: int = MeshSettings.max_vertices,
+) -> SentSurface:
+    """What was chosen, and how it is to be taken in."""
     first = chosen.used[0]
     geometry = chosen.geometry
     meshing = replace(settings.mesh or MeshSettings(), max_vertices=max_vertices)
-    sent = SentSurface(
+    return SentSurface(
         mesh=geometry if isinstance(geometry, SentMesh) else None,
         nurbs=geometry if isinstance(geometry, NurbsSurface) else None,
         brep=geometry if isinstance(geometry, Brep) else None,
@@ -92,11 +107,6 @@ def sent_surface(
         origin=Origin(first.name, first.layer, tuple(sorted(first.attributes.items()))),
         notes=chosen.notes,
     )
-    return FromFile(sent, rows(content.objects, chosen.used))
-
-
-def _chosen(content: FileContent, filename: str, asked: SurfaceSettings) -> Chosen:
-    return _guarded(filename, lambda _: choose(content, asked.object, asked.layer, asked.unit))
 
 
 def _guarded(filename: str, read: Callable[[str], T]) -> T:
