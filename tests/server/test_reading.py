@@ -15,8 +15,8 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from hexwrap_server.errors import FileTypeError, SeveralObjectsError, UnreadableFileError
 from hexwrap_server.input import surface_files
-from hexwrap_server.input.readers.errors import FileTypeError, SeveralObjectsError, UnreadableFileError
 from hexwrap_server.input.readers.found import Geometry
 from hexwrap_server.input.surface_files import READERS
 from hexwrap_solver.errors import SurfaceError

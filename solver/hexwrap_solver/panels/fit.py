@@ -80,7 +80,7 @@ class FitKey:
 WATERTIGHT_NOTES = (
     "Watertight panels share their corners: joint, orientation and size classes do not apply.",
 )
-WEIGHTS_NOTE = ("Weights were given, so that the energies were minimised, as with method energy.",)
+WEIGHTS_NOTE = ("Weights were given, so the energies were minimised, as with method energy.",)
 
 #: Corners farther from their panel's plane than this fraction of its mean edge: it did not become flat.
 FLAT = 1e-9

@@ -51,9 +51,9 @@ from hexwrap_solver.pattern.types import PatternSettings
 P99, MOST_PREDICTED, MOST_DISTORTED, FINE = 0.99, 0.15, 1.5, 0.005
 #: Where one leans by more than this (radians), a pattern that winds along with them is compared.
 LEANING = np.deg2rad(2.0)
-#: Features are given up, the costliest first, in so many rounds.
+#: Features are given up, the costliest first, in this many rounds.
 MOST_GIVEN_UP = 8
-#: So many, the longest, are tried: each is an unknown of its own in every round.
+#: This many, the longest, are tried: each is an unknown of its own in every round.
 MOST_FOLLOWED = 64
 #: More folds, and more places where they meet, are not named one by one.
 MOST_NAMED, MOST_PLACES = 4, 8

@@ -19,8 +19,8 @@ from hexwrap_solver.surface.types import Feature, Surface
 #: straight.
 WIDE = 0.02
 
-#: Creases that were only seen on the mesh count where they are longer than so many cells, and where all of
-#: them together leave so many cells between them: others are roughness, or a coarse mesh of a round surface.
+#: Creases that were only seen on the mesh count where they are longer than this many cells, and where all of
+#: them together leave as many between them: others are roughness, or a coarse mesh of a round surface.
 LEAST_CELLS = 3.0
 
 #: Directions at a vertex that differ by less (radians, relative to unit normals) are one.

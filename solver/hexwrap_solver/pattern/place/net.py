@@ -43,7 +43,7 @@ from hexwrap_solver.pattern.types import PatternSettings
 
 #: Sizes and directions tried, from one end of what is admissible to the other.
 SCALES, DIRECTIONS = 41, 24
-#: Where the lattice is free to move, so many offsets along either basis vector.
+#: Where the lattice is free to move, this many offsets along either basis vector.
 OFFSETS = 12
 #: Cost of a size off the wanted one by its whole spread, beside the misfit in lattice units: the root of the
 #: energy of the deformation.

@@ -21,7 +21,8 @@ from hexwrap_solver.surface.brep.kinks import crossings, kink_lines, kinks_of
 from hexwrap_solver.surface.brep.pull import Patch, free, lifted, patch_of, pull
 from hexwrap_solver.surface.brep.sizes import Field, Sizes, field_of, meeting, sized
 from hexwrap_solver.surface.brep.types import Brep, Edge, Face, Trim
-from hexwrap_solver.surface.errors import EmptySurfaceError, TooFineError
+from hexwrap_solver.surface.brep.whole import check_brep
+from hexwrap_solver.surface.errors import EmptySurfaceError, FlatSurfaceError, TooFineError
 from hexwrap_solver.surface.mesh_sizes import GRADE, ROW, check_settings
 from hexwrap_solver.surface.nurbs import evaluate
 from hexwrap_solver.surface.topology import sum_rows
@@ -30,6 +31,8 @@ from hexwrap_solver.tolerances import TINY
 
 #: Normals of two faces that differ by more than this along their edge make a crease, radians.
 CREASE = np.deg2rad(5.0)
+#: A surface with less area than this part of its largest face's size, squared, is a curve.
+FLAT = 1e-10
 #: Normals beside an edge are taken this part of the face's box away from it.
 BESIDE = 1e-4
 
@@ -79,6 +82,7 @@ def mesh_brep(brep: Brep, settings: MeshSettings | None = None) -> BrepMesh:
     check_settings(settings)
     if not brep.faces:
         raise EmptySurfaceError("The polysurface has no faces.")
+    check_brep(brep)
     used = sorted({t.edge for face in brep.faces for loop in face.loops for t in loop if t.edge >= 0})
     first = {e: places(brep.edges[e]) for e in used}
     at = {e: evaluate_curve(brep.edges[e].curve, t) for e, t in first.items()}
@@ -86,6 +90,11 @@ def mesh_brep(brep: Brep, settings: MeshSettings | None = None) -> BrepMesh:
         _side(face, name, brep, {e: a[0] for e, a in at.items()}) for name, face in enumerate(brep.faces)
     ]
     area = sum(side.field.area for side in sides)
+    if area < FLAT * max(side.patch.size for side in sides) ** 2:
+        raise FlatSurfaceError(
+            "The surface has no area, it has shrunk to a curve: run SelBadObjects in Rhino, or Undo what has "
+            "flattened it."
+        )
     sizes = Sizes.of(settings, area)
     for side in sides:
         side.field = sized(side.field, sizes)
