@@ -291,7 +291,7 @@ class Chart:
             except np.linalg.LinAlgError:  # the energy is flat where triangles break
                 break
             fresh = True
-        if not residual <= max(enough, ACCEPTED):  # neither where it is no number
+        if not residual <= max(enough, ACCEPTED):  # nor where it is NaN
             raise ConvergenceError(
                 "The map breaks down where the singularities have to move for the pattern to close: ask for "
                 "smaller cells, or another number of singularities."

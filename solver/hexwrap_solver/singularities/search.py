@@ -27,7 +27,7 @@ BEAM, STARTS = 5, 16
 STARTS_ALIGNED = 48
 #: States of each number that are kept, and how many of these, those that leave least open, are refined.
 REFINED, PROMISING = 8, 3
-#: Values that are held at a time: of so many states as that makes.
+#: Values that are held at a time: of this many states as that makes.
 TOGETHER = 4_000_000
 #: Best seats that an addition tries per state.
 TRIED = 4
@@ -357,7 +357,7 @@ class _Drafts:
         return np.asarray(values)
 
     def _move(self, which: Ints, move: Ints, steps: Ints) -> None:
-        """Makes a move of each, so many times."""
+        """Makes a move of each, this many times."""
         search, q = self.search, self.search.seats
         change = steps[:, None] * search._moves[0][move]
         slope = np.einsum("sf,sf->s", change, self.gradient[which][:, q:])

@@ -43,15 +43,15 @@ SIZES = 11
 MOST, MORE, MANY = 8, 2, 18
 #: The size of the cells may change by this share, and by this one where a length is asked for.
 FREE, ASKED = 0.05, 0.015
-#: Where the least moves that close are longer than this, in cells, singularities are seated anew, so many
+#: Where the least moves that close are longer than this, in cells, singularities are seated anew, this many
 #: times.
 FAR, AGAIN = 0.6, 2
-#: Where those chosen do not close, so many other numbers of singularities are tried.
+#: Where those chosen do not close, this many other numbers of singularities are tried.
 OTHERS = 1
 #: Closing is not tried anew once it was tried on meshes of so many vertices together; those on which it fails
-#: count so many times more.
+#: count this many times more.
 WORK, HARD = 100_000, 2
-#: Creases whose surroundings are more than this part of the surface are no lines to keep away from.
+#: Creases whose surroundings are more than this part of the surface are not lines to keep away from.
 FACETED = 0.5
 #: Sums of listed angles this near to a multiple of the quantum are one, radians.
 NEARLY = 1e-3

@@ -116,7 +116,7 @@ def loops_of(vertices: Floats, faces: Ints, twin: Ints, names: SentNames) -> tup
     return tuple(loops[i] for i in np.argsort(-np.array(length), kind="stable"))
 
 
-def _umbrellas(faces: Ints, twin: Ints) -> tuple[int, Ints]:
+def _umbrellas(twin: Ints) -> tuple[int, Ints]:
     """Fans of faces around vertices: their number, and the fan of every corner."""
     h = np.flatnonzero(twin >= 0)
     k = len(twin)
@@ -128,7 +128,7 @@ def _umbrellas(faces: Ints, twin: Ints) -> tuple[int, Ints]:
 def apart(faces: Ints, n: int, twin: Ints) -> tuple[Ints, Ints]:
     """Faces of a mesh in which every vertex has one fan of them, and (k,) of which vertices its vertices from
     n on are copies: one for every further fan around a vertex in which the surface touches itself."""
-    count, fan = _umbrellas(faces, twin)
+    count, fan = _umbrellas(twin)
     corner = np.unique(fan, return_index=True)[1]
     centre = faces.ravel()[corner]  # (count,)
     if count == len(np.unique(centre)):
