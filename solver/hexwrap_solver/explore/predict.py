@@ -2,7 +2,7 @@
 
 The cell that would stand at a point has an edge in proportion to e^−u, so that over the surface the sizes of
 the cells are known, and how many there are of each. Their largest regular panels are smaller for one reason
-that the map tells: where u has a gradient, the cell is no regular polygon. To first order the map carries the
+that the map says: where u has a gradient, the cell is not regular. To first order the map carries the
 polygon P around 0 by z + a z²/2, where |a| is the gradient of u; its edges turn, and the largest regular
 polygon between them is shorter by a part of |a|·ℓ of its edge ℓ (``floor``). With these lengths the exact
 programme over the size classes (``partition_by_area``), of each kind of cell by itself, says how much is left
@@ -65,7 +65,7 @@ class Outlook:
     limit: (c,) edge of its largest panel without a joint. Whole cells are those whose middle is as far from
     the boundary as they reach, on the average over all directions (perimeter/2π); along a loop that is a line
     of the pattern, half a row. special: cells with another number of sides; trimmed: those cut at the
-    boundary; folded: pieces of those that features cut, of so many kinds; rest: the area of all these, which
+    boundary; folded: pieces of those that features cut, of that many kinds; rest: area of all these, which
     their panels are taken to cover.
     """
 
@@ -80,7 +80,7 @@ class Outlook:
     rest: float = 0.0
 
     def foresee(self, sizes: int | None, joint: float = 0.0) -> Foreseen:
-        """With so many size classes (None: a length for each panel) and joints at least so wide."""
+        """With this many size classes (None: a length for each panel) and joints at least so wide."""
         others = self.special + self.trimmed + self.folded
         types = panels = 0
         area = perimeter = cells = 0.0
