@@ -25,7 +25,7 @@ from typing import Any
 from benchmarks.whole import violations
 from hexwrap_server.cli.local import Task, solve_here, task
 from hexwrap_server.cli.main import make_parser
-from hexwrap_server.input.readers.errors import NoObjectError, SeveralObjectsError
+from hexwrap_server.errors import NoObjectError, SeveralObjectsError
 from hexwrap_server.jobs.work import take_in
 from hexwrap_server.output import wire
 from hexwrap_server.output.writers import Meta, write

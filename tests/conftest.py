@@ -5,10 +5,18 @@ import sys
 
 import pytest
 
+from tests.server import forked
+
 os.environ.update(dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1"))
 # Tests start some hundred processes. Each would compile the whole program again.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
+forked.fork_workers()
+
+
+def pytest_sessionfinish() -> None:
+    forked.TEMPLATE.stop()
+
 
 #: Files that take a minute or more are begun first: begun last, one would keep the others' processes idle.
 LONG_FILES = (

@@ -6,8 +6,13 @@ HexwrapError                    (hexwrap_solver.errors) one sentence for the cli
 │   ├── UploadError             the form around an uploaded file is broken
 │   └── TooManyVerticesError
 ├── SurfaceError                (hexwrap_solver.errors)
-│   └── FileTypeError, UnreadableFileError, SeveralObjectsError    (input/readers/errors.py)
+│   ├── FileTypeError           ┐
+│   ├── UnreadableFileError     ├ a file, as opposed to the surface in it
+│   ├── SeveralObjectsError     │
+│   └── NoObjectError           ┘
 ├── DrawingError                points and curves for ``lift`` that cannot be read or followed
+├── NotMadeError                a file shows something that was not asked for
+├── SheetError                  a panel is larger than the sheet it should be cut from
 ├── HttpError                   about the request as such: no such job, host not allowed, queue full …
 │   ├── HopsError               the call does not fit the Hops component
 │   └── JobFailedError          the problem of a job, repeated
@@ -37,7 +42,7 @@ import sqlite3
 from collections.abc import Sequence
 from typing import Any, ClassVar
 
-from hexwrap_solver.errors import HexwrapError
+from hexwrap_solver.errors import HexwrapError, SurfaceError
 
 #: More faults than these are not listed, the first ones tell enough.
 MOST_LISTED = 100
@@ -91,9 +96,39 @@ class TooManyVerticesError(FormError):
     title = "The surface has too many vertices"
 
 
+class FileTypeError(SurfaceError):
+    slug = "file-type"
+    title = "The file type is not known"
+
+
+class UnreadableFileError(SurfaceError):
+    slug = "unreadable-file"
+    title = "The file cannot be read"
+
+
+class SeveralObjectsError(SurfaceError):
+    slug = "several-objects"
+    title = "The file holds more than one surface"
+
+
+class NoObjectError(SurfaceError):
+    slug = "no-such-object"
+    title = "The file does not hold the object"
+
+
 class DrawingError(HexwrapError):
     slug = "drawing"
     title = "The drawing cannot be read"
+
+
+class NotMadeError(HexwrapError):
+    slug = "not-made"
+    title = "The file needs a stage that was left out"
+
+
+class SheetError(HexwrapError):
+    slug = "sheet"
+    title = "The panels do not fit on the sheets"
 
 
 class HttpError(HexwrapError):

@@ -17,6 +17,7 @@ from hexwrap_server import samples
 from hexwrap_server.input.requests import SentSurface
 from hexwrap_server.input.schemas import parse_request
 from hexwrap_server.jobs.work import take_in
+from tests.server import forked
 from tests.server.patience import PATIENCE, until
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -123,7 +124,7 @@ def unpack(inner: archive.Chunk, name: str, form: components.Form, folder: Path)
 
 SERVE = (
     "from hexwrap_server.http.app import serve; from hexwrap_server.settings import Settings; "
-    "serve(Settings.from_environment())"
+    "from tests.server import forked; forked.fork_from_here(); serve(Settings.from_environment())"
 )
 
 
@@ -137,9 +138,9 @@ def server_port(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]:
     settings = {"HEXWRAP_PORT": str(port), "HEXWRAP_DATA": str(folder / "data")}
     log = folder / "server.log"
     with log.open("wb") as said:
-        process = subprocess.Popen(
+        process = forked.popen(
             [sys.executable, "-c", SERVE],
-            env=os.environ | settings,
+            env=os.environ | settings | {"PYTHONPATH": forked.paths()},
             stdin=subprocess.DEVNULL,
             stdout=said,
             stderr=said,

@@ -11,13 +11,14 @@ import pytest
 import rhino3dm
 
 from hexwrap_server.cli.main import main
+from hexwrap_server.errors import NoObjectError, SeveralObjectsError, UnreadableFileError
 from hexwrap_server.input.choose import Chosen, choose
-from hexwrap_server.input.readers.errors import NoObjectError, SeveralObjectsError, UnreadableFileError
 from hexwrap_server.input.readers.rhino_brep import control_net
 from hexwrap_server.input.surface_files import read_file, sent_surface
 from hexwrap_server.jobs.work import take_in
 from hexwrap_solver.surface import NurbsSurface, SentMesh, surface_from_mesh
 from hexwrap_solver.surface.brep import Brep
+from hexwrap_solver.surface.errors import FlatSurfaceError, NonFiniteError
 from hexwrap_solver.surface.types import SurfaceSettings
 from tests.server.live import Live, running
 from tests.server.test_reading import obj, rhino_mesh
@@ -140,11 +141,56 @@ def test_several_that_could_be_meant_are_listed() -> None:
         (None, "Wall::Old", "north"),
         (None, "new", "south"),
         (None, "*::N*", "south"),
+        (None, "Model::Wall::Old", None),
+        (None, "…::Wall::Old", "north"),
         ("*th", "Old", "north"),
+        ("object 1", None, "south"),
+        ("'north'", None, "north"),
     ],
 )
-def test_objects_and_layers_are_named(object: str | None, layer: str | None, found: str) -> None:
-    assert names(two().choose(object, layer)) == [found]
+def test_objects_and_layers_are_named(object: str | None, layer: str | None, found: str | None) -> None:
+    if found is None:
+        with pytest.raises(NoObjectError):
+            two().choose(object, layer)
+    else:
+        assert names(two().choose(object, layer)) == [found]
+
+
+def test_the_last_steps_of_a_path_name_a_layer() -> None:
+    model = Model().add(mesh_at(), "a", "Site::North::Wall").add(mesh_at(50), "b", "Site::South::Wall")
+    assert names(model.choose(layer="north::wall")) == ["a"]
+
+
+def test_brackets_in_names_are_letters_and_accents_are_written_either_way() -> None:
+    model = Model().add(mesh_at(), "wall [a] S\u00fcd").add(mesh_at(50), "wall b")
+    assert names(model.choose("WALL [A]*")) == ["wall [a] S\u00fcd"]
+    assert names(model.choose("wall [a] Su\u0308d")) == ["wall [a] S\u00fcd"]
+
+
+@pytest.mark.parametrize(
+    ("object", "layer"), [("North", None), ("tower", None), (None, "Facades"), ("skin", None)]
+)
+def test_what_a_block_holds_is_named_by_its_instances(object: str | None, layer: str | None) -> None:
+    model = Model().add(mesh_at(80), "other")
+    block = model.block("tower", mesh_at())
+    instance = rhino3dm.InstanceReference(block, rhino3dm.Transform.Translation(1, 2, 3))
+    model.file.Objects.AddInstanceObject(instance, model.attributes("North", "Facades", zone="3"))
+    if object == "skin":
+        with pytest.raises(NoObjectError):
+            model.choose(object)
+        return
+    (used,) = model.choose(object, layer).used
+    assert (used.name, used.attributes) == ("North", {"zone": "3"})
+
+
+def test_vertices_of_a_part_are_those_of_its_own_objects() -> None:
+    """So a vertex has one number, whether its object is named or found among others."""
+    model = Model().add(mesh_at(200, 0.1), "lamp").add(mesh_at(), "tower").add(plane(60, 500), "site")
+    found, named = model.choose().geometry, model.choose("tower").geometry
+    assert isinstance(found, SentMesh)
+    assert isinstance(named, SentMesh)
+    np.testing.assert_array_equal(found.vertices, named.vertices)
+    np.testing.assert_array_equal(found.faces.values, named.faces.values)
 
 
 def test_an_id_is_a_name() -> None:
@@ -282,6 +328,49 @@ def test_edges_that_nearly_meet_are_told_with_where_and_how_far() -> None:
     assert "'sill' comes within 0.02" in nearly or "was not joined" in nearly
 
 
+def ring(count: int, low: float, turned: float = 2 * np.pi) -> rhino3dm.Mesh:
+    """A tube of that many faces around, two high, in double precision; its seam is not welded."""
+    turn = np.linspace(0, turned, count + 1)
+    points = np.concatenate([[(2 * np.cos(t), 2 * np.sin(t), low + z) for t in turn] for z in (0, 1, 2)])
+    made = rhino3dm.Mesh()
+    made.Vertices.UseDoublePrecisionVertices = True
+    for x, y, z in points.tolist():
+        made.Vertices.AddPoint3d(x, y, z)
+    k = count + 1
+    for at in range(2 * k):
+        if at % k < count:
+            made.Faces.AddFace(at, at + 1, at + 1 + k, at + k)
+    return made
+
+
+def test_the_gap_is_told_where_the_tolerance_is_less_than_rounding() -> None:
+    """The tolerance is below a millionth of the size, within which vertices are one in any case."""
+    model = Model().add(ring(24, 0), "a").add(ring(24, 2 + 1e-6), "b")
+    model.file.Settings.ModelAbsoluteTolerance = 2e-6
+    assert "the greatest gap closed was 1e-06" in model.choose().notes[0]
+
+
+def test_edges_with_other_vertices_are_measured_between_these() -> None:
+    """Every other vertex of the finer rim lies off the coarser one, by its chord height."""
+    height = 2 * (1 - np.cos(np.pi / 24))
+    with pytest.raises(SeveralObjectsError, match=rf"comes within {height:.3g} of .* MatchMeshEdge"):
+        Model().add(ring(24, 0), "a").add(ring(48, 2), "b").choose()
+
+
+def test_meshes_are_not_joined_with_surfaces_and_it_is_said() -> None:
+    with pytest.raises(SeveralObjectsError, match=r"'b' meets the surface at .* Rhino's Mesh"):
+        Model().add(cylinder(radius=2.0), "a").add(ring(96, 4), "b").choose()
+
+
+@pytest.mark.parametrize("gap", [0.004, -0.004])
+def test_a_slit_is_told_whether_it_gapes_or_overlaps(gap: float) -> None:
+    """Edges that cover each other are no two sides of a seam: joined, they would make a Möbius band."""
+    chosen = Model().add(ring(24, 0, 2 * np.pi + gap / 2)).choose()
+    assert "Edges of the surface come within 0.004 of each other" in chosen.notes[0]
+    assert isinstance(chosen.geometry, SentMesh)
+    assert len(surface_from_mesh(chosen.geometry).loops) == 1
+
+
 def test_surfaces_whose_edges_meet_become_one() -> None:
     arcs = []
     for start in (0.0, np.pi):
@@ -321,6 +410,40 @@ def test_blocks_are_resolved_nested_scaled_and_mirrored() -> None:
     assert (turned.normals * plain.normals * [-1, 1, 1]).sum(axis=1).min() > 0.9  # still outside
 
 
+@pytest.mark.parametrize(
+    "content", [mesh_at(), cylinder(), cylinder(capped=True)], ids=["mesh", "tube", "mass"]
+)
+def test_blocks_that_flatten_their_content_are_refused(content: object) -> None:
+    model = Model()
+    flat = rhino3dm.Transform(1.0)
+    flat.M22 = 0.0
+    model.file.Objects.AddInstanceObject(
+        rhino3dm.InstanceReference(model.block("b", content), flat), model.attributes("lost")
+    )
+    with pytest.raises(UnreadableFileError, match=r"flattens it.*ResetBlock"):
+        model.choose()
+    assert any("'lost' was left out" in note for note in model.add(mesh_at(), "tower").choose().notes)
+
+
+@pytest.mark.parametrize("bad", [np.nan, 1e300])
+def test_surfaces_with_impossible_numbers_are_refused(bad: float) -> None:
+    surface = rhino3dm.NurbsSurface.CreateFromCylinder(rhino3dm.Cylinder(rhino3dm.Circle(origin(), 2.0), 5.0))
+    surface.Points[1, 0] = rhino3dm.Point4d(bad, 0, 0, 1)
+    with pytest.raises(NonFiniteError):
+        Model().add(surface).choose()
+
+
+def test_surfaces_without_area_are_refused() -> None:
+    """A tube pressed into the circle that it stands on."""
+    surface = rhino3dm.NurbsSurface.CreateFromCylinder(rhino3dm.Cylinder(rhino3dm.Circle(origin(), 2.0), 5.0))
+    for i in range(surface.Points.CountU):
+        for j in range(surface.Points.CountV):
+            p = surface.Points[i, j]
+            surface.Points[i, j] = rhino3dm.Point4d(p.X, p.Y, 0, p.W)
+    with pytest.raises(FlatSurfaceError, match="shrunk to a curve"):
+        take_in(sent_surface(Model().add(surface).bytes(), "a.3dm", SurfaceSettings()).sent)
+
+
 def test_mirrored_surfaces_keep_their_outside() -> None:
     mirror = rhino3dm.Transform.Mirror(origin(), rhino3dm.Vector3d(0, 0, 1))
     model = Model()
@@ -349,6 +472,8 @@ def test_units_and_names_come_along(unit: str, word: str | None) -> None:
     assert surface.origin.attributes == (("material", "glass"),)
     asked = sent_surface(model.bytes(), "a.3dm", SurfaceSettings(unit="cm")).sent
     assert take_in(asked).unit == "cm"
+    assert sum("miles, is not carried" in note for note in surface.repairs) == (unit == "Miles")
+    assert not any("is not carried" in note for note in asked.notes)
 
 
 def test_a_seam_open_by_less_than_the_tolerance_closes() -> None:
@@ -475,7 +600,22 @@ def test_inspect_prints_what_is_there_and_what_would_be_done(
     assert "to choose" in said
     assert main(["inspect", str(path), "--object", "north"]) == 0
     assert "taken" in capsys.readouterr().out
+    assert main(["inspect", str(path), "--object", "1"]) == 0
+    assert "Taken: 'south'" in capsys.readouterr().out
     assert main(["inspect", str(tmp_path / "none.3dm")]) == 2
+
+
+def test_inspect_says_what_would_be_mapped_as_the_options_ask(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "mass.3dm"
+    path.write_bytes(Model().add(cylinder(capped=True)).bytes())
+    for options, walls in (((), 2), (("--caps", "keep"), 0)):
+        assert main(["inspect", str(path), *options]) == 0
+        assert (
+            f"To be panelized: a surface of 2 × 2 × 4 m with {walls} boundary curves"
+            in capsys.readouterr().out
+        )
 
 
 def test_the_command_line_chooses(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -484,7 +624,7 @@ def test_the_command_line_chooses(tmp_path: Path, capsys: pytest.CaptureFixture[
     out = str(tmp_path / "out.json")
     assert main(["solve", str(path), "--pattern", "none", "-o", out]) == 1
     assert "--object" in capsys.readouterr().err
-    assert main(["solve", str(path), "--pattern", "none", "--object", "north", "-q", "-o", out]) == 0
+    assert main(["solve", str(path), "--pattern", "none", "--object", "0", "-q", "-o", out]) == 0
 
 
 SHOWN = {

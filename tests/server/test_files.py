@@ -19,13 +19,14 @@ import trimesh
 from matplotlib.image import imread
 
 from hexwrap_server.cli import main as cli
+from hexwrap_server.errors import NotMadeError, SheetError
 from hexwrap_server.http import routes
 from hexwrap_server.output import scene, text
 from hexwrap_server.output.dxf import object_coordinates
 from hexwrap_server.output.flat import lay_flat, pack
 from hexwrap_server.output.unrolled import Unrolled
 from hexwrap_server.output.wire import result_json
-from hexwrap_server.output.writers import WRITERS, Meta, NotMadeError, SheetError, write
+from hexwrap_server.output.writers import WRITERS, Meta, write
 from hexwrap_solver.arrays import Ragged
 from hexwrap_solver.conformal.net import Net
 from hexwrap_solver.panels import make_components

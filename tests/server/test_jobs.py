@@ -445,7 +445,6 @@ def test_solve_that_the_server_ends_says_where_the_job_is(tmp_path: Path) -> Non
     assert int(answer.headers["retry-after"]) > 0
 
 
-@pytest.mark.usefixtures("fresh_workers")
 def test_workers_know_for_whom_they_work(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     surface = fresh()
     with running(tmp_path, workers=1) as client:

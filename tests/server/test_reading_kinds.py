@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hexwrap_server.input.readers.errors import UnreadableFileError
+from hexwrap_server.errors import UnreadableFileError
 from hexwrap_server.input.surface_files import read_file
 from hexwrap_solver.surface import SentMesh, surface_from_mesh
 from tests.server.test_reading import obj, off, ply, read_surface

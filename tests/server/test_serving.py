@@ -12,6 +12,7 @@ from pathlib import Path
 import httpx
 import pytest
 
+from tests.server import forked
 from tests.server.bodies import request, tube
 from tests.server.patience import PATIENCE
 from tests.server.process import PROGRAM, children, free_port, is_gone, served
@@ -64,9 +65,10 @@ def test_taken_port_is_told_clearly(tmp_path: Path) -> None:
     with served(tmp_path, port, workers=1):
         (tmp_path / "other").mkdir()
         command = [sys.executable, "-c", PROGRAM, str(port), str(tmp_path / "other"), "1"]
-        second = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
+        with forked.popen(command, stderr=subprocess.PIPE) as second:
+            told = second.communicate(timeout=PATIENCE)[1]
     assert second.returncode != 0
-    assert f"Cannot listen on 127.0.0.1:{port}" in second.stderr
+    assert f"Cannot listen on 127.0.0.1:{port}" in told.decode()
 
 
 BROKEN = """

@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 
 from hexwrap_server.input.form import Body, leaves
+from tests.server import forked
 from tests.server.patience import PATIENCE, until
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -72,14 +73,16 @@ class Server:
         self.start()
 
     def start(self) -> None:
-        env = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT / "solver"), str(ROOT / "server")])}
+        env = {**os.environ, "PYTHONPATH": forked.paths()}
         settings = f"Settings(port={self.port}, data={str(self.data)!r}, workers=1)"
         program = (
             "from hexwrap_server.http.app import serve\n"
             "from hexwrap_server.settings import Settings\n"
+            "from tests.server import forked\n"
+            "forked.fork_from_here()\n"
             f"serve({settings})"
         )
-        self.process = subprocess.Popen(
+        self.process = forked.popen(
             [sys.executable, "-c", program], env=env, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
         )
         until(self.answers, "the server")

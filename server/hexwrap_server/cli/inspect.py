@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from hexwrap_server.input.choose import Chosen, choose
+from hexwrap_server.input.choose import Chosen
 from hexwrap_server.input.parts import parts_of
 from hexwrap_server.input.readers.found import FileContent, Found
-from hexwrap_server.input.surface_files import read_file
+from hexwrap_server.input.surface_files import as_sent, chosen_of, read_file
+from hexwrap_server.jobs.work import take_in
 from hexwrap_solver.errors import HexwrapError
-from hexwrap_solver.surface.types import SurfaceSettings
+from hexwrap_solver.surface.types import Surface, SurfaceSettings
 
 #: Rows that are printed; the loops of more objects are not counted either.
 MOST_ROWS = 200
@@ -23,9 +25,11 @@ def print_content(console: Console, data: bytes, filename: str, settings: Surfac
     content = read_file(data, filename)
     unit = settings.unit or content.unit
     chosen: Chosen | None = None
+    surface: Surface | None = None
     refusal = ""
     try:
-        chosen = choose(content, settings.object, settings.layer, unit)
+        chosen = chosen_of(content, filename, settings)
+        surface = take_in(as_sent(content, chosen, settings), settings)
     except HexwrapError as error:
         refusal = error.detail
     tolerance = f", tolerance {content.tolerance:g}" if content.tolerance else ""
@@ -37,9 +41,27 @@ def print_content(console: Console, data: bytes, filename: str, settings: Surfac
     if content.others:
         others = ", ".join(f"{count} {kind}" for kind, count in sorted(content.others.items()))
         console.print(f"Besides: {others}")
-    for sentence in (refusal,) if refusal else chosen.notes if chosen else ():
+    for sentence in surface.repairs if surface else chosen.notes if chosen else ():
         console.print(sentence)
+    console.print(_summary(surface) if surface else refusal)
     return 1 if refusal else 0
+
+
+def _summary(surface: Surface) -> str:
+    """What would be mapped."""
+    size = " × ".join(f"{x:.4g}" for x in np.ptp(surface.vertices, axis=0))
+    walls = len(surface.loops) - surface.openings
+    parts = [
+        f"{walls} boundary curve{'s' * (walls != 1)}",
+        *([f"{surface.openings} opening{'s' * (surface.openings != 1)}"] if surface.openings else []),
+        *(
+            [f"{len(surface.features)} crease{'s' * (len(surface.features) != 1)}"]
+            if surface.features
+            else []
+        ),
+    ]
+    unit = f" {surface.unit}" if surface.unit else ""
+    return f"To be panelized: a surface of {size}{unit} with {', '.join(parts)}."
 
 
 def _table(content: FileContent, chosen: Chosen | None, unit: str | None) -> Table:

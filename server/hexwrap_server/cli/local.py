@@ -78,6 +78,12 @@ def task(given: str, arguments: argparse.Namespace) -> Task:
     return Task(request.name, sent, request.wanted)
 
 
+def surface_settings(arguments: argparse.Namespace) -> SurfaceSettings:
+    """What the options ask for as to the surface alone. Raises FormError."""
+    body = asked_body(arguments, {"surface": {"id": ""}})
+    return parse_request(body, MAX_VERTICES, MAX_PANELS).wanted.surface or SurfaceSettings()
+
+
 def solve_here(asked: Task, report: Report) -> tuple[Solution, dict[str, float]]:
     """The solution and seconds per stage. Raises HexwrapError."""
     runner = CachingRunner(StageCache(None, 0), report)

@@ -25,11 +25,10 @@ from hexwrap_server.cli.explore import WRITERS as FRONT_WRITERS
 from hexwrap_server.cli.explore import add_explore_options, check_outputs, explore_here, print_front
 from hexwrap_server.cli.explore import asked as asked_exploration
 from hexwrap_server.cli.inspect import print_content
-from hexwrap_server.cli.local import Task, only_map, solve_here, task
+from hexwrap_server.cli.local import Task, only_map, solve_here, surface_settings, task
 from hexwrap_server.cli.options import add_request_options, as_options, is_option_at_fault
 from hexwrap_server.cli.summary import print_summary
 from hexwrap_server.errors import FormError, StartError, UsageError
-from hexwrap_server.input import form
 from hexwrap_server.input.curves import READERS, read_drawing, write_curves
 from hexwrap_server.input.curves import WRITERS as CURVE_WRITERS
 from hexwrap_server.input.finished_map import map_in_result
@@ -42,7 +41,6 @@ from hexwrap_server.output.writers import WRITERS, Meta, check_wanted, write
 from hexwrap_server.settings import Settings, add_arguments
 from hexwrap_solver.errors import HexwrapError
 from hexwrap_solver.pipeline import Solution
-from hexwrap_solver.surface.types import SurfaceSettings
 
 #: What an ending stands for where the name of the file says no more.
 ENDINGS = {
@@ -50,8 +48,6 @@ ENDINGS = {
     ".ifc": "panels.ifc", ".glb": "panels.glb", ".svg": "domain.svg",
     ".png": "panels.png", ".json": "result.json", ".npz": "result.npz",
 }  # fmt: skip
-#: Settings of a surface that choose among what a file holds.
-INSPECTED = ("object", "layer", "unit")
 INPUT = "a mesh (OBJ, PLY, STL, OFF, NPZ), a Rhino file (3DM), a request (JSON), or sample:NAME"
 
 
@@ -131,8 +127,7 @@ def make_parser() -> argparse.ArgumentParser:
     inspect.add_argument(
         "input", metavar="FILE", help="a mesh (OBJ, PLY, STL, OFF, NPZ) or a Rhino file (3DM)"
     )
-    for name in INSPECTED:
-        inspect.add_argument(f"--{name}", metavar=name.upper(), help=f"as for solve --{name}")
+    add_request_options(inspect, "surface")
     inspect.set_defaults(command=_inspect)
     lift = commands.add_parser(
         "lift", help="carry own points and curves from the domain onto the surface", parents=[quiet]
@@ -240,8 +235,7 @@ def _explore(asked: argparse.Namespace) -> int:
 
 
 def _inspect(asked: argparse.Namespace) -> int:
-    given = {name: getattr(asked, name) for name in INSPECTED if getattr(asked, name) is not None}
-    settings = form.read(SurfaceSettings, given)
+    settings = surface_settings(asked)
     try:
         data = Path(asked.input).read_bytes()
     except OSError as error:

@@ -103,7 +103,7 @@ def add_request_options(parser: argparse.ArgumentParser, section: str = "") -> N
         elif option.words:
             group.add_argument(option.flag, choices=option.words, **common)
         else:
-            n, of = option.leaf.numbers, str if isinstance(option.leaf.default, str) else _value
+            n, of = option.leaf.numbers, str if option.leaf.is_text else _value
             word = _metavar(option.leaf)
             group.add_argument(
                 option.flag,
@@ -179,7 +179,7 @@ def _within(at: str, section: str) -> bool:
 
 
 def _metavar(leaf: Leaf) -> str:
-    if isinstance(leaf.default, str) and not leaf.choices:
+    if leaf.is_text:
         return "TEXT"
     return "LENGTH" if leaf.setting.unit == "length" else "VALUE" if leaf.choices else "N"
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+import errno
 import gc
 import logging
 import signal
@@ -10,6 +12,7 @@ import sys
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from types import FrameType
+from typing import Any
 
 import uvicorn
 from fastapi import FastAPI, Request
@@ -38,6 +41,12 @@ from hexwrap_solver.errors import HexwrapError
 
 #: Seconds that open connections get when the server stops.
 GRACE = 2
+#: Connections that may wait to be accepted. Where no file handle is free, asyncio tries this many in a row,
+#: and with more all else waits.
+BACKLOG = 128
+#: Seconds that a connection stays open between requests: longer than clients that would not see it end keep
+#: theirs (httpx: five), and no longer, since each holds a file handle.
+KEEP_ALIVE = 10
 log = logging.getLogger("hexwrap.server")
 
 
@@ -51,6 +60,7 @@ def create_app(settings: Settings | None = None, engine: Engine | None = None) -
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        asyncio.get_running_loop().set_exception_handler(_on_loop_fault)
         try:
             await service.start()
         except Exception as error:
@@ -106,6 +116,8 @@ def serve(settings: Settings) -> None:
             access_log=False,
             server_header=False,
             timeout_graceful_shutdown=GRACE,
+            timeout_keep_alive=KEEP_ALIVE,
+            backlog=BACKLOG,
             h11_max_incomplete_event_size=64 * 1024,
         )
         gc.freeze()  # half a million objects of modules need not be searched for garbage
@@ -161,7 +173,7 @@ def open_listener(settings: Settings) -> socket.socket:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listener.bind((settings.host, settings.port))
-        listener.listen(128)
+        listener.listen(BACKLOG)
     except OSError as error:
         listener.close()
         raise PortTakenError(
@@ -171,6 +183,15 @@ def open_listener(settings: Settings) -> socket.socket:
     host, port = listener.getsockname()[:2]
     log.info("listening on http://%s:%s", f"[{host}]" if ":" in host else host, port)
     return listener
+
+
+def _on_loop_fault(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+    """What nobody waits for. Connections that cannot be accepted wait, and are not worth a traceback each."""
+    error = context.get("exception")
+    if isinstance(error, OSError) and error.errno in (errno.EMFILE, errno.ENFILE):
+        log.debug("no file handle is free for a connection")
+    else:
+        log.error("%s", context["message"], exc_info=error)
 
 
 async def _on_error(request: Request, error: Exception) -> Response:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from hexwrap_server.http.openapi_result import NUMBER, PLANE, POINT, listed, nullable, record
 from hexwrap_server.http.openapi_result import RESULT as _RESULT
-from hexwrap_server.http.schema_words import NUMBER, PLANE, POINT, listed, nullable, record
 from hexwrap_server.input.form import Body, ExploreBody, schema
 from hexwrap_server.input.schemas import NurbsForm
 from hexwrap_solver.surface.types import SurfaceSettings

@@ -274,7 +274,7 @@ async def _carry(request: Request, id: str, what: str) -> Response:
     async with sent_body(request) as body:
         _finished(job)
         path = str(service.store.solution_path(job.identity))
-        data = await service.read(f"hexwrap_server.jobs.lift_points:{what}", body, path)
+        data = await service.read(f"hexwrap_server.jobs.reading:{what}", body, path)
     return Response(data, media_type=JSON)
 
 

@@ -8,13 +8,17 @@ low ground for least, unless another comes near it that has another shape or ano
 
 from __future__ import annotations
 
+import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import cKDTree
 
+from hexwrap_server.errors import NoObjectError, SeveralObjectsError, UnreadableFileError
 from hexwrap_server.input.object_words import (
     apart_from,
     coarse_numbers,
@@ -22,29 +26,33 @@ from hexwrap_server.input.object_words import (
     joint,
     label,
     listed,
+    odd_unit,
     others,
     point,
     rows,
+    spoilt,
     strays,
 )
 from hexwrap_server.input.parts import COARSEST, Part, brep_where_needed, parts_of
-from hexwrap_server.input.readers.errors import NoObjectError, SeveralObjectsError, UnreadableFileError
 from hexwrap_server.input.readers.found import LINKED, FileContent, Found, Geometry
-from hexwrap_solver.surface import SentMesh
+from hexwrap_solver.surface.closest import TriangleTree
 from hexwrap_solver.surface.weld import TOLERANCE
 
 #: Of several parts that could be meant, one that counts for this many times the next is meant.
 DOMINANT = 1.3
 #: A part that nearly meets the best one is left out only if that counts for this many times as much.
 TORN = 10.0
-#: The area of what is no tube counts for so much of it, of ground, and of what is flat.
+#: The area of what is not a tube counts for this part of it, that of ground, and that of what is flat.
 NO_TUBE, GROUND, PLANE = 1 / 20, 1 / 400, 1e-6
 #: Parts are alike whose sizes and areas differ by no more than this part.
 ALIKE = 0.01
 #: A part thinner than this part of its size is flat; ground is lower than this.
 FLAT, LOW = 1e-4, 0.1
-#: Edges that nearly meet are reported up to this many times the tolerance.
-NEARLY = 100.0
+#: Edges that nearly meet are reported up to this many times the tolerance, those of one part up to so many
+#: times, if they are further apart along the boundary by a factor.
+NEARLY, SLIT, ALONG = 100.0, 20.0, 6.0
+#: A mesh and a surface meet that have so many points in common; a slit is looked for at so many places.
+MEETING, PLACES = 3, 100
 #: At most this many such places are reported.
 SHOWN = 5
 #: Of more objects than these, only the largest are looked at.
@@ -65,14 +73,10 @@ def choose(
 ) -> Chosen:
     """Raises NoObjectError, SeveralObjectsError, UnreadableFileError, SurfaceError."""
     meant = named(content, object, layer)
+    odd = odd_unit(content, unit)
     unit = unit or content.unit
     if content.is_whole and content.mesh is not None:
-        return Chosen(content.mesh, tuple(meant))
-    if content.mesh is None and len(meant) == 1:
-        geometry = meant[0].read()
-        if not isinstance(geometry, SentMesh):
-            geometry, notes = brep_where_needed(geometry, content.tolerance)
-            return Chosen(geometry, tuple(meant), (*notes, *others(content, meant)))
+        return Chosen(content.mesh, tuple(meant), odd)
     meant = sorted(meant, key=lambda item: -max(item.size))[:MOST]
     found = parts_of(content, meant)
     if not found.parts:
@@ -100,8 +104,10 @@ def choose(
     notes += apart_from([other.box for other in found.parts if other is not part and _shares(other, part)])
     notes += strays([piece for members, piece in found.strays if members & set(part.members)])
     notes += list(apart.values())[:SHOWN]
+    notes += _slits(part, content.tolerance, _commands([part], meant))
     notes += coarse_numbers(geometry, content.tolerance)
-    return Chosen(geometry, tuple(used), (*notes, *copies(len(found.copies)), *others(content, used)))
+    notes += [*copies(len(found.copies)), *spoilt(found.spoilt, meant, content), *others(content, used), *odd]
+    return Chosen(geometry, tuple(used), tuple(notes))
 
 
 def _weight(part: Part) -> float:
@@ -157,7 +163,7 @@ def named(content: FileContent, object: str | None, layer: str | None) -> list[F
             data={"objects": rows(objects)},
         )
     on = [(i, item) for i, item in enumerate(objects) if _is_on(item, layer)]
-    exact = [item for _, item in on if object is not None and item.name == object]
+    exact = [item for _, item in on if object is not None and _plain(object) in map(_plain, _names(item))]
     found = exact or [item for i, item in on if _is_named(item, i, object)]
     if found:
         return found
@@ -178,20 +184,38 @@ def _all(count: int) -> str:
 def _is_named(found: Found, number: int, object: str | None) -> bool:
     if object is None:
         return True
-    word = object.strip().lower()
-    return word in (str(number), found.id.lower(), *found.id.lower().split("/")) or fnmatchcase(
-        found.name.lower(), word
-    )
+    word = _plain(object)
+    ways = (str(number), f"object {number}", label(found, number), found.id, *found.id.split("/"))
+    return word in map(_plain, ways) or any(_fits(name, word) for name in _names(found))
+
+
+def _names(found: Found) -> list[str]:
+    """Its own, and those of the block instances that it is in, and of their blocks."""
+    return list(filter(None, (found.name, *(name for name, _ in found.within))))
+
+
+def _plain(text: str) -> str:
+    """Capitals, and the ways to write an accent, make no difference."""
+    return unicodedata.normalize("NFC", text.strip()).casefold()
+
+
+def _fits(text: str, word: str) -> bool:
+    """``*`` and ``?`` of a plain word stand for any letters; brackets for one of theirs, or themselves."""
+    return any(fnmatchcase(_plain(text), way) for way in (word, word.replace("[", "[[]")))
 
 
 def _is_on(found: Found, layer: str | None) -> bool:
-    """A layer stands for those below it; a single name for every layer of that name."""
+    """A layer stands for those below it; the last steps of a path for every layer that has them. A block
+    instance is on its own layer, and so is what is in it."""
     if layer is None:
         return True
-    word = layer.strip().lower()
-    steps = found.layer.lower().split("::")
-    paths = ["::".join(steps[i : k + 1]) for k in range(len(steps)) for i in (0, k)]
-    return any(fnmatchcase(path, word) for path in paths)
+    word = _plain(layer).removeprefix("…::")  # as hexwrap inspect shortens paths
+    for path in (found.layer, *(layer for _, layer in found.within)):
+        steps = path.split("::")
+        ends = range(1, len(steps) + 1)
+        if any(_fits("::".join(steps[i:k]), word) for k in ends for i in range(k)):
+            return True
+    return False
 
 
 def _nearly(
@@ -206,20 +230,76 @@ def _nearly(
     if not len(part.boundary):
         return {}
     notes = {}
-    tree = cKDTree(part.boundary)
+    tree = _tree(part)
     for other in others:
-        if not len(other.boundary):
+        box = part.box + np.array([[-reach], [reach]])
+        if not len(other.boundary) or (other.box[1] < box[0]).any() or (other.box[0] > box[1]).any():
             continue
-        distance = np.asarray(tree.query(other.boundary)[0])
+        own, its = part.boundary[:, 0], other.boundary[:, 0]
+        ends = np.concatenate([its, own])
+        distance = np.concatenate([tree.nearest(its).distance, _tree(other).nearest(own).distance])
+        corner = np.concatenate([cKDTree(own).query(its)[0], cKDTree(its).query(own)[0]])
+        distance = np.where((distance > tolerance) & (corner < reach), corner, distance)
         k = int(np.argmin(np.where(distance > tolerance, distance, np.inf)))
-        if tolerance < distance[k] < reach:
-            near = label(meant[other.members[0]], number[id(meant[other.members[0]])])
+        first = label(meant[other.members[0]], number[id(meant[other.members[0]])])
+        name = f"{first[0].upper()}{first[1:]}"
+        met = np.flatnonzero(distance <= tolerance)
+        if len(met) >= MEETING and _is_mesh(part, meant) != _is_mesh(other, meant):
             notes[id(other)] = (
-                f"{near[0].upper()}{near[1:]} comes within {distance[k]:.3g} of the surface at "
-                f"{point(other.boundary[k])}{allowed} and was not joined: close the gap with Rhino's "
-                "MatchSrf or JoinEdge."
+                f"{name} meets the surface at {point(ends[met[0]])} and was not joined, because meshes "
+                "are not joined with surfaces: make a mesh of both with Rhino's Mesh."
+            )
+        elif tolerance < distance[k] < reach:
+            notes[id(other)] = (
+                f"{name} comes within {distance[k]:.3g} of the surface at {point(ends[k])}{allowed} and was "
+                f"not joined: close the gap with Rhino's {_commands([part, other], meant)}."
             )
     return notes
+
+
+def _slits(part: Part, tolerance: float | None, commands: str) -> list[str]:
+    """About edges of a part that nearly meet each other, and not only along the boundary."""
+    size = float(np.linalg.norm(np.ptp(part.box, axis=0)))
+    if tolerance is None or not len(part.boundary) or SLIT * tolerance > LOW * size:
+        return []
+    points = part.boundary.reshape(-1, 3)
+    tree, n = cKDTree(points), len(points)
+    same = tree.query_pairs(tolerance, output_type="ndarray")
+    _, name = connected_components(coo_array((np.ones(len(same)), same.T), shape=(n, n)), directed=False)
+    near = tree.query_pairs(SLIT * tolerance, output_type="ndarray")
+    near = near[name[near[:, 0]] != name[near[:, 1]]]
+    near = near[:: 1 + len(near) // PLACES]
+    if not len(near):
+        return []
+    length = np.linalg.norm(points[::2] - points[1::2], axis=1)
+    along = coo_array((length, (name[::2], name[1::2])), shape=(n, n)).tocsr()
+    reach = ALONG * SLIT * tolerance
+    way = dijkstra(along, directed=False, indices=name[near[:, 0]], limit=reach)
+    near = near[np.isinf(way[np.arange(len(near)), name[near[:, 1]]])]
+    if len(near) < 2:
+        return []
+    apart = np.linalg.norm(points[near[:, 0]] - points[near[:, 1]], axis=1)
+    k = int(apart.argmin())
+    place = point(points[near[k, 0]])
+    return [
+        f"Edges of the surface come within {apart[k]:.3g} of each other at {place}, more than the file's "
+        f"tolerance of {tolerance:g}, and were left open: close the gap with Rhino's {commands}."
+    ]
+
+
+def _tree(part: Part) -> TriangleTree:
+    """Of its boundary, edges being triangles without area."""
+    n = 2 * np.arange(len(part.boundary))
+    return TriangleTree.build(part.boundary.reshape(-1, 3), np.stack([n, n + 1, n + 1], axis=1))
+
+
+def _is_mesh(part: Part, meant: Sequence[Found]) -> bool:
+    return all(meant[i].kind in ("mesh", "SubD") for i in part.members)
+
+
+def _commands(parts: Sequence[Part], meant: Sequence[Found]) -> str:
+    """What closes gaps between them in Rhino."""
+    return "MatchMeshEdge" if any(_is_mesh(part, meant) for part in parts) else "MatchSrf or JoinEdge"
 
 
 def several(

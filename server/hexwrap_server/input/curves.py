@@ -19,7 +19,7 @@ from hexwrap_server.input.readers.drawing_3dm import read_3dm_drawing
 from hexwrap_server.input.readers.drawing_csv import read_csv
 from hexwrap_server.input.readers.drawing_dxf import read_dxf
 from hexwrap_server.input.readers.drawing_json import read_json
-from hexwrap_server.output.drawing import encode
+from hexwrap_server.output.drawing import Entities
 from hexwrap_server.output.text import csv_table
 from hexwrap_server.output.units import heading, unit_of
 from hexwrap_solver.arrays import Floats
@@ -83,13 +83,13 @@ def _write_dxf(curves: list[Curve], unit: str | None) -> bytes:
 
     document = new("R2010")
     document.header["$INSUNITS"] = unit_of(unit).dxf
-    space = document.modelspace()
+    space = Entities(document)
     for curve in curves:
         if len(curve.points) == 1:
-            space.add_point(curve.points[0].tolist())
+            space.point(curve.points[0].tolist(), "0")
         else:
-            space.add_polyline3d(curve.points.tolist(), close=curve.closed)
-    return encode(document)
+            space.path(curve.points.tolist(), "0", close=curve.closed)
+    return space.encode()
 
 
 def _write_3dm(curves: list[Curve], unit: str | None) -> bytes:

@@ -63,6 +63,11 @@ class Leaf:
         )
 
     @property
+    def is_text(self) -> bool:
+        """Whether any text is a value."""
+        return str in _parts(self.annotation)
+
+    @property
     def is_list(self) -> bool:
         """Whether it is a list of sections."""
         return any(

@@ -45,6 +45,22 @@ def coarse_numbers(geometry: Geometry, tolerance: float | None) -> list[str]:
     ]
 
 
+def odd_unit(content: FileContent, unit: str | None) -> tuple[str, ...]:
+    if unit is not None or not content.odd_unit:
+        return ()
+    return (
+        f"The file's unit, {content.odd_unit}, is not carried: lengths are given without one. Change it with "
+        "Rhino's Units, or name the unit that is meant (--unit).",
+    )
+
+
+def spoilt(found: Sequence[tuple[int, str]], meant: Sequence[Found], content: FileContent) -> list[str]:
+    """About objects that cannot be read."""
+    number = {id(item): i for i, item in enumerate(content.objects)}
+    names = [(label(meant[i], number[id(meant[i])]), reason) for i, reason in found]
+    return [f"Of the objects, {name} was left out: {reason}" for name, reason in names[:SHOWN]]
+
+
 def copies(count: int) -> tuple[str, ...]:
     what = "1 object covers another one exactly" if count == 1 else f"{count} objects cover others exactly"
     return (f"{what}: left out (Rhino's SelDup selects such).",) if count else ()

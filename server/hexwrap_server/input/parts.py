@@ -11,18 +11,19 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from hexwrap_server.input.readers.found import STRAY, FileContent, Found, Geometry
-from hexwrap_solver.arrays import Floats, Ints
+from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged
 from hexwrap_solver.errors import SurfaceError
 from hexwrap_solver.surface import NurbsSurface, SentMesh
 from hexwrap_solver.surface.brep import Brep
+from hexwrap_solver.surface.brep.curves import evaluate_curve, places
 from hexwrap_solver.surface.brep.join import joined as joined_brep
 from hexwrap_solver.surface.brep.types import together as one_brep
-from hexwrap_solver.surface.brep.whole import brep_of_surface
+from hexwrap_solver.surface.brep.whole import brep_of_surface, check_brep
 from hexwrap_solver.surface.checks import check_arrays
 from hexwrap_solver.surface.nurbs_checks import TOLERANCE, closed_within, end_gap
 from hexwrap_solver.surface.pieces import Joint, Piece, joined, only, pieces, together
 
-#: Of more pieces of a mesh than these, only the largest are no strays.
+#: Of more pieces of a mesh than these, only the largest count; the rest are strays.
 MOST = 300
 #: The tolerance of a file counts up to this part of the size of what is joined.
 COARSEST = 1e-3
@@ -32,7 +33,8 @@ COARSEST = 1e-3
 class Part:
     """Something that hangs together. members: places of its objects. area: of a mesh, or of control nets.
 
-    make: its geometry. boundary: (k, 3) points on it. box: (2, 3) its lowest and highest coordinates.
+    make: its geometry. boundary: (k, 2, 3) pieces of its boundary curves. box: (2, 3) its lowest and highest
+    coordinates.
     """
 
     members: tuple[int, ...]
@@ -84,6 +86,7 @@ def parts_of(content: FileContent, meant: Sequence[Found]) -> Parts:
                 check_arrays(geometry)
                 meshes.append((i, geometry))
             else:
+                check_brep(geometry)
                 others.append((i, geometry))
         except SurfaceError as error:
             if len(meant) == 1:
@@ -91,7 +94,9 @@ def parts_of(content: FileContent, meant: Sequence[Found]) -> Parts:
             found.spoilt.append((i, error.detail))
     if meshes:
         mesh, source = together([geometry for _, geometry in meshes])
-        _add_meshes(mesh, np.array([i for i, _ in meshes])[source], content.tolerance, found)
+        member = np.array([i for i, _ in meshes])
+        at = np.repeat(member, [len(geometry.vertices) for _, geometry in meshes])
+        _add_meshes(mesh, member[source], content.tolerance, found, at)
     if others:
         _add_breps(others, content.tolerance, found)
     return found
@@ -123,7 +128,11 @@ def _is_copy(prints: list[Floats], tolerance: float | None) -> bool:
     return bool(same)
 
 
-def _add_meshes(mesh: SentMesh, owner: Ints, tolerance: float | None, found: Parts) -> None:
+def _add_meshes(
+    mesh: SentMesh, owner: Ints, tolerance: float | None, found: Parts, at: Ints | None = None
+) -> None:
+    """owner: (m,) the object of each face. at: (n,) that of each vertex, where objects have their own; a part
+    then has those of its own objects alone."""
     joint = Joint()
     if tolerance is not None:
         mesh, source, joint = joined(mesh, min(tolerance, COARSEST * _size(mesh.vertices[mesh.faces.values])))
@@ -144,11 +153,22 @@ def _add_meshes(mesh: SentMesh, owner: Ints, tolerance: float | None, found: Par
                     piece.area,
                     piece.boundary,
                     np.array([piece.low, piece.high]),
-                    partial(only, mesh, piece.faces),
+                    partial(_of_objects, mesh, piece.faces, None if at is None else np.isin(at, members)),
                     joint,
                     piece.is_fin,
                 )
             )
+
+
+def _of_objects(mesh: SentMesh, faces: Ints, own: Bools | None) -> SentMesh:
+    """Those faces, with the vertices that are their own (n,), or that they use; None: all."""
+    part = only(mesh, faces)
+    if own is None or own.all():
+        return part
+    own[part.faces.values] = True
+    number = np.cumsum(own) - 1
+    normals = None if part.normals is None else part.normals[own]
+    return SentMesh(part.vertices[own], Ragged(number[part.faces.values], part.faces.offsets), normals)
 
 
 def _add_breps(objects: list[tuple[int, NurbsSurface | Brep]], tolerance: float | None, found: Parts) -> None:
@@ -170,7 +190,8 @@ def _add_breps(objects: list[tuple[int, NurbsSurface | Brep]], tolerance: float 
         members = tuple(np.unique(owner[faces]).tolist())
         own = [geometry for i, geometry in objects if i in members]
         boundary, loops = _naked(whole, faces)
-        make = partial(_same, own[0]) if len(own) == 1 else partial(_some, whole, faces)
+        is_whole = len(own) == 1 and (owner == members[0]).sum() == len(faces)
+        make = partial(_same, own[0]) if is_whole else partial(_some, whole, faces)
         nets = np.concatenate([whole.faces[f].surface.control_points[..., :3].reshape(-1, 3) for f in faces])
         box = np.array([nets.min(axis=0), nets.max(axis=0)])
         found.parts.append(Part(members, loops, _net_area(whole, faces), boundary, box, make, joint))
@@ -222,12 +243,15 @@ def _connected(brep: Brep) -> list[list[int]]:
 
 
 def _naked(brep: Brep, faces: Sequence[int]) -> tuple[Floats, int]:
-    """Ends of edges with one face only, and the number of closed curves that these edges make."""
+    """(k, 2, 3) chords of edges with one face only, and the number of closed curves that these edges make."""
     edge, count = np.unique(_uses(brep, faces)[:, 1], return_counts=True)
-    ends = np.array([(e.start, e.end) for e in (brep.edges[k] for k in edge[count == 1])], dtype=np.int64)
+    naked = [brep.edges[k] for k in edge[count == 1]]
+    ends = np.array([(e.start, e.end) for e in naked], dtype=np.int64)
     start, end = ends.reshape(-1, 2).T
-    used = np.unique(ends)
-    return brep.vertices[used], len(np.unique(_components(start, end, len(brep.vertices))[used]))
+    loops = len(np.unique(_components(start, end, len(brep.vertices))[np.unique(ends)]))
+    lines = [evaluate_curve(e.curve, places(e))[0] for e in naked]
+    chords = [np.stack([line[:-1], line[1:]], axis=1) for line in lines]
+    return np.concatenate([np.zeros((0, 2, 3)), *chords]), loops
 
 
 def _uses(brep: Brep, faces: Iterable[int]) -> Ints:

@@ -44,29 +44,31 @@ class Request(Generic[Asked]):
 
 def parse_request(body: object, max_vertices: int, max_panels: int) -> Request[Wanted]:
     """Raises FormError with a JSON pointer for each fault."""
-    body, arrays, beside = _opened(body)
-    asked = read(Body, body | {"surface": beside or None})
-    surface = _id(arrays["id"]) if "id" in arrays else _sent(arrays, max_vertices, "/surface")
+    request = _parsed(Body, Wanted, body, max_vertices, max_panels)
+    surface, boundary = request.surface, request.wanted.boundary
     if isinstance(surface, SentSurface) and surface.mesh is not None:
-        _vertices_exist(asked.boundary.adapted(None), len(surface.mesh.vertices))
-    wanted = Wanted(**{f.name: getattr(asked, f.name) for f in fields(Wanted)})
-    if wanted.surface is not None or "nurbs" in arrays:
-        wanted = replace(wanted, surface=_limited(wanted.surface or SurfaceSettings(), max_vertices))
-    if wanted.pattern is not None:
-        wanted = replace(wanted, pattern=replace(wanted.pattern, max_cells=max_panels))
-    return Request(asked.name, surface, wanted)
+        _vertices_exist(boundary.adapted(None), len(surface.mesh.vertices))
+    return request
 
 
 def parse_exploration(body: object, max_vertices: int, max_panels: int) -> Request[Exploration]:
     """The body of ``POST /v1/explore``. Raises FormError with a JSON pointer for each fault."""
-    body, arrays, beside = _opened(body)
-    asked = read(ExploreBody, body | {"surface": beside or None})
+    request = _parsed(ExploreBody, Exploration, body, max_vertices, max_panels)
+    limited = replace(request.wanted, max_panels=max_panels, max_vertices=max_vertices)
+    return replace(request, wanted=limited)
+
+
+def _parsed(
+    form: type[Body | ExploreBody], kind: type[Asked], body: object, max_vertices: int, max_panels: int
+) -> Request[Asked]:
+    opened, arrays, beside = _opened(body)
+    asked = read(form, opened | {"surface": beside or None})
     surface = _id(arrays["id"]) if "id" in arrays else _sent(arrays, max_vertices, "/surface")
-    wanted = Exploration(**{f.name: getattr(asked, f.name) for f in fields(Exploration)})
+    wanted = kind(**{f.name: getattr(asked, f.name) for f in fields(kind)})
     if wanted.surface is not None or "nurbs" in arrays:
         wanted = replace(wanted, surface=_limited(wanted.surface or SurfaceSettings(), max_vertices))
-    pattern = replace(wanted.pattern, max_cells=max_panels)
-    wanted = replace(wanted, pattern=pattern, max_panels=max_panels, max_vertices=max_vertices)
+    if wanted.pattern is not None:
+        wanted = replace(wanted, pattern=replace(wanted.pattern, max_cells=max_panels))
     return Request(asked.name, surface, wanted)
 
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from pathlib import PurePath
 from typing import Any, TypeVar
 
+from hexwrap_server.errors import FileTypeError, UnreadableFileError
 from hexwrap_server.input.choose import Chosen, choose
 from hexwrap_server.input.object_words import rows
-from hexwrap_server.input.readers.errors import FileTypeError, UnreadableFileError
 from hexwrap_server.input.readers.found import FileContent
 from hexwrap_server.input.readers.npz import read_npz
 from hexwrap_server.input.readers.obj import read_obj
@@ -65,14 +65,12 @@ def read_file(data: bytes, filename: str) -> FileContent:
 
     Raises FileTypeError for other suffixes, UnreadableFileError for files that are broken.
     """
-    return _guarded(data, filename, lambda suffix: READERS[suffix](data))
+    return _guarded(filename, lambda suffix: READERS[suffix](data))
 
 
 def read_surface(data: bytes, filename: str, settings: SurfaceSettings | None = None) -> Chosen:
     """The surface that is meant. Raises as read_file does, and NoObjectError, SeveralObjectsError."""
-    asked = settings or SurfaceSettings()
-    content = read_file(data, filename)
-    return _guarded(data, filename, lambda _: choose(content, asked.object, asked.layer, asked.unit))
+    return chosen_of(read_file(data, filename), filename, settings or SurfaceSettings())
 
 
 def sent_surface(
@@ -80,13 +78,26 @@ def sent_surface(
 ) -> FromFile:
     """The surface that is meant, and how it is to be taken in. Raises as read_surface does."""
     content = read_file(data, filename)
-    chosen = _guarded(
-        data, filename, lambda _: choose(content, settings.object, settings.layer, settings.unit)
-    )
+    chosen = chosen_of(content, filename, settings)
+    return FromFile(as_sent(content, chosen, settings, max_vertices), rows(content.objects, chosen.used))
+
+
+def chosen_of(content: FileContent, filename: str, settings: SurfaceSettings) -> Chosen:
+    """The surface that is meant of what was read. Raises NoObjectError, SeveralObjectsError."""
+    return _guarded(filename, lambda _: choose(content, settings.object, settings.layer, settings.unit))
+
+
+def as_sent(
+    content: FileContent,
+    chosen: Chosen,
+    settings: SurfaceSettings,
+    max_vertices: int = MeshSettings.max_vertices,
+) -> SentSurface:
+    """What was chosen, and how it is to be taken in."""
     first = chosen.used[0]
     geometry = chosen.geometry
     meshing = replace(settings.mesh or MeshSettings(), max_vertices=max_vertices)
-    sent = SentSurface(
+    return SentSurface(
         mesh=geometry if isinstance(geometry, SentMesh) else None,
         nurbs=geometry if isinstance(geometry, NurbsSurface) else None,
         brep=geometry if isinstance(geometry, Brep) else None,
@@ -96,10 +107,9 @@ def sent_surface(
         origin=Origin(first.name, first.layer, tuple(sorted(first.attributes.items()))),
         notes=chosen.notes,
     )
-    return FromFile(sent, rows(content.objects, chosen.used))
 
 
-def _guarded(data: bytes, filename: str, read: Callable[[str], T]) -> T:
+def _guarded(filename: str, read: Callable[[str], T]) -> T:
     suffix = PurePath(filename).suffix.lower()
     if suffix not in READERS:
         what = f"Files of type {suffix}" if suffix else "Files without a suffix"

@@ -96,7 +96,7 @@ async def explore(
 
 
 async def _at_most(number: int, calls: list[Callable[[], Awaitable[Any]]]) -> list[Any]:
-    """What they answer, in their order, so many at once. The first error ends all."""
+    """What they answer, in their order, this many at once. The first error ends all."""
     places = asyncio.Semaphore(max(number, 1))
 
     async def placed(call: Callable[[], Awaitable[Any]]) -> Any:

@@ -1,4 +1,5 @@
-"""Bodies and files → requests and surfaces. Runs in a process under the limits of reading."""
+"""Bodies and files → requests and surfaces; points to lift and flatten. Runs in a process under the limits of
+reading."""
 
 from __future__ import annotations
 
@@ -17,16 +18,24 @@ from hexwrap_server.input.requests import (
     SentSurface,
     Wanted,
 )
-from hexwrap_server.input.schemas import Request, parse_exploration, parse_request, parse_surface
+from hexwrap_server.input.schemas import (
+    Request,
+    parse_exploration,
+    parse_points,
+    parse_request,
+    parse_surface,
+)
 from hexwrap_server.input.surface_files import FromFile
 from hexwrap_server.input.uploads import sent_file
 from hexwrap_server.jobs import codec
 from hexwrap_server.jobs.cache import CachingRunner
 from hexwrap_server.jobs.disk import keep_file, surface_file
-from hexwrap_server.jobs.work import stages, take_in
+from hexwrap_server.jobs.work import solution_at, stages, take_in
 from hexwrap_server.jobs.worker import Report
+from hexwrap_server.output import wire
 from hexwrap_server.problems import body_is_the_surface
 from hexwrap_server.settings import Settings
+from hexwrap_solver import domain
 
 
 def read_request(report: Report, body: Body, settings: Settings, folder: str) -> ParsedRequest:
@@ -87,6 +96,23 @@ def preview(report: Report, body: Body, settings: Settings, content_type: str, n
     else:
         vertices, faces = sent.mesh.vertices, sent.mesh.faces.to_lists()
     return orjson.dumps({"vertices": vertices, "faces": faces}, option=orjson.OPT_SERIALIZE_NUMPY)
+
+
+def lift(report: Report, body: Body, settings: Settings, path: str) -> bytes:
+    """Points of the unrolled domain → JSON answer of the lift route. path: of the solution.
+
+    Raises FormError, HttpError, GoneError.
+    """
+    at = parse_points(loads(body.plain(settings.max_body_mib)), 2, settings.max_points)
+    lifted = domain.lift(solution_at(path).map, at[:, 0] + 1j * at[:, 1])
+    return wire.dump({"points": lifted.points, "normals": lifted.normals, "inside": lifted.inside})
+
+
+def flatten(report: Report, body: Body, settings: Settings, path: str) -> bytes:
+    """Points near the surface → JSON answer of the flatten route. As ``lift``."""
+    at = parse_points(loads(body.plain(settings.max_body_mib)), 3, settings.max_points)
+    flat = domain.flatten(solution_at(path).map, at)
+    return wire.dump({"uv": flat.uv, "distance": flat.distance})
 
 
 def _file(body: Body, settings: Settings, content_type: str, name: str) -> FromFile:

@@ -16,7 +16,7 @@ import re
 import sqlite3
 import time
 import zlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -57,9 +57,6 @@ CREATE INDEX IF NOT EXISTS jobs_by_status ON jobs (status);
 """
 #: Of versions before there were explorations.
 _ADD_KIND = "ALTER TABLE jobs ADD COLUMN kind TEXT NOT NULL DEFAULT 'solve'"
-_COLUMNS = (
-    "kind, id, identity, name, status, stage, progress, created, started, finished, timings, found, problem"
-)
 
 
 @dataclass(frozen=True)
@@ -90,6 +87,12 @@ class Job:
         for name in ("created", "started", "finished"):
             content[name] = content[name] and _iso(content[name])
         return content | {"queue_position": position}
+
+
+#: The columns of a job, those that are JSON, and those that change.
+_COLUMNS = tuple(f.name for f in fields(Job))
+_AS_JSON = ("timings", "found", "problem")
+_CHANGING = ("status", "stage", "progress", "started", "finished", *_AS_JSON)
 
 
 @dataclass(frozen=True)
@@ -252,8 +255,8 @@ class Store:
     def add(self, job: Job, work: Work) -> None:
         with self._transaction():
             self._put(work)
-            marks = ", ".join("?" * len(_COLUMNS.split(",")))
-            self._db.execute(f"INSERT INTO jobs ({_COLUMNS}) VALUES ({marks})", _row(job))
+            marks = ", ".join("?" * len(_COLUMNS))
+            self._db.execute(f"INSERT INTO jobs ({', '.join(_COLUMNS)}) VALUES ({marks})", _row(job))
 
     def add_work(self, work: Work) -> None:
         """A work that another one wants, and no job."""
@@ -290,29 +293,23 @@ class Store:
     def update(self, jobs: Iterable[Job]) -> None:
         """Write the present state of jobs."""
         with self._transaction():
-            self._db.executemany(
-                "UPDATE jobs SET status = ?, stage = ?, progress = ?, started = ?, finished = ?, "
-                "timings = ?, found = ?, problem = ? WHERE id = ?",
-                [(j.status, j.stage, j.progress, j.started, j.finished, *_row(j)[-3:], j.id) for j in jobs],
-            )
+            changes = ", ".join(f"{name} = ?" for name in _CHANGING)
+            rows = [(*_row(job, _CHANGING), job.id) for job in jobs]
+            self._db.executemany(f"UPDATE jobs SET {changes} WHERE id = ?", rows)
 
     def job(self, id: str) -> Job | None:
-        rows = self._rows(f"SELECT {_COLUMNS} FROM jobs WHERE id = ?", id)
-        return _job(rows[0]) if rows else None
+        return next(iter(self._jobs("WHERE id = ?", id)), None)
 
     def jobs(self, limit: int, before: str | None = None) -> list[Job]:
         """Newest first. before: only those older than this one."""
         older = "" if before is None else "WHERE number < (SELECT number FROM jobs WHERE id = ?)"
-        statement = f"SELECT {_COLUMNS} FROM jobs {older} ORDER BY number DESC LIMIT ?"
-        rows = self._rows(statement, *([] if before is None else [before]), limit)
-        return [_job(row) for row in rows]
+        values = [limit] if before is None else [before, limit]
+        return self._jobs(f"{older} ORDER BY number DESC LIMIT ?", *values)
 
     def unfinished(self) -> list[Job]:
         """Oldest first."""
-        rows = self._rows(
-            f"SELECT {_COLUMNS} FROM jobs WHERE status IN ('queued', 'running') ORDER BY number"
-        )
-        return [replace(_job(row), status="queued", stage="", progress=0.0, started=None) for row in rows]
+        jobs = self._jobs("WHERE status IN ('queued', 'running') ORDER BY number")
+        return [replace(job, status="queued", stage="", progress=0.0, started=None) for job in jobs]
 
     def forget(self, id: str) -> None:
         self._write("DELETE FROM jobs WHERE id = ?", id)
@@ -357,6 +354,9 @@ class Store:
         prune(self.results, 0.0, keep=lambda name: name.partition(".")[0] in kept.works)
         prune(self.surfaces, 0.0, keep=lambda name: name.partition(".")[0] in kept.surfaces)
         prune(self.stages, stage_bytes, oldest=kept.oldest)
+
+    def _jobs(self, clause: str, *values: Any) -> list[Job]:
+        return [_job(row) for row in self._rows(f"SELECT {', '.join(_COLUMNS)} FROM jobs {clause}", *values)]
 
     def _rows(self, statement: str, *values: Any) -> list[Any]:
         try:
@@ -448,29 +448,14 @@ def _unusable(path: Path, error: sqlite3.DatabaseError) -> DamagedError:
     )
 
 
-def _row(job: Job) -> tuple[Any, ...]:
-    return (
-        job.kind,
-        job.id,
-        job.identity,
-        job.name,
-        job.status,
-        job.stage,
-        job.progress,
-        job.created,
-        job.started,
-        job.finished,
-        json.dumps(job.timings),
-        json.dumps(job.found),
-        None if job.problem is None else json.dumps(job.problem),
-    )
+def _row(job: Job, columns: Sequence[str] = _COLUMNS) -> list[Any]:
+    values = ((name, getattr(job, name)) for name in columns)
+    return [json.dumps(value) if name in _AS_JSON and value is not None else value for name, value in values]
 
 
 def _job(row: tuple[Any, ...]) -> Job:
-    values = dict(zip(_COLUMNS.split(", "), row, strict=True))
-    for name in ("timings", "found", "problem"):
-        values[name] = values[name] and json.loads(values[name])
-    return Job(**values)
+    values = dict(zip(_COLUMNS, row, strict=True))
+    return Job(**values | {name: values[name] and json.loads(values[name]) for name in _AS_JSON})
 
 
 def _iso(moment: float) -> str:

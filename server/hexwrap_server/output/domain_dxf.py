@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hexwrap_server.output.drawing import encode, grey_drawing
+from hexwrap_server.output.drawing import Entities, grey_drawing
 from hexwrap_server.output.meta import Meta
 from hexwrap_server.output.unrolled import Unrolled, cells, drawn, plane
 from hexwrap_server.output.viewpoint import corners
@@ -16,17 +16,16 @@ def domain_dxf(solution: Solution, meta: Meta) -> bytes:
     pattern = solution.pattern
     cmap, pieces = drawn(solution.map)
     names = [f"loop-{number}" for number in range(len(cmap.surface.loops))]
-    document = grey_drawing(meta, *names, "cut", "corners", "pattern")
-    space = document.modelspace()
+    space = Entities(grey_drawing(meta, *names, "cut", "corners", "pattern"))
     unrolled = Unrolled.of(cmap)
     for layer, sides in (*zip(names, unrolled.loops, strict=True), ("cut", unrolled.cut)):
         for line in unrolled.lines(sides):
-            space.add_lwpolyline(plane(line).tolist(), dxfattribs={"layer": layer})
+            space.polyline(plane(line).tolist(), layer)
     marked = [vertex for vertex, _ in corners(cmap)]
     for loop, sides in zip(cmap.surface.loops, unrolled.loops, strict=True):
         for place in plane(unrolled.start[sides[np.isin(loop, marked)]]).tolist():
-            space.add_point(place, dxfattribs={"layer": "corners"})
+            space.point(place, "corners")
     if pattern is not None:
         for outline in cells(pattern, pieces).to_lists():
-            space.add_lwpolyline(outline, close=True, dxfattribs={"layer": "pattern"})
-    return encode(document)
+            space.polyline(outline, "pattern", close=True)
+    return space.encode()

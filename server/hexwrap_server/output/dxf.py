@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hexwrap_server.output.drawing import drawing, encode
+from hexwrap_server.output.drawing import Entities, drawing
 from hexwrap_server.output.layers import size_layers
 from hexwrap_server.output.meta import Meta, panels_of
 from hexwrap_solver.arrays import Floats
@@ -18,23 +18,21 @@ TEXT = 0.16
 def panels_dxf(solution: Solution, meta: Meta) -> bytes:
     """AutoCAD 2010 DXF; labels lie in the planes of their panels, read from outside."""
     pattern, panels = panels_of(solution, "panels.dxf")
-    document = drawing(panels, meta, "labels")
-    space = document.modelspace()
+    space = Entities(drawing(panels, meta, "labels"))
     layers = {size: layer.name for size, layer in size_layers(panels).items()}
     for points, size in zip(panels.polygons.to_lists(), panels.size.tolist(), strict=True):
-        space.add_polyline3d(points, close=True, dxfattribs={"layer": layers[size]})
+        space.path(points, layers[size], close=True)
     hinges = hinges_of(panels)
     for row in np.flatnonzero(hinges >= 0).tolist():
         start, end = np.asarray(panels.polygons[row])[[0, hinges[row]]].tolist()
-        space.add_line(start, end, dxfattribs={"layer": layers[int(panels.size[row])]})
+        space.line(start, end, layers[int(panels.size[row])])
     names = pattern.labels()
     centres = object_coordinates(panels.center, panels.normal).tolist()
     for face, centre, normal, edge in zip(
         panels.face.tolist(), centres, panels.normal.tolist(), panels.edge_length.tolist(), strict=True
     ):
-        place = {"layer": "labels", "extrusion": normal, "insert": centre, "align_point": centre}
-        space.add_text(names[face], height=TEXT * edge, dxfattribs={**place, "halign": 1, "valign": 2})
-    return encode(document)
+        space.text(names[face], TEXT * edge, centre, "labels", normal=normal)
+    return space.encode()
 
 
 def object_coordinates(points: Floats, normals: Floats) -> Floats:

@@ -7,14 +7,14 @@ What is cut lies on layers ``cut-…``, one per size; what is engraved, all of i
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hexwrap_server.errors import SheetError
 from hexwrap_server.output.blocks import frames
-from hexwrap_server.output.drawing import drawing, encode
+from hexwrap_server.output.drawing import Entities, drawing
 from hexwrap_server.output.layers import size_layers
-from hexwrap_server.output.meta import Group, Meta, SheetError, panels_of
+from hexwrap_server.output.meta import Group, Meta, panels_of
 from hexwrap_server.output.table import neighbour_labels
 from hexwrap_server.output.text import length, lengths, one_line
 from hexwrap_server.output.units import unit_of
@@ -23,9 +23,6 @@ from hexwrap_solver.panels.folds import blanks
 from hexwrap_solver.panels.types import Panels
 from hexwrap_solver.pattern.types import Pattern
 from hexwrap_solver.pipeline import Solution
-
-if TYPE_CHECKING:
-    from ezdxf.layouts.layout import Modelspace
 
 #: Space left between outlines, and along the rim of a sheet, in parts of the largest panel's width.
 SPACE = 0.04
@@ -82,10 +79,8 @@ def flat_dxf(solution: Solution, meta: Meta) -> bytes:
     group = groups(panels, pattern, meta.group)
     places = pack(outlines.extent, panels.size, sheet_size(outlines.extent, meta), names, group)
     bent = ("bend",) if panels.bends is not None else ()
-    document = drawing(
-        panels, meta, "sheets", "engrave-label", "engrave-up", "engrave-neighbours", *bent, prefix="cut-"
-    )
-    space = document.modelspace()
+    grey = ("sheets", "engrave-label", "engrave-up", "engrave-neighbours", *bent)
+    space = Entities(drawing(panels, meta, *grey, prefix="cut-"))
     step = 1.1 * places.size[0]
     _draw_sheets(space, places, group, step, meta)
     moved = places.corner + np.stack([places.sheet * step, 0.0 * places.sheet], axis=1)
@@ -93,13 +88,13 @@ def flat_dxf(solution: Solution, meta: Meta) -> bytes:
     layers = {size: f"cut-{layer.name}" for size, layer in size_layers(panels).items()}
     laid = Ragged(corners, outlines.corners.offsets)
     for points, size in zip(laid.to_lists(), panels.size.tolist(), strict=True):
-        space.add_lwpolyline(points, close=True, dxfattribs={"layer": layers[size]})
+        space.polyline(points, layers[size], close=True)
     if panels.bends is not None:
         for start, hinge in zip(laid.offsets[panels.bends.panel], panels.bends.hinge, strict=True):
-            space.add_lwpolyline(corners[[start, start + hinge]].tolist(), dxfattribs={"layer": "bend"})
+            space.polyline(corners[[start, start + hinge]].tolist(), "bend")
     _write_inside(space, laid, panels, names, outlines.up)
     _write_along(space, laid, neighbour_labels(pattern, panels))
-    return encode(document)
+    return space.encode()
 
 
 def groups(panels: Panels, pattern: Pattern, kind: Group) -> Ints:
@@ -128,7 +123,7 @@ def sheet_size(extent: Floats, meta: Meta) -> tuple[float, float]:
     return width, height
 
 
-def _draw_sheets(space: Modelspace, places: Places, group: Ints, step: float, meta: Meta) -> None:
+def _draw_sheets(space: Entities, places: Places, group: Ints, step: float, meta: Meta) -> None:
     """The rims of the sheets, and above each what it is."""
     width, height = places.size
     name, unit = one_line(meta.name), f" {meta.unit}" if meta.unit else ""
@@ -136,14 +131,13 @@ def _draw_sheets(space: Modelspace, places: Places, group: Ints, step: float, me
     for sheet in range(int(places.sheet.max()) + 1):
         x = sheet * step
         rim = [(x, 0.0), (x + width, 0.0), (x + width, height), (x, height)]
-        space.add_lwpolyline(rim, close=True, dxfattribs={"layer": "sheets"})
+        space.polyline(rim, "sheets", close=True)
         kind = int(group[np.argmax(places.sheet == sheet)])
         where = {"ring": f", ring {kind}", "zone": f", {ZONES[kind]}" if meta.group == "zone" else ""}
         titles = (f"{name}, sheet {sheet + 1}{where.get(meta.group, '')}", 0.03, 1.05), (size, 0.018, 1.02)
         for words, high, above in titles:
             room = width / (LETTER * len(words))
-            place = {"layer": "sheets", "insert": (x, height * above)}
-            space.add_text(words, height=min(high * height, room), dxfattribs=place)
+            space.text(words, min(high * height, room), (x, height * above), "sheets", centred=False)
 
 
 def lay_flat(panels: Panels) -> Outlines:
@@ -195,7 +189,7 @@ def pack(
     return Places(sheets, corners, (width, height))
 
 
-def _write_inside(space: Modelspace, laid: Ragged, panels: Panels, names: list[str], up: Floats) -> None:
+def _write_inside(space: Entities, laid: Ragged, panels: Panels, names: list[str], up: Floats) -> None:
     """Label, size and side in the middle of each panel, and an arrow above them."""
     rows, count = laid.row, laid.lengths
     points = np.asarray(laid.values, dtype=np.float64)
@@ -203,8 +197,9 @@ def _write_inside(space: Modelspace, laid: Ragged, panels: Panels, names: list[s
     inradius = _inradius(laid)
     sizes, size_words = panels.size.tolist(), lengths(panels.class_length.tolist())
     turn = np.degrees(np.arctan2(-up[:, 0], up[:, 1])).tolist()
+    ways = zip(centre.tolist(), up.tolist(), strict=True)
     for row, (edge, r) in enumerate(zip(panels.edge_length.tolist(), inradius.tolist(), strict=True)):
-        size = sizes[row]
+        size, ((x, y), (up_x, up_y)) = sizes[row], next(ways)
         label = f"– / {length(edge)}" if size < 0 else f"{size:02d} / {size_words[size]}"
         for layer, words, high, at in (
             ("engrave-label", names[row], LABEL, LABEL_AT),
@@ -212,16 +207,15 @@ def _write_inside(space: Modelspace, laid: Ragged, panels: Panels, names: list[s
             ("engrave-up", "outside", SIDE, SIDE_AT),
         ):
             height = min(high, ROOM / (LETTER * len(words))) * r
-            place = centre[row] + at * r * up[row]
-            _write(space, layer, words, height, (float(place[0]), float(place[1])), turn[row])
+            space.text(words, height, (x + at * r * up_x, y + at * r * up_y), layer, turn=turn[row])
     across = np.stack([up[:, 1], -up[:, 0]], axis=1)
     foot, tip = (centre + (at * inradius)[:, None] * up for at in ARROW)
     barbs = [tip + (HEAD * inradius)[:, None] * (side * across - 1.5 * up) for side in (-1, 1)]
     for line in np.stack([foot, tip, barbs[0], barbs[1], tip], axis=1).tolist():
-        space.add_lwpolyline(line, dxfattribs={"layer": "engrave-up"})
+        space.polyline(line, "engrave-up")
 
 
-def _write_along(space: Modelspace, laid: Ragged, names: list[list[str]]) -> None:
+def _write_along(space: Entities, laid: Ragged, names: list[list[str]]) -> None:
     """The neighbour's label inside along each edge, turned so that it is not upside down."""
     points, rows = np.asarray(laid.values), laid.row
     along = points[laid.next()] - points
@@ -238,15 +232,7 @@ def _write_along(space: Modelspace, laid: Ragged, names: list[list[str]]) -> Non
         flat_names, middle.tolist(), turn.tolist(), heights.tolist(), strict=True
     ):
         if name != "-":
-            _write(space, "engrave-neighbours", name, high, (place[0], place[1]), angle)
-
-
-def _write(
-    space: Modelspace, layer: str, words: str, height: float, place: tuple[float, float], turn: float
-) -> None:
-    """One line of text around a place."""
-    attributes = {"layer": layer, "insert": place, "align_point": place, "rotation": turn}
-    space.add_text(words, height=height, dxfattribs={**attributes, "halign": 1, "valign": 2})
+            space.text(name, high, place, "engrave-neighbours", turn=angle)
 
 
 def measures(flat: Ragged) -> tuple[Floats, Floats]:

@@ -141,7 +141,7 @@ def _shapes(sheet: Sheet, height: int, panels: Panels, meta: Meta, unit: str) ->
 
 
 def _swatches(sheet: Sheet, top: float, panels: Panels, unit: str, shown: int) -> None:
-    """One row per size, of so many: colour, edge length, how many."""
+    """One row per size, of this many: colour, edge length, how many."""
     counts, words = panels.class_count.tolist(), text.lengths(panels.class_length.tolist())
     for i, colour in enumerate(colours.class_colours(panels)[:shown]):
         y = top + ROW * (i + 0.5)

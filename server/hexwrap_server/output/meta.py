@@ -1,12 +1,12 @@
-"""What writers get besides the solution, and their errors."""
+"""What writers get besides the solution."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import ClassVar, Literal
+from typing import Literal
 
-from hexwrap_solver.errors import HexwrapError
+from hexwrap_server.errors import NotMadeError
 from hexwrap_solver.panels.types import Panels
 from hexwrap_solver.pattern.types import Pattern
 from hexwrap_solver.pipeline import Solution
@@ -33,20 +33,6 @@ class Meta:
     unit: str | None = None
     group: Group = "size"
     storey: float | None = None
-
-
-class NotMadeError(HexwrapError):
-    """The file shows something that was not asked for, so it cannot be written."""
-
-    slug: ClassVar[str] = "not-made"
-    title: ClassVar[str] = "The file needs a stage that was left out"
-
-
-class SheetError(HexwrapError):
-    """A panel is larger than the sheet it should be cut from."""
-
-    slug: ClassVar[str] = "sheet"
-    title: ClassVar[str] = "The panels do not fit on the sheets"
 
 
 def panels_of(solution: Solution, name: str) -> tuple[Pattern, Panels]:

@@ -14,7 +14,7 @@ from hexwrap_server.output.dxf import panels_dxf
 from hexwrap_server.output.flat import flat_dxf
 from hexwrap_server.output.glb import panels_glb
 from hexwrap_server.output.ifc import panels_ifc
-from hexwrap_server.output.meta import Meta, NotMadeError, SheetError, check_stages
+from hexwrap_server.output.meta import Meta, check_stages
 from hexwrap_server.output.obj import panels_obj
 from hexwrap_server.output.picture import panels_png
 from hexwrap_server.output.rhino import panels_3dm
@@ -54,4 +54,4 @@ def check_wanted(name: str, wanted: Wanted) -> None:
         check_stages(name, pattern=wanted.pattern is not None, panels=wanted.panels is not None)
 
 
-__all__ = ["WRITERS", "Meta", "NotMadeError", "SheetError", "check_wanted", "write"]
+__all__ = ["WRITERS", "Meta", "check_wanted", "write"]

@@ -19,7 +19,7 @@ from hexwrap_solver.domain.locate import runs
 RASTER = 400
 #: Part of the raster's points held twice below which a net counts as not overlapping itself.
 NEGLIGIBLE = 1e-3
-#: Pieces smaller than this part of the net are not taken apart, nor more than so many.
+#: Pieces smaller than this part of the net are not taken apart, nor more than this many.
 CRUMB, MOST = 0.02, 24
 #: Room between pieces, and the width of a row of pieces, in parts of the size of them all.
 ROOM, WIDE = 0.04, 1.2

@@ -13,7 +13,7 @@ from hexwrap_solver.explore.types import Figures, Limits
 MOST_SOLVED = 30
 #: Differences that are none: of the uncovered share, and of the cost, relatively. Types are counted.
 SAME_UNCOVERED, SAME_COST = 1e-3, 5e-3
-#: Whatever closes the rest, and how it looks, is dear: an open square metre counts as so many of panels.
+#: Whatever closes the rest, and how it looks, is dear: an open square metre counts as this many of panels.
 OPEN = 10.0
 #: Figures are foreseen only so well: a variant this much beyond a limit of the panels may yet keep it.
 NEARLY = 1.05
@@ -46,7 +46,7 @@ def within(figures: Figures, limits: Limits, sizes: int | None, slack: float = 1
 
 
 def to_solve(figures: Sequence[Figures], most: int = MOST_SOLVED) -> Ints:
-    """Indices of the non-dominated, at most so many: ends of the front, and what fills its widest holes."""
+    """Indices of the non-dominated, at most this many: ends of the front, and what fills its widest holes."""
     values = objectives(figures)
     candidates = np.flatnonzero(non_dominated(values, (SAME_UNCOVERED, 0.0, SAME_COST)))
     if len(candidates) <= most:

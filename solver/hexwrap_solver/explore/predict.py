@@ -64,7 +64,7 @@ class Outlook:
     limit: (c,) edge of its largest panel without a joint. Whole cells are those whose middle is as far from
     the boundary as they reach, on the average over all directions (perimeter/2π); along a loop that is a line
     of the pattern, half a row. special: cells with another number of sides; trimmed: those cut at the
-    boundary; folded: pieces of those that features cut, of so many kinds; rest: the area of all these, which
+    boundary; folded: pieces of those that features cut, of that many kinds; rest: area of all these, which
     their panels are taken to cover. distortion: of the placement.
     """
 
@@ -85,7 +85,7 @@ class Outlook:
         return float(self.size.mean()) if len(self.size) else np.inf
 
     def foresee(self, sizes: int | None, joint: float = 0.0) -> Foreseen:
-        """With so many size classes (None: a length for each panel) and joints at least so wide."""
+        """With this many size classes (None: a length for each panel) and joints at least so wide."""
         others = self.special + self.trimmed + self.folded
         types = panels = 0
         area = perimeter = cells = 0.0

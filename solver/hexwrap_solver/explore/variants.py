@@ -15,14 +15,14 @@ from hexwrap_solver.pattern.types import PatternSettings
 from hexwrap_solver.pipeline import SolveSettings
 from hexwrap_solver.singularities.types import SingularityAt, SingularitySettings
 
-#: Sizes of cells that are tried: so many steps from the lowest to the highest, in equal ratios. Variants of
+#: Sizes of cells that are tried: this many steps from the lowest to the highest, in equal ratios. Variants of
 #: one size share their map where singularities make it depend on that.
 STEPS = 3
 #: Without a range: the default size times these.
 AROUND_DEFAULT = (0.8, 1.25)
 #: Joints that are tried, likewise.
 JOINTS = 4
-#: Different variants are looked for among so many times as many points.
+#: Different variants are looked for among this many times as many points.
 PATIENCE = 20
 #: Some cannot be made, or come to the same as others: more are drawn than are asked for.
 SPARE = 2

@@ -80,7 +80,7 @@ class FitKey:
 WATERTIGHT_NOTES = (
     "Watertight panels share their corners: joint, orientation and size classes do not apply.",
 )
-WEIGHTS_NOTE = ("Weights were given, so that the energies were minimised, as with method energy.",)
+WEIGHTS_NOTE = ("Weights were given, so the energies were minimised, as with method energy.",)
 
 #: Corners farther from their panel's plane than this fraction of its mean edge: it did not become flat.
 FLAT = 1e-9
@@ -399,7 +399,7 @@ def _limits(
         ]
         partner = _partners(np.concatenate([group.at.ravel() for group in groups]), edges)
         try:
-            return *jointly_largest(bound, partner, settings.joint, progress), ()
+            return *jointly_largest(bound, partner, progress), ()
         except ConvergenceError:
             return *_together([group.inscribed(planes) for group in groups]), JOINTLY_NOTE
     return *_together([_limit(group, planes, settings) for group in groups]), ()

@@ -29,11 +29,11 @@ from hexwrap_solver.panels.types import Bends, Panels, PanelSettings
 from hexwrap_solver.pattern.types import FoldPieces, Pattern
 from hexwrap_solver.surface.types import Surface
 
-#: Places in the lattice are the same where they agree to so many parts of an edge.
+#: Places in the lattice are the same where they agree to this many parts of an edge.
 PARTS = 1e5
 #: Planes along the hinge, whose distance a shift does not change.
 LEVEL = 1e-9
-#: A shape that fewer pieces have is no kind: they are made as large as their cells allow, each by itself.
+#: A shape that fewer pieces have is not a kind: they are made as large as their cells allow, each by itself.
 FEWEST = 2
 
 
@@ -262,7 +262,7 @@ class AlongFolds:
         return np.where(hinge, 0.0, joint)
 
     def joined(self, pattern: Pattern, shapes: Ragged, center: Floats, face: Ints) -> Singles:
-        """Polygons that are no kind, (k,) of the cells in ``face``; mates as one where panels are folded."""
+        """Polygons of no kind, (k,) of the cells in ``face``; mates as one where panels are folded."""
         if self.pieces is None or not (self.closed >= 0).any():
             none = np.full(len(face), -1)
             return Singles(shapes, center, face, none, none, np.stack([none, none], axis=1))

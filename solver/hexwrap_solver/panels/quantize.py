@@ -160,7 +160,7 @@ def _by_kind(fitted: FittedPanels, limit: Floats, choose: Callable[[Floats], Flo
 def _chosen(
     fitted: FittedPanels, limit: Floats, classes: int | None, settings: PanelSettings, smallest: float = 0.0
 ) -> Floats:
-    """(r,) lengths in so many classes of each kind."""
+    """(r,) lengths in this many classes of each kind."""
     cost, increment = settings.size_cost, settings.increment
     return _by_kind(fitted, limit, lambda own: choose_lengths(own, classes, cost, increment, smallest))
 

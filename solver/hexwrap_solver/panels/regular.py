@@ -22,7 +22,7 @@ class Poses:
 
     Corner i of a polygon with edge ℓ stands at center + ℓ·(corners(p)[i] · [x_axis, y_axis]).
     free_length: (q,) edge length of the nearest regular polygon of any size. outline: (q, p, 2) corners at
-    edge length 1 where the polygons are no regular ones.
+    edge length 1 where the polygons are not regular.
     """
 
     center: Floats

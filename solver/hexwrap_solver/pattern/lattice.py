@@ -238,7 +238,7 @@ class Lattice:
         return {p: outline - outline.mean() for p, outline in self.outlines.items()}
 
     def uneven_outline(self, sides: int) -> Floats | None:
-        """(sides, 2) corners, about their mean, of a cell that is no regular polygon; else None."""
+        """(sides, 2) corners, about their mean, of a cell that is not a regular polygon; else None."""
         outline = self.outlines[sides]
         edge = np.roll(outline, -1) - outline
         if np.ptp((np.roll(edge, -1) / edge).real) < 1e-9:

@@ -56,9 +56,9 @@ CLOSE = 0.005
 #: Parts of the default edge length that are tried where cells of it do not close up.
 FINER = (2, 4, 8)
 
-#: Above so many cells, where the map is STEEP, it is the map that does not suit, not the size of the cells.
+#: Above this many cells, where the map is STEEP, it is the map that does not suit, not the size of the cells.
 MANY = 1e12
-#: Differences of u that alone make so many: areas e^24 = 3e10 times as large as others.
+#: Differences of u that alone make this many: areas e^24 = 3e10 times as large as others.
 STEEP = 12.0
 
 #: Of the layout, relative to its extent; points this near to an edge count as on it.

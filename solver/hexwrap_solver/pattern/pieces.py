@@ -36,7 +36,7 @@ def fold_pieces(
     step = place[shape.next()] - place
     pair = np.where(other >= 0, shape.row[side] * cells.n + shape.row[np.maximum(other, 0)], -1)
     once = np.unique(pair, return_inverse=True, return_counts=True)
-    straight = once[2][once[1].ravel()] == 1  # a fold that turns inside a cell is no hinge
+    straight = once[2][once[1].ravel()] == 1  # a fold that turns inside a cell is not a hinge
     mated = (other >= 0) & straight & _makes_one(lattice, shape, place, side, np.maximum(other, 0))
     # Of several sides along folds the one across which its mate lies, then the longest, then the first.
     order = np.lexsort((side, -np.round(abs(step[side]), 6), ~mated, shape.row[side]))

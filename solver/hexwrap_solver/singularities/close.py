@@ -116,7 +116,7 @@ class Chart:
         self._seat(cones, self.energy.unknowns_of(found.u), found.corners)
 
     def _wanted(self, surface: Surface, cones: Ints) -> Targets:
-        return self._targets(surface, vertex=cones, angles=_extended(self._angles, surface))
+        return self._targets(surface, vertex=cones, angles=extended(self._angles, surface))
 
     def _seat(self, cones: Ints, x: Floats, corners: Corners) -> None:
         """x, corners: the map with the singularities at these vertices."""
@@ -291,7 +291,7 @@ class Chart:
             except np.linalg.LinAlgError:  # the energy is flat where triangles break
                 break
             fresh = True
-        if not residual <= max(enough, ACCEPTED):  # neither where it is no number
+        if not residual <= max(enough, ACCEPTED):  # nor where it is NaN
             raise ConvergenceError(
                 "The map breaks down where the singularities have to move for the pattern to close: ask for "
                 "smaller cells, or another number of singularities."
@@ -315,7 +315,7 @@ class Chart:
         return np.array(images, dtype=complex), np.array(turns, dtype=np.int64)
 
 
-def _extended(angles: Floats | None, surface: Surface) -> Floats | None:
+def extended(angles: Floats | None, surface: Surface) -> Floats | None:
     """Target angles of new vertices, too: on a loop they are straight."""
     if angles is None:
         return None

@@ -18,9 +18,9 @@ from hexwrap_solver.surface.projection import project
 from hexwrap_solver.surface.topology import half_edges
 from hexwrap_solver.surface.types import Surface
 
-#: The mesh follows within so many cells, this part of the way to a loop, and that to the next singularity.
+#: The mesh follows within this many cells, this part of the way to a loop, and that to the next singularity.
 REACH, TO_LOOP, TO_NEXT = 4.0, 0.95, 0.6
-#: Edges within so many cells of a singularity are split until they are below that part of a cell.
+#: Edges within this many cells of a singularity are split until they are below that part of a cell.
 FINE, FINEST = (2.0, 1.0), (0.3, 0.15)
 #: Tangents with a smaller squared sine between them are singular.
 REGULAR = 1e-4

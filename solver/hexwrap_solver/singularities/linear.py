@@ -24,7 +24,7 @@ from hexwrap_solver.linalg.factor import Factorisation
 from hexwrap_solver.singularities.types import Rules
 from hexwrap_solver.surface.types import Surface
 
-#: The surface is seen in about so many patches: u is smooth, and a patch is as large as a cell or so.
+#: The surface is seen in about this many patches: u is smooth, and a patch is as large as a cell or so.
 PATCHES = 1200
 #: Seats times vertices, which the time of the solves is proportional to: large meshes get fewer seats,
 #: but this number at least.

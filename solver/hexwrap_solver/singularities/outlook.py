@@ -19,7 +19,7 @@ from hexwrap_solver.singularities.types import Choices, End, Rules
 from hexwrap_solver.surface.holes import fill_openings
 from hexwrap_solver.surface.types import Surface
 
-#: A coarse look: so many patches and singularities; larger meshes are not looked at.
+#: A coarse look: this many patches and singularities; larger meshes are not looked at.
 PATCHES, MOST, LARGEST = 200, 4, 30_000
 #: Numbers of sizes that are told apart; more leave hardly less open.
 CURVE = 24
@@ -89,7 +89,7 @@ def prospects(surface: Surface, key: ProspectKey) -> Prospects:
 
 
 def outlook(found: Prospects, laid: Pattern, sizes: int, left: float) -> Choices | None:
-    """What numbers of singularities would leave open with so many sizes; the first is none, which leaves
+    """What numbers of singularities would leave open with this many sizes; the first is none, which leaves
     ``left``. None where there is no choice."""
     number = found.choices.number
     if len(number) < 2 or number[0]:

@@ -22,10 +22,10 @@ from hexwrap_solver.surface.types import Surface
 WORTH, CLEARLY = 0.001, 0.25
 #: Groups of symmetries that are tried.
 GROUPS = 5
-#: The search ends where so many numbers more have brought nothing.
+#: The search ends where this many numbers more have brought nothing.
 PATIENCE = 3
-#: The final places are found within so many cells, again and again nearer, among vertices at such a part of
-#: that apart, in so many steps.
+#: The final places are found within this many cells, again and again nearer, among vertices at such a part of
+#: that apart, in this many steps.
 REACHES, SPACING, ROUNDS = (1.5, 0.8, 0.4), 0.4, 20
 
 
@@ -137,7 +137,7 @@ def _choice(proposals: list[Proposal], count: int | Literal["auto"]) -> int:
         if not len(possible):
             raise SingularitiesError(
                 f"At most {count} singularities are asked for, but this surface takes at least {number[0]} "
-                "(Gauss–Bonnet): ask for so many, or give an end of the surface the freedom to turn.",
+                "(Gauss–Bonnet): ask for that many, or give an end of the surface the freedom to turn.",
                 field=("singularities", "count"),
             )
         return int(possible[np.argmin(uncovered[possible])])

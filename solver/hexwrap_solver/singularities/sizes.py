@@ -9,7 +9,7 @@ from hexwrap_solver.panels.sizes import partition_by_area
 
 #: Patches whose sizes differ by less than this (relatively) count as one.
 ALIKE = 2e-3
-#: Sizes are told apart in so many steps when many states are compared.
+#: Sizes are told apart in this many steps when many states are compared.
 STEPS = 64
 
 

@@ -19,7 +19,7 @@ from hexwrap_solver.conformal.types import Targets
 from hexwrap_solver.errors import ConvergenceError
 from hexwrap_solver.surface.types import Surface
 
-#: Rounds of splitting, and how many times the vertices there may be in the end, and so many more.
+#: Rounds of splitting, and how many times the vertices there may be in the end, and this many more.
 ROUNDS, MOST, MOST_MORE = 12, 2, 2000
 
 

@@ -15,9 +15,9 @@ from hexwrap_solver.singularities.linear import distance_to, vertex_areas
 from hexwrap_solver.singularities.types import Rules
 from hexwrap_solver.surface.types import Surface
 
-#: A symmetry carries no point further from the surface than so many cells.
+#: A symmetry carries no point further from the surface than this many cells.
 OFF = 0.15
-#: Points that are tried; rotations by a full turn over up to so many; planes through an axis of which none
+#: Points that are tried; rotations by a full turn over up to this many; planes through an axis of which none
 #: is known.
 TRIED, FOLDS, PLANES = 150, 8, 48
 #: Principal moments that differ by less than this part are equal.

@@ -36,7 +36,7 @@ UPRIGHT = np.sqrt(0.5)
 LONGER = 2.5
 #: More flat regions than this make a faceted surface, not a mass with caps.
 MOST = 60
-#: Walls that fall apart into more tubes than this are no building with courtyards.
+#: Walls that fall apart into more tubes than this are not a building with courtyards.
 MOST_TUBES = 20
 #: Walls around a courtyard stand: they lean by no more than this, radians; else the block is a ring.
 LEANING = np.deg2rad(25.0)

@@ -17,7 +17,7 @@ from hexwrap_solver.surface.types import Feature, Triangles
 
 #: A chain that turns by more than this at a vertex is two, radians.
 CORNER = np.deg2rad(40.0)
-#: Edges lie on a line if they are no farther from it than this part of the mesh's size.
+#: Edges lie on a line if they are not farther from it than this part of the mesh's size.
 NEAR = 1e-3
 
 

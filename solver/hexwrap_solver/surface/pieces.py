@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged
-from hexwrap_solver.geometry import dot, face_areas
+from hexwrap_solver.geometry import dot, face_areas, normalize
 from hexwrap_solver.surface.topology import face_graph, half_edges
 from hexwrap_solver.surface.triangulate import triangulate
 from hexwrap_solver.surface.types import SentMesh, Triangles
@@ -20,13 +20,15 @@ from hexwrap_solver.tolerances import TINY
 
 #: Open edges are divided again where a division has made new ones, at most so often.
 ROUNDS = 16
+#: Edges lie along each other, and faces on the same side, with at least this cosine.
+ALIGNED = 0.9
 
 
 @dataclass(frozen=True)
 class Piece:
     """Faces that hang together across edges, ascending; loops: the number of their boundary curves.
 
-    boundary: (k, 3) the vertices on these. is_fin: whether it shares a vertex with a larger piece.
+    boundary: (k, 2, 3) the edges on these. is_fin: whether it shares a vertex with a larger piece.
     """
 
     faces: Ints
@@ -81,9 +83,11 @@ def pieces(mesh: SentMesh) -> list[Piece]:
     points = mesh.vertices[triangles[first[by_piece]]]
     low = np.minimum.reduceat(points.min(axis=1), ends[held])
     high = np.maximum.reduceat(points.max(axis=1), ends[held])
-    owner, at = np.divmod(np.unique(piece[rim // 3].astype(np.int64) * n + start), n)
-    rims = np.split(mesh.vertices[at], np.searchsorted(owner, np.arange(1, count)))
-    loops = np.bincount(np.unique(owner * n + loop[at]) // n, minlength=count)
+    owner = piece[rim // 3].astype(np.int64)
+    by_owner = np.argsort(owner, kind="stable")
+    edges = mesh.vertices[np.stack([start, end], axis=1)[by_owner]]
+    rims = np.split(edges, np.searchsorted(owner[by_owner], np.arange(1, count)))
+    loops = np.bincount(np.unique(owner * n + loop[start]) // n, minlength=count)
     faces = np.split(by_piece, ends[1:-1])
     found = [
         Piece(faces[k], int(loops[k]), float(area[k]), low[i], high[i], rims[k], bool(attached[k]))
@@ -132,19 +136,19 @@ def joined(mesh: SentMesh, tolerance: float) -> tuple[SentMesh, Ints, Joint]:
     label = weldings(exact, min(TOLERANCE * size, tolerance))[0]
     near = weldings(relabelled(exact, label), tolerance)[0][label]
     moved = np.flatnonzero(near != label)
-    joint = Joint()
-    if len(moved):
-        apart = np.linalg.norm(mesh.vertices[moved] - mesh.vertices[near[moved]], axis=1)
-        worst = int(np.argmax(apart))
-        joint = Joint(len(moved), float(apart[worst]), _place(mesh.vertices[moved[worst]]))
+    apart = np.linalg.norm(mesh.vertices - mesh.vertices[near], axis=1)
+    worst = int(np.argmax(apart))
+    joint = Joint(len(moved), float(apart[worst]), _place(mesh.vertices[worst]))
     faces, source, divided = _divided(mesh.vertices, near[triangles], polygon, tolerance)
     if joint.count == 0 and divided.count == 0:
         return mesh, np.arange(mesh.faces.n_rows), joint
-    if divided.count == 0:
-        values = near[np.asarray(mesh.faces.values, dtype=np.int64)]
-        whole = SentMesh(mesh.vertices, Ragged(values, mesh.faces.offsets), mesh.normals)
-        return whole, np.arange(mesh.faces.n_rows), joint
-    return SentMesh(mesh.vertices, Ragged.from_table(faces), mesh.normals), source, joint.worse(divided)
+    m = mesh.faces.n_rows
+    more = np.bincount(source, minlength=m) > np.bincount(polygon, minlength=m)
+    kept, split = only(mesh, np.flatnonzero(~more)).faces, more[source]
+    values = np.concatenate([near[np.asarray(kept.values, dtype=np.int64)], faces[split].ravel()])
+    lengths = np.append(kept.lengths, np.full(int(split.sum()), 3))
+    whole = SentMesh(mesh.vertices, Ragged(values, np.append(0, np.cumsum(lengths))), mesh.normals)
+    return whole, np.append(np.flatnonzero(~more), source[split]), joint.worse(divided)
 
 
 def _place(point: Floats) -> tuple[float, float, float]:
@@ -160,6 +164,8 @@ def _divided(vertices: Floats, faces: Ints, source: Ints, tolerance: float) -> t
         start, end = half_edges(faces)
         rim = np.flatnonzero((twin < 0) & (start != end))
         h, v, apart = _on_edges(vertices, start[rim], end[rim], tolerance)
+        beside = ~_overlap(vertices, faces, rim, h, v)
+        h, v, apart = h[beside], v[beside], apart[beside]
         if len(h) == 0:
             break
         joint = joint.worse(Joint(len(h), float(apart.max()), _place(vertices[v[int(np.argmax(apart))]])))
@@ -173,6 +179,23 @@ def _divided(vertices: Floats, faces: Ints, source: Ints, tolerance: float) -> t
         faces[face] = first
         source = np.concatenate([source, source[face]])
     return faces, source, joint
+
+
+def _overlap(vertices: Floats, faces: Ints, rim: Ints, h: Ints, v: Ints) -> Bools:
+    """(k,) whether an open edge at the vertex v lies along the open edge h with its face on the same side of
+    it: one covers the other, and they are no two sides of a seam."""
+    start, end = (side[rim] for side in half_edges(faces))
+    along = normalize(vertices[end] - vertices[start])
+    across = vertices[faces[rim // 3, (rim + 2) % 3]] - vertices[start]
+    inward = normalize(across - dot(across, along)[:, None] * along)
+    covers = np.zeros(len(h), dtype=bool)
+    for side in (start, end):
+        at = np.full(len(vertices), -1, dtype=np.int64)
+        at[side] = np.arange(len(rim))
+        other = at[v]
+        parallel = np.abs(dot(along[other], along[h])) > ALIGNED
+        covers |= (other >= 0) & parallel & (dot(inward[other], inward[h]) > ALIGNED)
+    return covers
 
 
 def _on_edges(vertices: Floats, start: Ints, end: Ints, tolerance: float) -> tuple[Ints, Ints, Floats]:

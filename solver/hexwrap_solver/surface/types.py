@@ -93,7 +93,7 @@ class FeatureSettings:
     ] = ()
     without: Annotated[
         tuple[Polyline, ...],
-        Setting("polylines along folds and creases that are to be no lines of the pattern", most=1000),
+        Setting("polylines along folds and creases that are not to become lines of the pattern", most=1000),
     ] = ()
 
     def __post_init__(self) -> None:

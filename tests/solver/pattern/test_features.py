@@ -21,7 +21,7 @@ from hexwrap_solver.pattern.lay.nodes import Nodes
 from hexwrap_solver.pattern.place import choose
 from hexwrap_solver.pattern.place.choose import PlacementFamily
 from hexwrap_solver.pattern.place.deform import distortion_of
-from hexwrap_solver.pattern.place.features import least_where_they_meet
+from hexwrap_solver.pattern.place.features import chains_of, lasting, least_where_they_meet
 from hexwrap_solver.pattern.place.placement import cost_of
 from hexwrap_solver.pattern.trim.boundary import Boundary
 from hexwrap_solver.pattern.trim.tips import ending_at_tips
@@ -190,6 +190,24 @@ def test_no_more_folds_than_a_bound_are_tried(monkeypatch: pytest.MonkeyPatch) -
     assert len(cmap.surface.features) == 6
     assert sum(feature.straight for feature in pattern.features) <= 4
     assert any("Of 6 folds only the 4 longest" in note for note in pattern.notes)
+
+
+def test_networks_of_short_folds_ask_for_no_lines() -> None:
+    """A niche three vertices wide in a tube: its folds, a network that meets no other, are followed by cells
+    a third of it, and only cut by cells of its size; folds from loop to loop are followed at any size."""
+    angle = np.linspace(0, 2 * np.pi, 48, endpoint=False)
+    ring = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    rings = 10 * ring + np.linspace(0, 40, 33)[:, None, None] * np.array([0.0, 0.0, 1.0])
+    rings[14:18, 10:14, :2] *= 1.25
+    cmap = conformal_map(surface_from_mesh(grid(rings)), BoundaryCondition("straight"))
+    chains = chains_of(cmap, cmap.surface.features, frozenset(range(len(cmap.surface.features))))
+    assert len(chains) >= 12
+    side = max(chain.length for chain in chains)
+    assert lasting(chains, cmap.surface, side / 4).all()
+    assert not lasting(chains, cmap.surface, side).any()
+    box = solved("box")
+    folds = chains_of(box, box.surface.features, frozenset(range(4)))
+    assert lasting(folds, box.surface, 10 * folds[0].length).all()
 
 
 def test_no_distortion_is_told_that_is_none() -> None:

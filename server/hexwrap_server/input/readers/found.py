@@ -29,7 +29,7 @@ class Found:
     """An object of a file that is a mesh or a surface.
 
     kind: Rhino's word for it. size: of its bounding box. read: its geometry, converted when it is asked for.
-    attributes: user strings.
+    attributes: user strings. within: names and layers of the block instances that it is in, outermost first.
     """
 
     id: str
@@ -41,12 +41,14 @@ class Found:
     visible: bool = True
     locked: bool = False
     attributes: dict[str, str] = field(default_factory=dict)
+    within: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True)
 class FileContent:
     """unit: ``m``, ``cm``, ``mm``, ``ft``, ``in`` or None. tolerance: of the file, in its unit; None where
-    the format has none. others: what else is there, by kind.
+    the format has none. others: what else is there, by kind. odd_unit: the file's own unit, if it is none of
+    these.
 
     mesh, owner: where the objects are faces (m,) of one table of vertices, the whole table; its vertices keep
     their numbers, independent of the choice. is_whole: the mesh is one object, and known to be one piece.
@@ -59,6 +61,7 @@ class FileContent:
     mesh: SentMesh | None = None
     owner: Ints | None = None
     is_whole: bool = False
+    odd_unit: str = ""
 
 
 def of_mesh(mesh: SentMesh, names: Sequence[tuple[str, str]] = (), owner: Ints | None = None) -> FileContent:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.lib import format as npy
 
-from hexwrap_server.input.readers.errors import UnreadableFileError
+from hexwrap_server.errors import UnreadableFileError
 from hexwrap_server.input.readers.found import FileContent, of_mesh
 from hexwrap_solver.arrays import Ragged
 from hexwrap_solver.surface import SentMesh

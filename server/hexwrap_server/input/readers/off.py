@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 
-from hexwrap_server.input.readers.errors import UnreadableFileError
+from hexwrap_server.errors import UnreadableFileError
 from hexwrap_server.input.readers.found import FileContent, of_mesh
 from hexwrap_server.input.readers.text import as_utf8, count, floats, integers, rows
 from hexwrap_solver.arrays import Ragged

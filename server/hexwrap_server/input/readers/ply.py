@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hexwrap_server.input.readers.errors import UnreadableFileError
+from hexwrap_server.errors import UnreadableFileError
 from hexwrap_server.input.readers.found import FileContent, of_mesh
 from hexwrap_server.input.readers.text import MARKS, Width, as_utf8, count, floats, rows
 from hexwrap_solver.arrays import Floats, Ints, Ragged

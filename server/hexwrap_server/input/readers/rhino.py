@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from itertools import product
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 import numpy as np
 import rhino3dm
 
-from hexwrap_server.input.readers.errors import UnreadableFileError
+from hexwrap_server.errors import UnreadableFileError
 from hexwrap_server.input.readers.found import LINKED, FileContent, Found, Geometry
 from hexwrap_server.input.readers.rhino_brep import brep_of, nurbs_surface, rhino_mesh, subd_mesh
 from hexwrap_server.input.readers.rhino_model import MOST_OBJECTS, Model, Placed, TooManyObjectsError
@@ -18,7 +19,7 @@ from hexwrap_solver.surface import NurbsSurface
 
 #: Rhino's geometry types that are surfaces; curves, points, lights and texts beside them do no harm.
 SURFACES = (rhino3dm.Mesh, rhino3dm.Brep, rhino3dm.Surface, rhino3dm.SubD)
-#: Words for what is no surface. Blocks are resolved: one that is left is linked to a file that is not there.
+#: Words for what is not a surface. Blocks are resolved: one that is left is linked to a missing file.
 OTHERS = {
     rhino3dm.Curve: "curves",
     rhino3dm.Point: "points",
@@ -29,6 +30,8 @@ OTHERS = {
     rhino3dm.TextDot: "text dots",
     rhino3dm.InstanceReference: LINKED,
 }
+#: A block that is scaled by less than this part of its largest scale in some direction is flat.
+FLATTENED = 1e-9
 #: Rhino's unit systems that are carried.
 UNITS = {"Meters": "m", "Centimeters": "cm", "Millimeters": "mm", "Feet": "ft", "Inches": "in"}
 
@@ -47,25 +50,33 @@ def read_3dm(data: bytes) -> FileContent:
         ) from None
     settings = model.file.Settings
     tolerance = float(settings.ModelAbsoluteTolerance)
+    unit = str(settings.ModelUnitSystem).rpartition(".")[2]
     return FileContent(
         tuple(_found(item, tolerance) for item in placed if isinstance(item.geometry, SURFACES)),
-        UNITS.get(str(settings.ModelUnitSystem).rpartition(".")[2]),
+        UNITS.get(unit),
         tolerance if 0 < tolerance < np.inf else None,
         Counter(_other_kind(item.geometry) for item in placed if not isinstance(item.geometry, SURFACES)),
+        odd_unit="" if unit in (*UNITS, "None", "Unset") else re.sub(r"\B(?=[A-Z])", " ", unit).lower(),
     )
 
 
 def _found(placed: Placed, tolerance: float) -> Found:
     return Found(
         placed.id,
-        placed.name or (placed.blocks[-1] if placed.blocks else ""),
+        placed.name,
         _kind(placed.geometry),
         _size(placed),
         lambda: _moved(convert(placed.geometry, tolerance), placed.matrix),
         placed.layer,
         placed.visible,
         placed.locked,
-        {str(key): str(value) for key, value in placed.attributes.GetUserStrings()},
+        placed.strings,
+        tuple(
+            (name, one.layer)
+            for one in placed.within
+            for name in dict.fromkeys((one.name, one.block))
+            if name
+        ),
     )
 
 
@@ -85,7 +96,7 @@ def _kind(geometry: Any) -> str:
 
 
 def _other_kind(geometry: Any) -> str:
-    """Of what is no surface."""
+    """Of what is not a surface."""
     for kind, word in OTHERS.items():
         if isinstance(geometry, kind):
             return word
@@ -94,6 +105,8 @@ def _other_kind(geometry: Any) -> str:
 
 def _size(placed: Placed) -> tuple[float, float, float]:
     box = placed.geometry.GetBoundingBox()
+    if not box.IsValid:  # of nothing
+        return 0.0, 0.0, 0.0
     corners = np.array(list(product(*zip(_xyz(box.Min), _xyz(box.Max), strict=True))))
     if placed.matrix is not None:
         corners = corners @ placed.matrix[:3, :3].T
@@ -105,9 +118,15 @@ def _moved(geometry: Geometry, matrix: Floats | None) -> Geometry:
     """Where its block puts it; the outside stays outside where a block is mirrored."""
     if matrix is None:
         return geometry
+    linear, shift = matrix[:3, :3], matrix[:3, 3]
+    scales = np.linalg.svd(linear, compute_uv=False)
+    if not scales[-1] > FLATTENED * scales[0]:
+        raise UnreadableFileError(
+            "The block instance that the surface is in flattens it: undo its scaling with Rhino's "
+            "ResetBlock, or explode it with ExplodeBlock and look at what is left."
+        )
     if not isinstance(geometry, NurbsSurface):
         return geometry.transformed(matrix)
-    linear, shift = matrix[:3, :3], matrix[:3, 3]
     net = geometry.control_points
     moved = np.concatenate([net[..., :3] @ linear.T + shift, net[..., 3:]], axis=-1)
     surface = NurbsSurface(geometry.degree, geometry.knots, moved, geometry.closed)

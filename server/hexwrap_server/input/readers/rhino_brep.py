@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import rhino3dm
 
-from hexwrap_server.input.readers.errors import UnreadableFileError
+from hexwrap_server.errors import UnreadableFileError
 from hexwrap_solver.arrays import Floats, Ragged
 from hexwrap_solver.surface import NurbsSurface, SentMesh
 from hexwrap_solver.surface.brep import Brep, Edge, Face, NurbsCurve, Trim

@@ -14,7 +14,6 @@ from hexwrap_solver.arrays import Floats
 
 #: Blocks within blocks, at most this deep, and this many objects in all.
 DEEPEST, MOST_OBJECTS = 32, 200_000
-_NO_LAYER = "00000000-0000-0000-0000-000000000000"
 
 
 class TooManyObjectsError(Exception):
@@ -22,11 +21,21 @@ class TooManyObjectsError(Exception):
 
 
 @dataclass(frozen=True)
+class Instance:
+    """A block instance. block: the name of its block."""
+
+    name: str
+    layer: str
+    block: str
+    strings: tuple[tuple[str, str], ...] = ()
+
+
+@dataclass(frozen=True)
 class Placed:
     """An object where it stands. matrix: (4, 4), how its geometry is to be moved, None: not at all.
 
     id: the object's own, or that of the block instance it belongs to, with its own behind it.
-    blocks: the names of the blocks around it, outermost first.
+    within: the block instances around it, outermost first.
     """
 
     geometry: Any
@@ -36,11 +45,23 @@ class Placed:
     visible: bool
     locked: bool
     matrix: Floats | None = None
-    blocks: tuple[str, ...] = ()
+    within: tuple[Instance, ...] = ()
 
     @property
     def name(self) -> str:
-        return str(self.attributes.Name or "")
+        """Its own, or else that of the innermost instance or block that has one."""
+        around = (name for one in reversed(self.within) for name in (one.name, one.block))
+        return next(filter(None, (str(self.attributes.Name or ""), *around)), "")
+
+    @property
+    def strings(self) -> dict[str, str]:
+        """User strings, of the instances around it, too; its own go before theirs."""
+        found = dict(pair for one in self.within for pair in one.strings)
+        return found | dict(_strings(self.attributes))
+
+
+def _strings(attributes: Any) -> list[tuple[str, str]]:
+    return [(str(key), str(value)) for key, value in attributes.GetUserStrings()]
 
 
 @dataclass(frozen=True)
@@ -112,9 +133,9 @@ class Model:
                 visible and around.visible,
                 locked or around.locked,
                 around.matrix,
-                around.blocks,
+                around.within,
             )
-        if not isinstance(item.Geometry, rhino3dm.InstanceReference) or len(placed.blocks) == DEEPEST:
+        if not isinstance(item.Geometry, rhino3dm.InstanceReference) or len(placed.within) == DEEPEST:
             yield placed
             return
         name, members = self._blocks.get(str(item.Geometry.ParentIdefId), ("", []))
@@ -130,7 +151,7 @@ class Model:
             placed.visible,
             placed.locked,
             own if placed.matrix is None else placed.matrix @ own,
-            (*placed.blocks, name),
+            (*placed.within, Instance(str(attributes.Name or ""), layer, name, tuple(_strings(attributes)))),
         )
         for member in members:
             yield from self._resolved(member, inner)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from hexwrap_server.input.readers.errors import UnreadableFileError
+from hexwrap_server.errors import UnreadableFileError
 from hexwrap_solver.arrays import Floats, Ints
 
 #: Byte order marks; the longer one first where one begins like another.

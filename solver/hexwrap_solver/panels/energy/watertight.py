@@ -41,11 +41,11 @@ from hexwrap_solver.surface.types import Surface
 #: Weights of the plane distances, stage by stage; the surface weighs 1.
 FLATNESS: tuple[float, ...] = (1e2, 1e3, 1e4, 1e5, 1e6, 1e8)
 
-#: After so many stages Newton's method is tried; the others follow only where it makes no headway.
+#: After this many stages Newton's method is tried; the others follow only where it makes no headway.
 USUAL = 5
 
 #: Most Gauss–Newton steps, and the fraction of its energy that a step takes away if another one is to follow
-#: in its stage: what is left undone, the next stage does along with its own work. A heavier weight is no help
+#: in its stage: what is left undone, the next stage does along with its own work. Heavier weights do not help
 #: where the planes are most of the energy; there it is less. The first stage has one step.
 MOST_STEPS, ENOUGH, LITTLE = 25, 0.6, 0.5
 
@@ -59,7 +59,7 @@ DAMPING, EASE, TIGHTEN = 1e-4, 4.0, 4.0
 #: Weight of the planes in Newton's method at the end, so large that the rest only chooses among flat meshes.
 DECISIVE = 1e9
 
-#: Distances from planes / ℓ below this are rounding; Newton's method takes at most so many steps to it.
+#: Distances from planes / ℓ below this are rounding; Newton's method takes at most this many steps to it.
 FLAT, NEWTON_STEPS = 1e-12, 12
 
 #: Of coordinates, relative to them.
@@ -81,7 +81,7 @@ ASLANT = 0.7
 PROJECTIONS, INSIDE, ALIKE = 3, 1e-9, 0.8
 
 #: With the same derivatives at most so many corrections follow a step, as long as each leaves less than this
-#: fraction of the energy; and at most so many of Newton's steps follow each other.
+#: fraction of the energy; and at most this many of Newton's steps follow each other.
 CORRECTIONS, CHORDS, WORTH = 4, 8, 0.6
 
 #: Rounds for a step end after so many, or when one changes it by less than this fraction. Eigenvalues of the
@@ -236,7 +236,7 @@ def _search(problem: _Problem, state: _State) -> tuple[_State | None, float]:
         if not corrected.energy < WORTH * before.energy:
             break
     fraction = 1.0
-    while not best.energy < state.energy:  # nor where it is no number
+    while not best.energy < state.energy:  # nor where it is NaN
         fraction /= 2
         if fraction < SHORTEST:
             return None, 0.0
@@ -402,7 +402,7 @@ class _Problem:
         return every, np.concatenate([shape, whole], axis=1)
 
     def bend(self, points: Floats) -> float:
-        """Greatest distance of a corner from its face's plane / ℓ; ∞ where points are no numbers."""
+        """Greatest distance of a corner from its face's plane / ℓ; ∞ where coordinates are NaN."""
         with np.errstate(all="ignore"):
             found = [
                 np.abs(Seen.of(points[g.corner]).heights() / g.length[:, None]).max() for g in self._bent

@@ -12,7 +12,7 @@ from hexwrap_solver.arrays import Bools, Ints, Ragged
 from hexwrap_solver.pattern.lattice import Lattice
 from hexwrap_solver.pattern.lay.edges import PatternEdges
 
-#: Around a singularity there are at most so many sectors more than elsewhere.
+#: Around a singularity there are at most this many sectors more than elsewhere.
 MOST_EXTRA = 6
 
 

@@ -63,7 +63,7 @@ COST_OF_LOPSIDED = 3.0
 #: Parallel lines of a lattice are of this many kinds at most, up to translations.
 MOST_LINES = 3
 
-#: So many placements with the least mean strain are compared by their sharp one, and so many of these, in
+#: This many placements with the least mean strain are compared by their sharp one, and this many of these, in
 #: order, are deformed, until one of them distorts by less than ENOUGH.
 COMPARED, DEFORMED, ENOUGH = 12, 3, 0.03
 

@@ -9,9 +9,10 @@ import numpy as np
 
 from hexwrap_solver.arrays import Bools, Floats
 from hexwrap_solver.conformal.types import ConformalMap
-from hexwrap_solver.pattern.lattice import Lattice
+from hexwrap_solver.pattern.lattice import Isometry, Lattice
 from hexwrap_solver.pattern.place.align import (
     Straightening,
+    frame_of,
     place_by_sides,
     predicted,
     turn_between_loops,
@@ -19,9 +20,11 @@ from hexwrap_solver.pattern.place.align import (
 from hexwrap_solver.pattern.place.cone import place_on_cone, place_on_flat_ring
 from hexwrap_solver.pattern.place.cylinder import place_on_cylinder
 from hexwrap_solver.pattern.place.features import (
+    LEAST_CELLS,
     Chain,
     FeatureLines,
     chains_of,
+    lasting,
     least_where_they_meet,
     narrow,
     worth_following,
@@ -48,9 +51,9 @@ from hexwrap_solver.pattern.types import PatternSettings
 P99, MOST_PREDICTED, MOST_DISTORTED, FINE = 0.99, 0.15, 1.5, 0.005
 #: Where one leans by more than this (radians), a pattern that winds along with them is compared.
 LEANING = np.deg2rad(2.0)
-#: Features are given up, the costliest first, in so many rounds.
+#: Features are given up, the costliest first, in this many rounds.
 MOST_GIVEN_UP = 8
-#: So many, the longest, are tried: each is an unknown of its own in every round.
+#: This many, the longest, are tried: each is an unknown of its own in every round.
 MOST_FOLLOWED = 64
 #: More folds, and more places where they meet, are not named one by one.
 MOST_NAMED, MOST_PLACES = 4, 8
@@ -154,6 +157,14 @@ class PlacementFamily:
         chains = narrow(self.chains, self.cmap)
         straight = {chain.feature for chain in chains}
         sentences = [self._wide_note(chain) for chain in self.chains if chain.feature not in straight]
+        lasts = lasting(chains, self.cmap.surface, self.cell).tolist()
+        if not all(lasts):
+            sentences.insert(
+                0,
+                f"{lasts.count(False)} folds in networks of pieces shorter than {LEAST_CELLS:.0f} cells were "
+                "not tried for lines of the pattern: cells are cut where they fall.",
+            )
+            chains = [chain for chain, one in zip(chains, lasts, strict=True) if one]
         if len(chains) > MOST_FOLLOWED:
             sentences.insert(
                 0,
@@ -192,9 +203,14 @@ class PlacementFamily:
 
     def _winding(self, chains: list[Chain], aligned: _Way, settings: PatternSettings) -> _Way | None:
         """Aligned with the features alone, which lean: where that costs less than half as much."""
-        lean = abs(aligned.features.lean).max()
-        if not self.loops or not self.is_cylinder or lean <= LEANING or any(c.closed for c in chains):
+        lean = abs(aligned.features.lean)
+        if not self.loops or not self.is_cylinder or lean.max() <= LEANING or any(c.closed for c in chains):
             return None
+        length = np.array([chain.length for chain in chains])
+        rotation = Isometry(self.lattice, self.cone_index, (0, 0))
+        _, freely = frame_of(self.cmap, self.lattice, self.shape, rotation, [], chains)
+        if freely is None or length @ abs(freely.lean) > 0.5 * (length @ lean):
+            return None  # each leans in a way of its own
         winding = self._way(chains, [], settings)
         return winding if winding.cost < 0.5 * aligned.cost else None
 

@@ -27,7 +27,7 @@ SIZE = 0.1
 ROUNDS, FLOOR = 4, 1e-2
 #: Below this worst ratio of singular values − 1, a round that gains nothing is the last one.
 FINE = 0.03
-#: Where no triangle bears more than so many times the root mean square, there is nothing to spread.
+#: Where no triangle bears more than this many times the root mean square, there is nothing to spread.
 EVEN = 1.1
 
 #: Pull towards the undeformed place, relative: it only settles what nothing else does.

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
 
 from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints
 from hexwrap_solver.conformal.types import ConformalMap
@@ -17,8 +19,8 @@ from hexwrap_solver.surface.types import Feature, Surface
 #: straight.
 WIDE = 0.02
 
-#: Creases that were only seen on the mesh count where they are longer than so many cells, and where all of
-#: them together leave so many cells between them: others are roughness, or a coarse mesh of a round surface.
+#: Creases that were only seen on the mesh count where they are longer than this many cells, and where all of
+#: them together leave as many between them: others are roughness, or a coarse mesh of a round surface.
 LEAST_CELLS = 3.0
 
 #: Directions at a vertex that differ by less (radians, relative to unit normals) are one.
@@ -117,6 +119,32 @@ def narrow(chains: list[Chain], cmap: ConformalMap) -> list[Chain]:
     """Those straight enough to be made a line, and that go somewhere."""
     size = abs(cmap.circumference) or float(np.ptp(cmap.uv.real) + np.ptp(cmap.uv.imag))
     return [chain for chain in chains if chain.width <= min(WIDE * size, 0.5 * chain.length)]
+
+
+def lasting(chains: list[Chain], surface: Surface, cell: float) -> Bools:
+    """(c,) those that a line may follow: given, from loop to loop, or in one network with a piece, between
+    two places where it branches, of at least LEAST_CELLS cells. Roughness of a mesh makes networks of short
+    ones."""
+    if not chains:
+        return np.zeros(0, dtype=bool)
+    ends = np.array([chain.vertex[[0, -1]] for chain in chains], dtype=np.int64)
+    on_loop = np.zeros(len(surface.vertices), dtype=bool)
+    on_loop[surface.boundary] = True
+    passing = (np.bincount(ends.ravel(), minlength=len(on_loop)) == 2) & ~on_loop
+    length = np.array([chain.length for chain in chains])
+    piece = _together(ends, passing)
+    lasts = np.bincount(piece, length)[piece] >= LEAST_CELLS * cell
+    lasts |= np.array([surface.features[chain.feature].given for chain in chains], dtype=bool)
+    lasts |= (ends[:, 0] != ends[:, 1]) & on_loop[ends].all(axis=1)
+    network = _together(ends, ~on_loop)
+    return np.asarray(np.bincount(network, lasts)[network] > 0)
+
+
+def _together(ends: Ints, joined: Bools) -> Ints:
+    """(c,) which of the chains with these ends (c, 2) hang together at vertices where they are joined."""
+    chain, end = np.nonzero(joined[ends])
+    at = csr_array((np.ones(len(chain)), (chain, ends[chain, end])), shape=(len(ends), len(joined)))
+    return np.asarray(connected_components(at @ at.T, directed=False)[1])
 
 
 @dataclass(frozen=True)

@@ -88,7 +88,7 @@ def quantum_name(lattice: Lattice) -> str:
 
 
 def cone_index_of(cmap: ConformalMap, lattice: Lattice) -> int:
-    """The cone angle in turns by ζ. Raises NotAdaptedError where it is no multiple of the quantum (paper,
+    """The cone angle in turns by ζ. Raises NotAdaptedError where it is not a multiple of the quantum (paper,
     definition 2)."""
     quantum, K = lattice.quantum, cmap.deck.angle
     k = round(K / quantum)

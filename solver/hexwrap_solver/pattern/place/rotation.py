@@ -28,7 +28,7 @@ def with_rotation(
 ) -> tuple[PatternSettings, list[str]]:
     """Settings with ``u`` and ``v`` turned into the angle that fits best over the surface.
 
-    Raises PatternError where the surface is no NURBS surface, or its tangents turn too much to be followed.
+    Raises PatternError where the surface is not a NURBS surface, or its tangents turn too much to follow.
     """
     if settings.rotation not in ("u", "v"):
         return settings, []

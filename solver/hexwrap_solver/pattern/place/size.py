@@ -13,11 +13,11 @@ from hexwrap_solver.pattern.place.placement import is_disk, main_loops
 from hexwrap_solver.pattern.place.sense import too_many
 from hexwrap_solver.pattern.types import PatternSettings
 
-#: Where neither a number nor a length is asked for: so many cells around, but fewer where that would make
-#: more cells altogether, and more where not so many rows would fit between the loops, or where fewer cells
+#: Where neither a number nor a length is asked for: this many cells around, but fewer where that would make
+#: more cells altogether, and more where fewer rows would fit between the loops, or where fewer cells
 #: than the last would go around the shorter loop.
 DEFAULT_AROUND, DEFAULT_CELLS, DEFAULT_ROWS, DEFAULT_NARROWEST = 48, 3000, 3.0, 3
-#: On nets: so many cells, or more where not so many rows would fit.
+#: On nets: this many cells, or more where fewer rows than that would fit.
 DEFAULT_ON_NETS = 1000
 #: Whole cells may stay away from so much of the surface at its narrow end.
 DEFAULT_OPEN = 0.01

@@ -108,7 +108,7 @@ def arrangement(
 def _points_on_boundary(
     layout: Layout, boundary: Boundary, n: int, at_node: BoundaryPoints, leaving: Exits, chord: Chords
 ) -> tuple[BoundaryPoints, BoundaryPoints]:
-    """All points on the boundary, and those of them that are no nodes, numbered from n on."""
+    """All points on the boundary, and those of them that are not nodes, numbered from n on."""
     edge = np.concatenate([leaving.edge, chord.edge, chord.end_edge])
     t = np.concatenate([leaving.t, chord.t, chord.end_t])
     taken = np.zeros(len(boundary.face), dtype=bool)

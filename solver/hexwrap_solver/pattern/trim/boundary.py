@@ -20,7 +20,7 @@ from hexwrap_solver.pattern.lay.nodes import Nodes
 from hexwrap_solver.pattern.lay.trace import trace
 from hexwrap_solver.surface.types import Surface
 
-#: A boundary vertex at which the boundary turns by less (radians) is no corner of a cut cell.
+#: A boundary vertex at which the boundary turns by less (radians) is not a corner of a cut cell.
 STRAIGHT = 1e-7
 
 

@@ -14,7 +14,7 @@ is the first one clockwise from the twin of h around the head of h:
         <- twin(h) --  |
 
 so that faces are the cycles of h ↦ next(h). Those bounded by whole cells are known already, and the outside
-is no face; what remains are the cut cells. A cell that the boundary cuts into several pieces comes out as
+is not a face; what remains are the cut cells. A cell that the boundary cuts into several pieces comes out as
 several. No place is ever compared with another: the order around points, the twins and the lattice isometries
 along half-edges are all that is needed, so that this works on nets that overlap themselves.
 

@@ -123,7 +123,7 @@ def piece_of(
             data={"face": name},
         )
     points = np.concatenate([outline.points, evaluate_points(patch.opened, inner)])
-    merged = _one_per_pole(outline, points, len(uv))
+    merged = _one_per_pole(outline, len(uv))
     faces = merged[faces]
     faces = faces[(faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])]
     lines = merged[outline.lines]
@@ -168,7 +168,7 @@ def _without_doubles(patch: Patch, piece: Piece, id: Ints, taken: set[int]) -> P
     return piece
 
 
-def _one_per_pole(outline: Outline, points: Floats, n: int) -> Ints:
+def _one_per_pole(outline: Outline, n: int) -> Ints:
     """(n,) vertices, neighbours on the outline at one and the same place (a pole) being one."""
     label = np.arange(n)
     for a, b in zip(outline.loops[:-1], outline.loops[1:], strict=True):

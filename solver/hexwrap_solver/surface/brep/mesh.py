@@ -21,7 +21,8 @@ from hexwrap_solver.surface.brep.kinks import crossings, kink_lines, kinks_of
 from hexwrap_solver.surface.brep.pull import Patch, free, lifted, patch_of, pull
 from hexwrap_solver.surface.brep.sizes import Field, Sizes, field_of, meeting, sized
 from hexwrap_solver.surface.brep.types import Brep, Edge, Face, Trim
-from hexwrap_solver.surface.errors import EmptySurfaceError, TooFineError
+from hexwrap_solver.surface.brep.whole import check_brep
+from hexwrap_solver.surface.errors import EmptySurfaceError, FlatSurfaceError, TooFineError
 from hexwrap_solver.surface.mesh_sizes import GRADE, ROW, check_settings
 from hexwrap_solver.surface.nurbs import evaluate
 from hexwrap_solver.surface.topology import sum_rows
@@ -30,6 +31,8 @@ from hexwrap_solver.tolerances import TINY
 
 #: Normals of two faces that differ by more than this along their edge make a crease, radians.
 CREASE = np.deg2rad(5.0)
+#: A surface with less area than this part of its largest face's size, squared, is a curve.
+FLAT = 1e-10
 #: Normals beside an edge are taken this part of the face's box away from it.
 BESIDE = 1e-4
 
@@ -79,6 +82,7 @@ def mesh_brep(brep: Brep, settings: MeshSettings | None = None) -> BrepMesh:
     check_settings(settings)
     if not brep.faces:
         raise EmptySurfaceError("The polysurface has no faces.")
+    check_brep(brep)
     used = sorted({t.edge for face in brep.faces for loop in face.loops for t in loop if t.edge >= 0})
     first = {e: places(brep.edges[e]) for e in used}
     at = {e: evaluate_curve(brep.edges[e].curve, t) for e, t in first.items()}
@@ -86,13 +90,16 @@ def mesh_brep(brep: Brep, settings: MeshSettings | None = None) -> BrepMesh:
         _side(face, name, brep, {e: a[0] for e, a in at.items()}) for name, face in enumerate(brep.faces)
     ]
     area = sum(side.field.area for side in sides)
+    if area < FLAT * max(side.patch.size for side in sides) ** 2:
+        raise FlatSurfaceError(
+            "The surface has no area, it has shrunk to a curve: run SelBadObjects in Rhino, or Undo what has "
+            "flattened it."
+        )
     sizes = Sizes.of(settings, area)
     for side in sides:
         side.field = sized(side.field, sizes)
-    uses = _uses(brep, sides)
-    wanted = {
-        e: _wanted(sizes, first[e], at[e], [uv for _, uv in uses[e]], [s for s, _ in uses[e]]) for e in used
-    }
+    uses = _uses(sides)
+    wanted = {e: _wanted(sizes, at[e], [uv for _, uv in uses[e]], [s for s, _ in uses[e]]) for e in used}
     for e in used:
         for side, uv in uses[e]:
             side.field = meeting(side.field, at[e][0], uv, wanted[e])
@@ -111,7 +118,7 @@ def _side(face: Face, name: int, brep: Brep, points: dict[int, Floats]) -> _Side
     return _Side(face, patch, loops, coarse, kinks_of(patch, coarse), field_of(patch, coarse))
 
 
-def _uses(brep: Brep, sides: list[_Side]) -> dict[int, list[tuple[_Side, Floats]]]:
+def _uses(sides: list[_Side]) -> dict[int, list[tuple[_Side, Floats]]]:
     """For every edge, the faces it bounds and its first places in their parameters, in its own direction."""
     out: dict[int, list[tuple[_Side, Floats]]] = {}
     for side in sides:
@@ -122,9 +129,7 @@ def _uses(brep: Brep, sides: list[_Side]) -> dict[int, list[tuple[_Side, Floats]
     return out
 
 
-def _wanted(
-    sizes: Sizes, t: Floats, at: tuple[Floats, Floats, Floats], uvs: list[Floats], sides: list[_Side]
-) -> Floats:
+def _wanted(sizes: Sizes, at: tuple[Floats, Floats, Floats], uvs: list[Floats], sides: list[_Side]) -> Floats:
     """(k,) edge lengths along an edge: its own curvature and the faces beside it, slowly changing."""
     point, tangent, bend = at
     h = sizes.at(curvature(tangent, bend))
@@ -182,7 +187,7 @@ def _divided(
         edge = brep.edges[e]
         ends = frozenset((edge.start, edge.end))
         least = 3 if len(ends) == 1 else 2 if alike[ends] > 1 else 1
-        t = _parameters(edge, first[e], at[e], wanted[e], marks[e], least, sizes)
+        t = _parameters(edge, first[e], wanted[e], marks[e], least, sizes)
         points = evaluate_curve(edge.curve, t)[0]
         points[0], points[-1] = brep.vertices[edge.start], brep.vertices[edge.end]
         inner = np.arange(next_id, next_id + len(t) - 2)
@@ -194,7 +199,6 @@ def _divided(
 def _parameters(
     edge: Edge,
     t: Floats,
-    at: tuple[Floats, Floats, Floats],
     wanted: Floats,
     marks: Floats,
     least: int,

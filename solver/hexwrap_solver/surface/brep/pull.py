@@ -25,7 +25,7 @@ from hexwrap_solver.surface.types import NurbsSurface
 LINES, MOST_LINES = 16, 160
 #: This many grid points are tried where the nearest one leads astray.
 ATTEMPTS = 6
-#: Points far off are pulled again from their neighbours in so many rounds.
+#: Points far off are pulled again from their neighbours in this many rounds.
 FOLLOWED = 8
 #: A parameter whose whole range moves a point by less than this part of the surface's size is free there.
 POLE = 1e-6

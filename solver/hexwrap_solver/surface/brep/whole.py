@@ -8,9 +8,22 @@ import scipy
 from hexwrap_solver.arrays import Floats
 from hexwrap_solver.surface.brep.curves import evaluate_curve
 from hexwrap_solver.surface.brep.types import Brep, Edge, Face, NurbsCurve, Trim
+from hexwrap_solver.surface.checks import check_extent, check_finite
 from hexwrap_solver.surface.nurbs import domain
-from hexwrap_solver.surface.nurbs_checks import closed_within, collapsed
+from hexwrap_solver.surface.nurbs_checks import check_data, closed_within, collapsed
 from hexwrap_solver.surface.types import NurbsSurface, premultiplied
+
+
+def check_brep(brep: Brep | NurbsSurface) -> None:
+    """Raises NurbsDataError, NonFiniteError, FlatSurfaceError."""
+    surfaces = [face.surface for face in brep.faces] if isinstance(brep, Brep) else [brep]
+    for surface in surfaces:
+        check_data(surface)
+    for edge in brep.edges if isinstance(brep, Brep) else ():
+        check_finite(edge.curve.control_points, "Control point of an edge")
+    nets = [surface.control_points[..., :3].reshape(-1, 3) for surface in surfaces]
+    if nets:
+        check_extent(float(np.linalg.norm(np.ptp(np.concatenate(nets), axis=0))))
 
 
 def brep_of_surface(nurbs: NurbsSurface, tolerance: float) -> Brep:

@@ -1,4 +1,4 @@
-"""Makes the bundled samples: ``python -m hexwrap_server.samples.make``."""
+"""Makes the bundled samples: ``python server/make_samples.py``."""
 
 from __future__ import annotations
 
@@ -474,4 +474,4 @@ def make(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    make(Path(__file__).parent)
+    make(Path(__file__).parent / "hexwrap_server" / "samples")
