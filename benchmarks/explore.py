@@ -51,11 +51,13 @@ def main() -> None:
     parser.add_argument("--same", action="store_true", help="explore it ten times with the same seed")
     parser.add_argument("--vertices", type=int, help="run: a tower of that many, not a sample")
     asked = parser.parse_args()
-    name = (asked.samples or ["tower"])[0]
+    first = (asked.samples or ["tower"])[0]
     if asked.run:
-        return run(name, asked.vertices)
+        run(first, asked.vertices)
+        return
     if asked.same:
-        return same(name)
+        same(first)
+        return
     worst = 0.0
     columns = ("sample", "ends", "cells", *(f"{k or 'own'} sizes" for k in SIZES), "s")
     table = ["| " + " | ".join(columns) + " |", "| --- " * len(columns) + "|"]
