@@ -116,7 +116,7 @@ class Chart:
         self._seat(cones, self.energy.unknowns_of(found.u), found.corners)
 
     def _wanted(self, surface: Surface, cones: Ints) -> Targets:
-        return self._targets(surface, vertex=cones, angles=_extended(self._angles, surface))
+        return self._targets(surface, vertex=cones, angles=extended(self._angles, surface))
 
     def _seat(self, cones: Ints, x: Floats, corners: Corners) -> None:
         """x, corners: the map with the singularities at these vertices."""
@@ -315,7 +315,7 @@ class Chart:
         return np.array(images, dtype=complex), np.array(turns, dtype=np.int64)
 
 
-def _extended(angles: Floats | None, surface: Surface) -> Floats | None:
+def extended(angles: Floats | None, surface: Surface) -> Floats | None:
     """Target angles of new vertices, too: on a loop they are straight."""
     if angles is None:
         return None

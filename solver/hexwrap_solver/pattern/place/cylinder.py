@@ -10,8 +10,11 @@ import numpy as np
 from hexwrap_solver.arrays import Complexes, Floats, Ints
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.pattern.lattice import Isometry, Lattice
+from hexwrap_solver.pattern.place.deform import distortion_of
+from hexwrap_solver.pattern.place.glued import Glued
 from hexwrap_solver.pattern.place.placement import BEARABLE, Placement, anchor_vertex, edge_angle, is_straight
 from hexwrap_solver.pattern.place.rows import Rows, rows_along
+from hexwrap_solver.pattern.place.sides import is_line
 from hexwrap_solver.pattern.place.size import edges_around, fitting_number, size_spread, width_per_cell
 from hexwrap_solver.pattern.types import PatternSettings
 
@@ -37,7 +40,7 @@ def place_on_cylinder(
 ) -> Placement:
     """Scale and rotation follow from the translation; height and turn from the loops to align and ``phase``.
 
-    loops: straight ones, on each of which a lattice line shall lie.
+    loops: straight ones, or nearly, on each of which a lattice line shall lie.
     """
     angle = edge_angle(lattice, settings)
     strip = _strip(cmap, anchor_vertex(cmap), loops)
@@ -67,11 +70,13 @@ def place_on_cylinder(
         phase = lattice.without_translations((around_by + 1j * settings.phase[1] * rows.period) * unit) / unit
     place = strip.place.real * scale + 1j * _heights(strip, rows, loops, scale * stretch)
     place = (place + phase) * unit
-    distortion = max(stretch, 1 / stretch) - 1
+    distortion, motion = max(stretch, 1 / stretch) - 1, Isometry(lattice, 0, (int(T[0]), int(T[1])))
+    if not all(is_line(cmap, loop) for loop in loops):
+        distortion = distortion_of(cmap, Glued.by_sheets(cmap, motion), place)
     return Placement.on_annulus(
         cmap,
         place,
-        Isometry(lattice, 0, (int(T[0]), int(T[1]))),
+        motion,
         angle_taken(lattice, along, angle),
         around,
         distortion,
@@ -90,9 +95,12 @@ def _strip(cmap: ConformalMap, anchor: int, loops: list[int]) -> _Strip:
     t = cmap.deck.translation
     place = (cmap.uv - cmap.uv[anchor]) * np.conj(t) / abs(t)
     low, high = (float(place[loop].imag.mean()) for loop in cmap.surface.loops[:2])
-    for which in loops:
-        loop = cmap.surface.loops[which]
-        place[loop] = place[loop].real + 1j * (low, high)[which]  # straight but for rounding; made exactly so
+    for which in loops:  # nearly straight, made exactly so; what that takes fades towards the other loop
+        loop, height = cmap.surface.loops[which], (low, high)[which]
+        here = place[loop]
+        fade = np.clip(1 - abs(place.imag - height) / abs(high - low), 0.0, 1.0)
+        place -= 1j * fade * np.interp(place.real, here.real, here.imag - height, period=abs(t))
+        place[loop] = here.real + 1j * height
     return _Strip(place, abs(t), (low, high), int(anchor in cmap.surface.loops[1]))
 
 

@@ -15,6 +15,8 @@ from hexwrap_solver.pattern.lattice import Isometry, Lattice
 
 #: A boundary is straight where it turns by less than this altogether, a corner quantized within it; rad.
 QUANTIZED = 0.02
+#: Where it turns by less than this, it is straight but for rounding (of given angles, too).
+ROUNDING = 1e-5
 
 
 @dataclass(frozen=True)
@@ -54,6 +56,11 @@ def curvatures(cmap: ConformalMap, loop: int) -> Floats:
 def has_corners(cmap: ConformalMap, lattice: Lattice, loop: int) -> bool:
     """Whether a loop has corners of quantized angles."""
     return bool(corners_of(curvatures(cmap, loop), lattice).any())
+
+
+def is_line(cmap: ConformalMap, loop: int) -> bool:
+    """Whether a loop is straight but for rounding."""
+    return bool(abs(np.cumsum(curvatures(cmap, loop))).max() < ROUNDING)
 
 
 def is_polygon(cmap: ConformalMap, lattice: Lattice, loop: int) -> bool:
