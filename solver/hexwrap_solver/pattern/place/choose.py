@@ -44,6 +44,7 @@ from hexwrap_solver.pattern.place.placement import (
 from hexwrap_solver.pattern.place.sides import has_corners, is_polygon
 from hexwrap_solver.pattern.place.size import FREE, mean_stretch, size_spread, wanted_edge
 from hexwrap_solver.pattern.types import PatternSettings
+from hexwrap_solver.tolerances import RELATIVE
 
 #: Features are made straight where that costs no more than this at all but one triangle of a hundred, as
 #: predicted, and than that at the worst; above FINE, a number of cells around at which they cost less than
@@ -290,7 +291,7 @@ class PlacementFamily:
         points = self.cmap.surface.vertices
         size = float(np.ptp(points, axis=0).max())
         point = points[vertex]
-        return "(" + ", ".join(f"{x:.4g}" for x in np.where(abs(point) < 1e-9 * size, 0.0, point)) + ")"
+        return "(" + ", ".join(f"{x:.4g}" for x in np.where(abs(point) < RELATIVE * size, 0.0, point)) + ")"
 
     @cached_property
     def cell(self) -> float:
