@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from hexwrap_solver.tolerances import RELATIVE
+
 #: Coordinates below this have six significant digits, larger ones two decimals.
 LARGE = 1e5
 
@@ -21,7 +23,7 @@ def box(size: Iterable[float]) -> str:
 def place(point: Iterable[float]) -> str:
     """Coordinates in parentheses; what is rounding beside the largest is 0."""
     values = list(point)
-    least = 1e-9 * max(map(abs, values), default=0.0)
+    least = RELATIVE * max(map(abs, values), default=0.0)
     return "(" + ", ".join(_coordinate(x) if abs(x) > least else "0" for x in values) + ")"
 
 

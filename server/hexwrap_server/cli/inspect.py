@@ -29,7 +29,7 @@ def print_content(console: Console, data: bytes, filename: str, settings: Surfac
     surface: Surface | None = None
     refusal = ""
     try:
-        chosen = chosen_of(content, data, filename, settings)
+        chosen = chosen_of(content, filename, settings)
         surface = take_in(as_sent(content, chosen, settings), settings)
     except HexwrapError as error:
         refusal = error.detail

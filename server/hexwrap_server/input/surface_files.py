@@ -83,12 +83,12 @@ def read_file(data: bytes, filename: str) -> FileContent:
 
     Raises FileTypeError for other suffixes, UnreadableFileError for files that are broken.
     """
-    return _guarded(data, filename, lambda suffix: READERS[suffix](data))
+    return _guarded(filename, lambda suffix: READERS[suffix](data))
 
 
 def read_surface(data: bytes, filename: str, settings: SurfaceSettings | None = None) -> Chosen:
     """The surface that is meant. Raises as read_file does, and NoObjectError, SeveralObjectsError."""
-    return chosen_of(read_file(data, filename), data, filename, settings or SurfaceSettings())
+    return chosen_of(read_file(data, filename), filename, settings or SurfaceSettings())
 
 
 def sent_surface(
@@ -96,13 +96,13 @@ def sent_surface(
 ) -> FromFile:
     """The surface that is meant, and how it is to be taken in. Raises as read_surface does."""
     content = read_file(data, filename)
-    chosen = chosen_of(content, data, filename, settings)
+    chosen = chosen_of(content, filename, settings)
     return FromFile(as_sent(content, chosen, settings, max_vertices), rows(content.objects, chosen.used))
 
 
-def chosen_of(content: FileContent, data: bytes, filename: str, settings: SurfaceSettings) -> Chosen:
+def chosen_of(content: FileContent, filename: str, settings: SurfaceSettings) -> Chosen:
     """The surface that is meant of what was read. Raises NoObjectError, SeveralObjectsError."""
-    return _guarded(data, filename, lambda _: choose(content, settings.object, settings.layer, settings.unit))
+    return _guarded(filename, lambda _: choose(content, settings.object, settings.layer, settings.unit))
 
 
 def as_sent(
@@ -126,7 +126,7 @@ def as_sent(
     )
 
 
-def _guarded(data: bytes, filename: str, read: Callable[[str], T]) -> T:
+def _guarded(filename: str, read: Callable[[str], T]) -> T:
     suffix = PurePath(filename).suffix.lower()
     if suffix not in READERS:
         what = f"Files of type {suffix}" if suffix else "Files without a suffix"

@@ -21,8 +21,8 @@ from hexwrap_solver.tolerances import is_zero
 Numbers = TypeVar("Numbers", Floats, Complexes)
 
 #: An apex further away than this many times the size of the domain is not made the origin: coordinates would
-#: lose the digits in which they agree.
-FAR = 100.0
+#: lose the digits in which they agree (a scan of 50,000 vertices that shrinks in places to 1e-11).
+FAR = 3.0
 #: Shorter edges, relative to the longest one, count as so long where squares of lengths are weights.
 FINEST = 1e-100
 #: A translation shorter than this, relative to the domain, is none (flat rings that close up by themselves).

@@ -281,8 +281,8 @@ def _polygons(fitted: FittedPanels, length: Floats) -> Ragged:
     offsets = np.concatenate([[0], np.cumsum(count)]).astype(np.int64)
     points = np.zeros((int(offsets[-1]), 3))
     is_regular = np.repeat(regular, count)
-    center = fitted.center[regular]
-    points[is_regular] = center[spokes.row] + length[spokes.row, None] * spokes.values
+    center, row = fitted.center[regular], spokes.row
+    points[is_regular] = center.take(row, axis=0) + length.take(row)[:, None] * spokes.values
     points[~is_regular] = fitted.shapes.values
     return Ragged(points, offsets)
 

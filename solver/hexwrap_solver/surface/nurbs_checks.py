@@ -12,6 +12,7 @@ from hexwrap_solver.surface.checks import LARGEST, SMALLEST, check_extent, check
 from hexwrap_solver.surface.errors import HandlesError, NotClosedError, NurbsDataError, PoleError
 from hexwrap_solver.surface.nurbs import domain, evaluate_points
 from hexwrap_solver.surface.types import NurbsSurface
+from hexwrap_solver.tolerances import RELATIVE
 from hexwrap_solver.words import place
 
 NAMES = "uv"
@@ -194,7 +195,7 @@ def _narrowest(nurbs: NurbsSurface, direction: int, low: float, high: float) -> 
         lambda x: _extent(nurbs, direction, x),
         bounds=(low, high),
         method="bounded",
-        options={"xatol": 1e-9 * (high - low), "maxiter": 100},
+        options={"xatol": RELATIVE * (high - low), "maxiter": 100},
     )
     return float(found.x)
 

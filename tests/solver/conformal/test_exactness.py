@@ -283,7 +283,7 @@ def test_powers_of_g_form_a_group(
         np.testing.assert_allclose(g.apply(np.array([g.apex]), a), g.apex, rtol=1e-11, atol=1e-11)
 
 
-@pytest.mark.parametrize("angle", [1e-2, 1e-5, 1e-8, -1e-8])
+@pytest.mark.parametrize("angle", [5e-2, 1e-2, 1e-5, 1e-8, -1e-8])
 def test_cones_that_are_nearly_cylinders_keep_their_digits(angle: float) -> None:
     """The apex is far away; neither uv nor g may lose digits to it."""
     condition = corners_at(
@@ -293,7 +293,7 @@ def test_cones_that_are_nearly_cylinders_keep_their_digits(angle: float) -> None
     cmap = conformal_map(TOWER, condition)
     assert_honest(cmap)
     assert cmap.deck.angle == pytest.approx(angle, rel=1e-6)
-    assert np.abs(cmap.uv).max() < 1e3
+    assert np.abs(cmap.uv).max() < 5 * (np.ptp(cmap.uv.real) + np.ptp(cmap.uv.imag))
     cylinder = conformal_map(TOWER, BoundaryCondition())
     assert cmap.circumference == pytest.approx(cylinder.circumference, rel=10 * abs(angle))
 
