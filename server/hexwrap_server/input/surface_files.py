@@ -83,7 +83,22 @@ def read_file(data: bytes, filename: str) -> FileContent:
 
     Raises FileTypeError for other suffixes, UnreadableFileError for files that are broken.
     """
-    return _guarded(filename, lambda suffix: READERS[suffix](data))
+    return _guarded(filename, lambda suffix: _read(data, suffix))
+
+
+def _read(data: bytes, suffix: str) -> FileContent:
+    if not data:
+        raise UnreadableFileError("The file is empty: save or export it again.")
+    try:
+        return READERS[suffix](data)
+    except UnreadableFileError as error:
+        other = next((end for start, end in BEGINNINGS.items() if data.startswith(start)), suffix)
+        if other in (suffix, ".zip" if suffix == ".npz" else suffix):
+            raise
+        instead = f" Of files of that type: {INSTEAD[other]}." if other in INSTEAD else ""
+        raise UnreadableFileError(
+            f"The file begins like a {other} file: give it the ending {other}.{instead}"
+        ) from error
 
 
 def read_surface(data: bytes, filename: str, settings: SurfaceSettings | None = None) -> Chosen:
@@ -134,18 +149,8 @@ def _guarded(filename: str, read: Callable[[str], T]) -> T:
         raise FileTypeError(
             f"{what} cannot be read as a surface: {instead}. Send the surface as one of {', '.join(READERS)}."
         )
-    if not data:
-        raise UnreadableFileError(f"The file {PurePath(filename).name} is empty: save or export it again.")
     try:
         return read(suffix)
-    except UnreadableFileError as error:
-        other = next((end for start, end in BEGINNINGS.items() if data.startswith(start)), suffix)
-        if other in (suffix, ".zip" if suffix == ".npz" else suffix):
-            raise
-        raise UnreadableFileError(
-            f"The file {PurePath(filename).name} begins like a {other} file: give it the ending {other}."
-            + (f" Files of that type: {INSTEAD[other]}." if other in INSTEAD else "")
-        ) from error
     except SurfaceError:
         raise
     except (Exception, MemoryError) as error:  # foreign readers fail in every way on broken files
