@@ -213,7 +213,7 @@ def test_of_one_pattern_every_loop_is_straightened_once(monkeypatch):
 
 
 def test_an_end_that_is_nearly_straight_is_made_so_gently_and_what_that_takes_is_told():
-    """A wavy end of a cylinder, whose map is its unrolling: the wave is a good part of a cell high in the domain."""
+    """A wavy end of a cylinder, whose map is its unrolling: so high is the wave in the domain."""
     n, rows = 96, 24
     base = annuli.revolution(lambda z: 1 + 0 * z, np.linspace(0, 2, rows + 1), n)
     points = base.surface.vertices.copy()
