@@ -206,10 +206,10 @@ def _loops(cmap: ConformalMap, frame: Frame, unrolled: Unrolled) -> list[str]:
         first, last = _straight_piece(places, unrolled.end[sides], place, 1 / frame.scale)
         along = last - first
         size = float(
-            np.clip(abs(along) * frame.scale / (CHARACTER * len(f"loop {number} →")), SMALLEST, LARGEST)
+            np.clip(0.8 * abs(along) * frame.scale / (CHARACTER * len(f"loop {number} →")), SMALLEST, LARGEST)
         )
         at = (unrolled.start[middle] + unrolled.end[middle] if size == LARGEST else first + last) / 2
-        away = along / abs(along) * -1j * ROOM * size / LARGEST / frame.scale
+        away = along / abs(along) * -1j * ROOM / frame.scale
         x, y = frame.at(at + away)
         turn = -np.degrees(np.angle(along))
         arrow, turn = ("→", turn) if abs(turn) <= 90 else ("←", turn - np.copysign(180, turn))
