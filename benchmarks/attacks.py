@@ -1,7 +1,7 @@
 """What attacks cost a server with its default settings: python benchmarks/attacks.py
 
 Each row: the statuses answered, seconds, the highest memory in MiB of the server and of the largest of
-its processes, and the slowest answer of /health meanwhile. Bodies unpack to 200 MiB.
+its processes, and the slowest answer of /health meanwhile. Bodies unpack to 100 MiB.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         data, port = Path(folder), free_port()
         many_jobs(data, 1000)
-        options = {"base_url": f"http://127.0.0.1:{port}", "timeout": 120.0, "trust_env": False}
+        options = {"base_url": f"http://127.0.0.1:{port}", "timeout": 300.0, "trust_env": False}
         with (
             served(data, port, workers=2) as process,
             httpx.Client(**options, limits=httpx.Limits(max_connections=None)) as client,
             httpx.Client(**options) as health,
         ):
-            target = Target(process, client, health, data, bomb=200)
+            target = Target(process, client, health, data, bomb=100)
             for attack in ATTACKS:
                 answers, cost = measured(target, attack)
                 found = ", ".join(map(str, sorted({answer.status_code for answer in answers})))

@@ -190,7 +190,7 @@ def test_3dm_has_a_coloured_layer_per_size_and_data_on_every_panel(solution: Sol
 
 def named(solution: Solution, unit: str | None) -> Solution:
     """The same, as if it came from a Rhino file."""
-    origin = Origin("tower", "Facade::Outer", (("material", "glass"),))
+    origin = Origin("tower", "Facade::Outer", (("material", "glass"),), 0.02)
     surface = replace(solution.map.surface, unit=unit, origin=origin)
     return replace(solution, map=replace(solution.map, surface=surface))
 
@@ -202,6 +202,7 @@ def test_what_came_in_goes_out(solution: Solution) -> None:
     made = replace(made, map=replace(made.map, surface=far))
     model = rhino3dm.File3dm.FromByteArray(write("panels.3dm", made, ODD))
     assert model.Settings.ModelUnitSystem == rhino3dm.UnitSystem.Millimeters
+    assert model.Settings.ModelAbsoluteTolerance == 0.02
     paths = {layer.Index: layer.FullPath for layer in model.Layers}
     assert "Facade::Outer::panels" in paths.values()
     panels = [o for o in model.Objects if o.Geometry.ObjectType == rhino3dm.ObjectType.Curve]

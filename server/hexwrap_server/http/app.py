@@ -44,9 +44,9 @@ GRACE = 2
 #: Connections that may wait to be accepted. Where no file handle is free, asyncio tries this many in a row,
 #: and with more all else waits.
 BACKLOG = 128
-#: Seconds that a connection stays open between requests: longer than most clients keep theirs, so that no
-#: request meets its end.
-KEEP_ALIVE = 60
+#: Seconds that a connection stays open between requests: longer than clients that would not see it end keep
+#: theirs (httpx: five), and no longer, since each holds a file handle.
+KEEP_ALIVE = 10
 log = logging.getLogger("hexwrap.server")
 
 

@@ -43,6 +43,8 @@ class Service:
         self.engine = engine or make_engine(settings)
         self.errands = ProcessEngine(2, ERRANDS_PRELOAD, warm=1)
         self.readers = ProcessEngine(settings.readers, ERRANDS_PRELOAD, warm=0)
+        #: Those of them that are free.
+        self.free_readers = asyncio.Semaphore(settings.readers)
         #: Bytes of request bodies in memory.
         self.body_bytes = 0
         self.manager = JobManager(self.store, self.engine, settings, self.metrics, self.errand)
@@ -89,7 +91,8 @@ class Service:
     async def read(self, function: str, body: Body, *arguments: Any, is_file: bool = False) -> Any:
         """Have a body read in a process, as ``function(report, body, settings, *arguments)``.
 
-        Raises what the function raises, TimeLimitError and MemoryLimitError.
+        Raises what the function raises, TimeLimitError and MemoryLimitError; HttpError where none is free for
+        as long as a reading may take.
         """
         settings = self.settings
         if not is_file and len(body.data) <= SMALL_BODY * MIB:
@@ -99,7 +102,21 @@ class Service:
             except HttpError as error:
                 if error.status != 413 or small == settings:
                     raise
-        return await self._read(self.readers, function, body, settings, *arguments)
+        try:
+            async with asyncio.timeout(settings.read_seconds):
+                await self.free_readers.acquire()
+        except TimeoutError:
+            raise HttpError(
+                503,
+                "too-many-bodies",
+                "Too many large bodies at once",
+                f"Other bodies were being read for {settings.read_seconds:g} s; try again in a moment.",
+                {"Retry-After": "5"},
+            ) from None
+        try:
+            return await self._read(self.readers, function, body, settings, *arguments)
+        finally:
+            self.free_readers.release()
 
     async def _read(self, engine: ProcessEngine, function: str, *arguments: Any) -> Any:
         seconds, mib = self.settings.read_seconds, self.settings.read_mib

@@ -6,12 +6,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from hexwrap_server.output.colours import encoded, from_hex, linear
 from hexwrap_server.output.raster import Camera, Polygons, draw, planes
-from hexwrap_solver.arrays import Bools, Floats
+from hexwrap_solver.arrays import Floats
 
 #: Pixels: the model is fitted into this box, with room around it for its shadow on the ground.
 HEIGHT, WIDTH, MARGIN = 1600, 1460, 100
@@ -28,8 +27,6 @@ SUN_MAP, BIAS = 700, 0.014
 TAPS, PENUMBRA = 6, 2.2
 GROUND_TAPS, GROUND_BLUR, GROUND_STEP = 24, 15.0, 6
 SUNLIGHT, SKYLIGHT, GLOSS, GLOSS_EXPONENT = 0.70, 0.52, 0.10, 40.0
-#: Blur radii in pixels, depths in radii of the model, over which hollows darken; pixels per blurred one.
-HOLLOWS = ((6.0, 0.03, 2), (40.0, 0.25, 8))
 #: The backs of the panels keep this much of their colour.
 SHELL, BACK, BACK_COLOUR = "#4a4f58", "#b3b0ab", 0.25
 #: How far behind the shell a panel is still seen, in parts of its radius.
@@ -65,13 +62,12 @@ def render(scene: Scene) -> NDArray[np.uint8]:
     shell = scene.shell.take(facing)
     drawn = scene.panels.join(shell)
     n_panels = scene.panels.outline.n_rows
-    owner, nearest = _visible(camera, scene.panels, shell)
+    owner = _visible(camera, scene.panels, shell)
     sun = _sun(scene, points, radius)
     direct, sky = _light(scene, drawn, camera, sun)
     middle = owner[FINE // 2 :: FINE, FINE // 2 :: FINE]
     sunny = np.append(direct[:-1].any(axis=1), False)  # the last is for no polygon
     lit = _lit(camera, drawn, np.where(sunny[middle], middle, -1), sun, scene, points, radius)
-    sky_seen = _openness(nearest[FINE // 2 :: FINE, FINE // 2 :: FINE], radius)
     outline = _outline(owner, n_panels)
     ground = direct[-1, 0] * lit + sky[-1, 0]  # grey: one channel
     image = np.repeat(_shade(ground)[..., None], 3, axis=2)
@@ -79,16 +75,14 @@ def render(scene: Scene) -> NDArray[np.uint8]:
     shown = np.flatnonzero(np.maximum.reduce([owner[of] for of in samples]) >= 0)
     # Half the memory of the usual numbers, and twice the speed: these are millions of samples.
     tables = direct.astype(np.float32), sky.astype(np.float32)
-    sun_there, sky_there = (light.ravel()[shown, None].astype(np.float32) for light in (lit, sky_seen))
+    sun_there = lit.ravel()[shown, None].astype(np.float32)
     model = np.zeros((len(shown), 3), dtype=np.float32)
     for of in samples:
         row = owner[of].ravel()[shown]
         row[row < 0] = len(direct) - 1  # the ground
         light = tables[0].take(row, axis=0)
         light *= sun_there
-        from_sky = tables[1].take(row, axis=0)
-        from_sky *= sky_there
-        light += from_sky
+        light += tables[1].take(row, axis=0)
         light *= outline[of].ravel()[shown, None]
         model += light
     image.reshape(-1, 3)[shown] = _shade(model / FINE**2)
@@ -101,7 +95,7 @@ def _shade(light: NDArray[Any]) -> NDArray[np.uint8]:
     return table.take((light * SHADES).astype(np.int32), mode="clip")
 
 
-def _visible(camera: Camera, panels: Polygons, shell: Polygons) -> tuple[NDArray[np.int32], Floats]:
+def _visible(camera: Camera, panels: Polygons, shell: Polygons) -> NDArray[np.int32]:
     """As ``draw`` of panels and shell together, but a panel may dip into the shell by part of its size."""
     owner, nearest = draw(camera, panels)
     behind, depth = draw(camera, shell)
@@ -115,8 +109,7 @@ def _visible(camera: Camera, panels: Polygons, shell: Polygons) -> tuple[NDArray
     # Where no panel stands the last row is read: nothing reaches that far.
     seen = there[sunk > reach[before]]
     owner.ravel()[seen] = behind.ravel()[seen] + panels.outline.n_rows
-    nearest.ravel()[seen] = depth.ravel()[seen]
-    return owner, nearest
+    return owner
 
 
 def _camera(points: Floats, radius: float, view: Floats) -> Camera:
@@ -238,23 +231,6 @@ def _fade(shape: tuple[int, ...]) -> Floats:
     rows, columns = (np.minimum(np.arange(n), n - 1 - np.arange(n)) for n in shape)
     t = np.clip(np.minimum(rows[:, None], columns) / FADE, 0, 1)
     return np.asarray(t * t * (3 - 2 * t))
-
-
-def _openness(nearest: Floats, radius: float) -> Floats:
-    """(h, w) how much of the sky a pixel sees: less where its surroundings stand nearer to the viewer."""
-    there: Bools = nearest > 0
-    depth = np.where(there, 1.0 / np.where(there, nearest, 1.0), 0.0)
-    light = np.ones(nearest.shape)
-    for blur, reach, coarse in HOLLOWS:
-        weight, total = (
-            scipy.ndimage.gaussian_filter(
-                image[::coarse, ::coarse].astype(np.float64), blur / coarse, truncate=2.5
-            )
-            for image in (there, depth)
-        )
-        around = _enlarged(total / np.maximum(weight, 1e-9), nearest.shape)
-        light *= 1 - 0.5 * np.clip((depth - around) / (reach * radius), 0, 1)
-    return np.where(there, light, 1.0)
 
 
 def _enlarged(image: Floats, shape: tuple[int, ...]) -> Floats:

@@ -66,7 +66,7 @@ def conformal_map(
     if found is None:
         targets = boundary.targets(surface, [a for a in angles if a is not None], cones)
         found = map_to(surface, targets, cones, None, progress)
-        found = scaled(found, -_mean_on_area(found.surface, found.log_scale))
+        found = on_area(found)
         if found.surface is surface and not found.flips and not len(cones):
             found = replace(found, notes=(*found.notes, *corner_notes(surface, targets, found.log_scale)))
     if condition.mode == "angles" and not condition.angles:
@@ -152,8 +152,7 @@ def map_of_curvatures(surface: Surface, curvature: Floats, progress: Progress = 
     """The map with u constant along every loop, whose curvature is prescribed, (b,) radians; that of the
     first is what Gauss–Bonnet leaves. Raises ConvergenceError."""
     targets = boundary.targets(surface, [float(K) for K in curvature])
-    found = map_to(surface, targets, Cones.none(), None, progress)
-    return scaled(found, -_mean_on_area(found.surface, found.log_scale))
+    return on_area(map_to(surface, targets, Cones.none(), None, progress))
 
 
 def _rim_notes(found: ConformalMap, loops: list[int]) -> tuple[str, ...]:
@@ -284,10 +283,12 @@ def _finish(plain: _Plain, cones: Cones) -> ConformalMap:
     )
 
 
-def _mean_on_area(surface: Surface, u: Floats) -> float:
-    """Area-weighted mean of u: the domain is as large as the surface on (geometric) average."""
-    a, b, c = surface.faces.T
-    return float(surface.areas @ (u[a] + u[b] + u[c]) / (3 * surface.areas.sum()))
+def on_area(found: ConformalMap) -> ConformalMap:
+    """Scaled so that the area-weighted mean of u is 0: the domain is as large as the surface on (geometric)
+    average."""
+    surface, u = found.surface, found.log_scale
+    mean = surface.areas @ u[surface.faces].sum(axis=1) / (3 * surface.areas.sum())
+    return scaled(found, -float(mean))
 
 
 def _mean_on(found: ConformalMap, loops: list[int]) -> float:

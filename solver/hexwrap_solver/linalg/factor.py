@@ -271,7 +271,7 @@ def _analyse(tree: Dissection, low: Ints, high: Ints) -> tuple[list[_Front], lis
     in_rest = np.searchsorted(every, parent[front] * n + unknown) - begin[parent[front]]
     split = begin[:-1] + np.bincount(front, weights=to_own, minlength=nodes).astype(np.int64)
     offset = np.concatenate([[0], np.cumsum(size * (size + np.diff(begin)))])
-    visits, stack, update, sizes = _stacked(np.diff(begin), tree.depth)
+    visits, stack, update, sizes = _stacked(np.diff(begin))
     fronts = [
         _Front(
             int(tree.start[i]),
@@ -295,7 +295,7 @@ def _children(i: int, nodes: int) -> tuple[int, ...]:
     return (nodes - 1 - left, nodes - 2 - left) if left < nodes else ()
 
 
-def _stacked(b: Ints, depth: int) -> tuple[list[int], list[int], list[int], list[int]]:
+def _stacked(b: Ints) -> tuple[list[int], list[int], list[int], list[int]]:
     """Fronts visited children first, left before right, so that only the updates along one way up wait. A
     front's update and those of its children are needed at once, so levels take turns on two stacks: what is
     pushed on one lies above all that still waits there.

@@ -37,7 +37,7 @@ class Bound:
 
 
 def jointly_largest(
-    groups: list[Bound], partner: Ints, joint: float, progress: Progress = no_progress
+    groups: list[Bound], partner: Ints, progress: Progress = no_progress
 ) -> tuple[Floats, Floats]:
     """Lengths (r,) and centres (r, 3) with the greatest total area to first order, without overlap.
 

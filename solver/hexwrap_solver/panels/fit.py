@@ -399,7 +399,7 @@ def _limits(
         ]
         partner = _partners(np.concatenate([group.at.ravel() for group in groups]), edges)
         try:
-            return *jointly_largest(bound, partner, settings.joint, progress), ()
+            return *jointly_largest(bound, partner, progress), ()
         except ConvergenceError:
             return *_together([group.inscribed(planes) for group in groups]), JOINTLY_NOTE
     return *_together([_limit(group, planes, settings) for group in groups]), ()

@@ -1,9 +1,28 @@
 """Panels for cells cut at the boundary: flat, of the cell's own shape, and clear of their neighbours.
 
-A panel may reach the separating planes of its edges (``separation``), so its corners are laid where these
-meet in the panel's plane. A plane that binds the whole panel must have all of it on one side. Where a sliver
-was joined to a cell, the outline has a reflex corner with the same neighbour on both of its edges; the
-neighbour then stands in the wedge between the two planes, and the panel need only stay out of that.
+Each edge of a cell that has a neighbour has a plane that separates the two panels (``separation``). In the
+panel's own plane it is a line s · x = h, with s of length 1 pointing outwards; the panel must stay where
+s · x ≤ h. A regular panel is shrunk until it does. A cut cell has no shape to keep, so that its corners may
+go to these lines one by one, in three steps.
+
+Mitres. Imagine a picture frame whose sides are moved, each along its own normal: a corner slides along its
+mitre, to where its two sides meet again. With u and v the normals of the edges before and behind a corner c,
+and e_u = h_u − u · c, e_v = h_v − v · c what is left to their lines, that place is
+
+    c + (e_v J u − e_u J v) / (u × v),   J a quarter turn to the left,
+
+since u · J v = −u × v and v · J u = u × v. Where u × v is nearly 0, the lines meet far off or nowhere: there
+the corner goes straight back along u + v, behind both. Edges that would turn round keep their ends.
+
+Clipping. A line binds the whole panel, not only its own edge: an outline that is not convex may reach over
+the line of an edge far from there. So it is clipped at each line in turn, as by Sutherland and Hodgman
+(1974); but corners beyond a line are not dropped. They are spread over the piece of the line that closes the
+gap, so that the panel keeps a corner for every corner of its cell.
+
+Wedges. Where a sliver was joined to the cell, the outline has a reflex corner with the same neighbour on both
+of its edges. The neighbour then stands in the wedge beyond both lines, and to be beyond one of them is no
+fault: these lines do not clip. Only where an edge of the outline passes through the wedge all the same, the
+first or the last line of the run is made to clip, whichever leaves more of the panel.
 """
 
 from __future__ import annotations

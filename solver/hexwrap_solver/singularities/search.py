@@ -46,6 +46,8 @@ DIRECTION = 100.0
 #: What a panel leaves open in a cell whose size changes by the share |∇u| over one cell's width: so much of
 #: that share (measured: 0.46 to 0.53 on real panels of tubes and domes, hexagons inside their cells).
 FIT = 0.5
+#: Share left open that is much: more singularities than enough are tried then.
+MUCH = 0.15
 #: Changes of the uncovered area that are none.
 SMALL = 2e-5
 
@@ -444,8 +446,8 @@ def curve(
     search: Search, starts: int = STARTS, refine: bool = True, patience: int | None = None
 ) -> list[Proposal]:
     """The best there is with 0, 1, 2, … singularities, as far as the rules allow and numbers are possible.
-    starts, refine: see ``ranked``. patience: numbers beyond the best at which it ends; None: only at
-    ``rules.most``."""
+    starts, refine: see ``ranked``. patience: numbers beyond the best at which it ends; None: only where there
+    are enough, or ``rules.most``."""
     found: dict[int, Proposal] = {}
     for states in ranked(search, starts, refine):
         for state in states:
@@ -457,7 +459,9 @@ def curve(
                 ):
                     found[count] = one
         least = min(found.values(), key=lambda one: one.uncovered, default=None)
-        if patience is not None and least is not None and max(found) >= least.count + patience:
+        if least is not None and patience is not None and max(found) >= least.count + patience:
+            break
+        if least is not None and max(found) >= search.rules.enough and least.uncovered <= MUCH:
             break
     return [found[number] for number in sorted(found)]
 

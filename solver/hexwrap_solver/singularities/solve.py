@@ -15,7 +15,7 @@ from hexwrap_solver.conformal.corners import asked_angles
 from hexwrap_solver.conformal.layout import lay_out
 from hexwrap_solver.conformal.net import Net
 from hexwrap_solver.conformal.openings import cut_openings
-from hexwrap_solver.conformal.solve import map_of_curvatures
+from hexwrap_solver.conformal.solve import map_of_curvatures, map_to, on_area
 from hexwrap_solver.conformal.types import QUANTA, BoundaryCondition, Cones, ConformalMap, Fitted
 from hexwrap_solver.errors import ConvergenceError, NotAdaptedError, SingularitiesError
 from hexwrap_solver.pattern.lattice import LATTICES, Lattice
@@ -28,9 +28,9 @@ from hexwrap_solver.pattern.place.size import (
     width_per_cell,
 )
 from hexwrap_solver.pattern.types import Kind, PatternSettings
-from hexwrap_solver.singularities.close import Chart, Closed, Closing, Line
+from hexwrap_solver.singularities.close import Chart, Closed, Closing, Line, extended
 from hexwrap_solver.singularities.drag import refined, rims
-from hexwrap_solver.singularities.linear import Tube, vertex_areas
+from hexwrap_solver.singularities.linear import Tube, targets, vertex_areas
 from hexwrap_solver.singularities.place import Proposals, given, place
 from hexwrap_solver.singularities.types import End, Proposal, Rules, SingularitySettings
 from hexwrap_solver.surface.holes import fill_openings
@@ -38,17 +38,16 @@ from hexwrap_solver.surface.types import Surface
 
 #: Size classes for which singularities are placed where every panel may have its own size.
 SIZES = 11
-#: Numbers of singularities tried where as many as pay are asked for, and how many more than the topology
-#: asks for.
-MOST, MORE = 8, 2
+#: Numbers of singularities tried where as many as pay are asked for; how many more than the topology asks
+#: for, and where that leaves much open.
+MOST, MORE, MANY = 8, 2, 18
 #: The size of the cells may change by this share, and by this one where a length is asked for.
 FREE, ASKED = 0.05, 0.015
 #: Where the least moves that close are longer than this, in cells, singularities are seated anew, this many
 #: times.
 FAR, AGAIN = 0.6, 2
-#: Where those chosen do not close, this many other numbers of singularities are tried, and then those chosen
-#: with cells smaller by these factors.
-OTHERS, FINER = 1, (1, 2)
+#: Where those chosen do not close, this many other numbers of singularities are tried.
+OTHERS = 1
 #: Closing is not tried anew once it was tried on meshes of so many vertices together; those on which it fails
 #: count this many times more.
 WORK, HARD = 100_000, 2
@@ -63,7 +62,7 @@ class Frame:
     """What the singularities of one surface are chosen and closed for.
 
     width: of a cell, which is that of the surface as of the domain. line: for straight loops that are to be
-    lattice lines; aligned: which ones. tube: where both are. sized: a size of the cells was asked for.
+    lattice lines; aligned: which ones. tube: where both are.
     """
 
     lattice: Lattice
@@ -73,7 +72,6 @@ class Frame:
     aligned: tuple[bool, ...]
     tube: Tube | None
     free_scale: float
-    sized: bool
 
 
 def needs_singularities(surface: Surface, boundary: BoundaryCondition) -> bool:
@@ -108,17 +106,19 @@ def frame_of(
     aligned = tuple(on and i < wanted and is_straight(lattice, angle) for i, on in enumerate(straight))
     tube = conformal_map(surface, BoundaryCondition("straight")) if len(surface.loops) == 2 else None
     width = _width(surface, lattice, pattern, angle, tube)
-    most = max(settings.count if isinstance(settings.count, int) else MOST, 1)
+    enough = most = max(settings.count if isinstance(settings.count, int) else MOST, 1)
     if "free" not in ends:
         missing = 6 * (2 - len(ends)) if lattice.order == 6 else 4 * (2 - len(ends))
         missing -= sum(round(float((np.pi - angles[loop]).sum()) / lattice.quantum) for loop in surface.loops)
-        most = max(most, abs(missing) + MORE) if settings.count in (None, "auto") else most
+        if settings.count in (None, "auto"):
+            enough, most = max(most, abs(missing) + MORE), max(most, abs(missing) + MANY)
     rules = Rules(
         lattice.quantum,
         width,
         sizes or SIZES,
         ends,
         most=most,
+        enough=enough,
         from_loops=settings.from_boundary,
         angles=angles if "angles" in ends else None,
         away=_lines(surface, settings, width),
@@ -133,8 +133,7 @@ def frame_of(
         straight_tube = Tube(tube.uv[:n] / tube.circumference, tube.log_scale[:n])
     free_scale = ASKED if pattern.edge_length is not None else FREE
     line = _line(lattice, angle, pattern.boundary) if any(aligned) else None
-    sized = pattern.edge_length is not None or pattern.around is not None
-    return Frame(lattice, rules, width, line, aligned, straight_tube, free_scale, sized)
+    return Frame(lattice, rules, width, line, aligned, straight_tube, free_scale)
 
 
 def _check_kind(lattice: Lattice, settings: SingularitySettings) -> None:
@@ -265,9 +264,9 @@ def closed_map(
     boundary: BoundaryCondition,
     progress: Progress = no_progress,
 ) -> ConformalMap:
-    """The map with the singularities that were chosen, moved until the pattern closes up. Without any: the
-    map for the boundary alone; with more loops than two, all free, that of the curvatures that were chosen
-    for these. Raises ConvergenceError."""
+    """The map with the singularities that were chosen, moved until the pattern closes up, or, where they
+    have to be and that fails, where they are. Without any: the map for the boundary alone; with more loops
+    than two, all free, that of the curvatures that were chosen for these. Raises ConvergenceError."""
     proposal = placing.proposal
     if surface.openings:
         return cut_openings(closed_map(fill_openings(surface), frame, placing, boundary, progress), surface)
@@ -275,40 +274,58 @@ def closed_map(
         if len(surface.loops) > 2 and set(frame.rules.ends) == {"free"}:
             return map_of_curvatures(surface, frame.rules.quantum * np.array(proposal.loops), progress)
         return conformal_map(surface, boundary, progress)
+    work = Work(WORK)
     try:
-        return first_that_closes(surface, frame, placing, progress)
+        return first_that_closes(surface, frame, placing, progress, work)
     except ConvergenceError as error:
         if placing.proposals[0].count:  # these are given, or it cannot be without
-            raise
+            return unmoved(frame, work.seats or Seats.of(surface, frame, proposal), progress)
         plain = conformal_map(surface, boundary, progress)
         note = f"{in_words(frame.lattice.kind, proposal.index).capitalize()} would pay, but are left out: "
         return replace(plain, notes=(*plain.notes, note + error.detail))
 
 
-def first_that_closes(surface: Surface, frame: Frame, placing: Proposals, progress: Progress) -> ConformalMap:
-    """With other singularities, and smaller cells where no size is asked for, if those chosen do not close:
-    the smaller the cells, the less they have to move. Raises ConvergenceError, that of the first."""
+def first_that_closes(
+    surface: Surface, frame: Frame, placing: Proposals, progress: Progress, work: Work
+) -> ConformalMap:
+    """With other singularities, if those chosen do not close. Raises ConvergenceError, that of the first."""
     failed: ConvergenceError | None = None
-    work = Work(WORK)
-    for part in FINER[:1] if frame.sized or not placing.proposals[0].count else FINER:
-        smaller = replace(frame, width=frame.width / part)
-        for chosen in (placing.chosen, *(placing.others[:OTHERS] if part == 1 else ())):
-            taken = replace(placing, chosen=chosen)
-            if failed is not None and work.left <= 0:
-                raise failed
-            try:
-                chart, found = closed_at(surface, smaller, taken.proposal, progress, work)
-            except ConvergenceError as error:
-                failed = failed or error
-                continue
-            cmap = as_map(smaller, chart, found, taken, surface)
-            changes = [*_changes(frame, placing, chosen, part)]
-            return replace(cmap, notes=(*cmap.notes, *changes))
+    for chosen in (placing.chosen, *placing.others[:OTHERS]):
+        taken = replace(placing, chosen=chosen)
+        if failed is not None and work.left <= 0:
+            raise failed
+        try:
+            chart, found = closed_at(surface, frame, taken.proposal, progress, work)
+        except ConvergenceError as error:
+            failed = failed or error
+            continue
+        cmap = as_map(frame, chart, found, taken, surface)
+        return replace(cmap, notes=(*cmap.notes, *_changes(frame, placing, chosen)))
     assert failed is not None
     raise failed
 
 
-def _changes(frame: Frame, placing: Proposals, chosen: int, part: int) -> Iterator[str]:
+def unmoved(frame: Frame, seats: Seats, progress: Progress) -> ConformalMap:
+    """The map with the singularities at vertices, for which the pattern is bent until it closes. Triangles
+    may be flipped, so that there always is one. Raises ConvergenceError where doubles do not suffice."""
+    surface, rules, cones = (
+        seats.surface,
+        frame.rules,
+        Cones.at(seats.vertex, seats.index, frame.lattice.quantum),
+    )
+    angles = extended(rules.angles, surface)
+    wanted = targets(
+        surface, rules.ends, seats.loops, cones.quantum, cones.vertex, cones.index, angles=angles
+    )
+    found = map_to(surface, wanted, cones, None, progress)
+    note = (
+        f"{in_words(frame.lattice.kind, cones.index).capitalize()}: they cannot be moved on this mesh until "
+        "the pattern closes around each, so that it is bent beside them; smaller cells are bent less."
+    )
+    return replace(on_area(found), notes=(*found.notes, note))
+
+
+def _changes(frame: Frame, placing: Proposals, chosen: int) -> Iterator[str]:
     best, kind = placing.proposal, frame.lattice.kind
     if chosen != placing.chosen:
         yield (
@@ -316,18 +333,32 @@ def _changes(frame: Frame, placing: Proposals, chosen: int, part: int) -> Iterat
             f"uncovered instead of {placing.proposals[chosen].uncovered:.1%}, cannot be moved so that it "
             "closes."
         )
-    if part > 1:
-        yield (
-            f"The cells are 1/{part} of the default size, since the singularities of larger ones would have "
-            "to move too far for the pattern to close."
-        )
+
+
+@dataclass(frozen=True)
+class Seats:
+    """Singularities on a mesh that is fine beside them. vertex, index: (s,). loops: curvatures in quanta."""
+
+    surface: Surface
+    vertex: Ints
+    index: Ints
+    loops: tuple[int, ...]
+
+    @classmethod
+    def of(cls, surface: Surface, frame: Frame, proposal: Proposal) -> Seats:
+        vertex, index = _ordered(proposal)
+        finer = refined(surface, surface.vertices[vertex], frame.width)
+        return cls(finer, vertex, index, proposal.loops)
 
 
 @dataclass
 class Work:
-    """left: vertices of the meshes on which closing may still be tried."""
+    """left: vertices of the meshes on which closing may still be tried. seats: those so far from which the
+    longest move that would close is shortest, and off: that move, cells."""
 
     left: int
+    seats: Seats | None = None
+    off: float = np.inf
 
 
 def closed_at(
@@ -336,8 +367,8 @@ def closed_at(
     """Seated anew at the nearest vertices where the first moves would be too long, or the mesh does not allow
     them."""
     failed: ConvergenceError | None = None
-    vertex, index = _ordered(proposal)
-    finer = refined(surface, surface.vertices[vertex], frame.width)
+    seats = Seats.of(surface, frame, proposal)
+    finer, vertex, index = seats.surface, seats.vertex, seats.index
     slope = partial(_slope, surface, frame.tube) if frame.tube is not None else None
     quantum, ends, angles = frame.lattice.quantum, frame.rules.ends, frame.rules.angles
     chart: Chart | None = None
@@ -353,8 +384,11 @@ def closed_at(
             raise failed or error from None
         finer = chart.surface
         work.left -= len(finer.vertices)
+        off = float(np.linalg.norm(closing.moves, axis=1).max())
+        if off < work.off:
+            work.off, work.seats = off, Seats(finer, vertex, index, proposal.loops)
         last = again == AGAIN or work.left <= 0
-        if last or np.linalg.norm(closing.moves, axis=1).max() <= FAR:
+        if last or off <= FAR:
             try:
                 return chart, closing.solve(progress)
             except ConvergenceError as error:
@@ -363,12 +397,12 @@ def closed_at(
                 if last or work.left <= 0:
                     break
                 finer = refined(finer, closing.places, frame.width)
-        seats = _nearest_inside(finer, closing.places)
-        if len({*seats.tolist()} - {*finer.boundary.tolist()}) < len(seats) or (seats == vertex).all():
+        nearest = _nearest_inside(finer, closing.places)
+        if len({*nearest.tolist()} - {*finer.boundary.tolist()}) < len(nearest) or (nearest == vertex).all():
             if failed is None:
                 return chart, closing.solve(progress)
             break
-        vertex = seats
+        vertex = nearest
     assert failed is not None
     raise failed
 

@@ -93,7 +93,8 @@ class Rules:
     """What the search must keep to.
 
     quantum: of the cone angles, π/3 or π/2. cell: width of a cell on the surface, model units. sizes:
-    number of size classes. ends: per loop of the surface. most: number of singularities, at most.
+    number of size classes. ends: per loop of the surface. most: number of singularities, at most; enough:
+    more than so many only where these leave much open.
     from_loops: cells between a singularity and a loop; apart, opposite: between two of the same and of
     opposite signs. away: polylines (k, 3), each with how many cells they must keep from it. only: (k, 4)
     centres and radii of balls in which they must stand, None: anywhere. largest: greatest |k| of one.
@@ -106,6 +107,7 @@ class Rules:
     sizes: int | None
     ends: tuple[End, ...]
     most: int = 6
+    enough: int = 30
     from_loops: float = 2.0
     apart: float = 3.0
     opposite: float = 5.0

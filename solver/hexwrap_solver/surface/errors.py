@@ -11,7 +11,6 @@ SurfaceError
 │   └── FlatSurfaceError         all vertices in one place or on one line
 ├── of the topology
 │   ├── NonManifoldEdgeError     an edge with three or more faces
-│   ├── NonManifoldVertexError   faces that meet in a vertex only
 │   ├── SeveralComponentsError   more than one piece
 │   ├── NotOrientableError       a Möbius band
 │   └── HandlesError             a torus, or a surface with handles
@@ -68,11 +67,6 @@ class FlatSurfaceError(SurfaceError):
 class NonManifoldEdgeError(SurfaceError):
     slug = "non-manifold-edge"
     title = "More than two faces share an edge"
-
-
-class NonManifoldVertexError(SurfaceError):
-    slug = "non-manifold-vertex"
-    title = "Parts of the surface touch in a single vertex"
 
 
 class SeveralComponentsError(SurfaceError):

@@ -14,7 +14,6 @@ from hexwrap_solver.surface.checks import LISTED
 from hexwrap_solver.surface.errors import (
     HandlesError,
     NonManifoldEdgeError,
-    NonManifoldVertexError,
     NotOrientableError,
     SeveralComponentsError,
 )
@@ -25,6 +24,7 @@ from hexwrap_solver.surface.topology import (
     next_half_edge,
     spanning_tree,
 )
+from hexwrap_solver.words import place
 
 #: A loop around a handle is searched through at most this many vertices.
 TRIALS = 24
@@ -40,7 +40,7 @@ class SentNames:
 
     def at(self, vertices: Ints) -> str:
         """The middle of vertices of the working mesh."""
-        return "at (" + ", ".join(f"{x:.6g}" for x in self.points[vertices].mean(axis=0)) + ")"
+        return f"at {place(self.points[vertices].mean(axis=0))}"
 
     def edges(self, faces: Ints, h: Ints) -> list[list[int]]:
         """Half-edges as pairs of sent vertices."""
@@ -101,20 +101,13 @@ def loops_of(vertices: Floats, faces: Ints, twin: Ints, names: SentNames) -> tup
     """The boundary loops of a connected, oriented mesh without crowded edges, if it has no handles: where
     there are two, the one that holds the lowest vertex comes first; otherwise the longest.
 
-    With b loops, χ = V − E + F = 2 − b leaves room neither for handles nor for vertices in which the surface
-    touches itself: separating those would add vertices, and no orientable surface with b loops has a
-    larger χ. Raises NonManifoldVertexError, HandlesError.
+    Every vertex has one fan of faces (see ``apart``). Raises HandlesError.
     """
-    start, _ = half_edges(faces)
     n = len(vertices)
     boundary = np.flatnonzero(twin < 0)
-    if np.bincount(start[boundary], minlength=1).max(initial=0) > 1:
-        raise _pinched(faces, twin, n, names)
     loops = boundary_loops(faces, twin) if len(boundary) else []
     euler = n - (len(twin) + len(boundary)) // 2 + len(faces)
     if euler != 2 - len(loops):
-        if _umbrellas(faces, twin)[0] > n:
-            raise _pinched(faces, twin, n, names)
         raise _handles(vertices, faces, twin, len(loops), euler, names)
     if len(loops) == 2:
         return tuple(loops)
@@ -124,7 +117,7 @@ def loops_of(vertices: Floats, faces: Ints, twin: Ints, names: SentNames) -> tup
     return tuple(loops[i] for i in np.argsort(-np.array(length), kind="stable"))
 
 
-def _umbrellas(faces: Ints, twin: Ints) -> tuple[int, Ints]:
+def _umbrellas(twin: Ints) -> tuple[int, Ints]:
     """Fans of faces around vertices: their number, and the fan of every corner."""
     h = np.flatnonzero(twin >= 0)
     k = len(twin)
@@ -133,17 +126,19 @@ def _umbrellas(faces: Ints, twin: Ints) -> tuple[int, Ints]:
     return int(count), label.astype(np.int64)
 
 
-def _pinched(faces: Ints, twin: Ints, n: int, names: SentNames) -> NonManifoldVertexError:
-    _, fan = _umbrellas(faces, twin)
-    fans = np.unique(np.stack([faces.ravel(), fan], axis=1), axis=0)[:, 0]
-    pinched = np.flatnonzero(np.bincount(fans, minlength=n) > 1)
-    vertices = names.vertex[pinched]
-    return NonManifoldVertexError(
-        f"The surface is non-manifold at {_count(len(vertices), 'vertex', 'vertices')}, the "
-        f"first is vertex {vertices[0]} {names.at(pinched[:1])}: faces must surround every vertex in one "
-        "fan, so pull the parts apart there or join them along an edge.",
-        vertices=vertices[:LISTED],
-    )
+def apart(faces: Ints, n: int, twin: Ints) -> tuple[Ints, Ints]:
+    """Faces of a mesh in which every vertex has one fan of them, and (k,) of which vertices its vertices from
+    n on are copies: one for every further fan around a vertex in which the surface touches itself."""
+    count, fan = _umbrellas(twin)
+    corner = np.unique(fan, return_index=True)[1]
+    centre = faces.ravel()[corner]  # (count,)
+    if count == len(np.unique(centre)):
+        return faces, np.zeros(0, dtype=np.int64)
+    first = np.zeros(count, dtype=bool)
+    first[np.unique(centre, return_index=True)[1]] = True
+    name = centre.copy()
+    name[~first] = n + np.arange(int((~first).sum()))
+    return name[fan].reshape(-1, 3), centre[~first]
 
 
 def _handles(

@@ -16,6 +16,7 @@ from hexwrap_solver.surface.errors import DegeneratePolygonError, NotOrientableE
 from hexwrap_solver.surface.features import chained, folds, lie_along
 from hexwrap_solver.surface.genus import (
     SentNames,
+    apart,
     check_connected,
     check_edges,
     loops_of,
@@ -111,10 +112,11 @@ def _build(sent: SentMesh, mesh: Triangles, polygon: Ints, label: Ints, settings
     if settings.caps == "drop":
         _uncap(draft)
 
-    index = np.flatnonzero(_mark(draft.faces, n))
-    new = np.full(n, -1, dtype=np.int64)
+    origin = np.concatenate([np.arange(n), _untouching(draft, n)])  # of the mesh's vertices
+    index = np.flatnonzero(_mark(draft.faces, len(origin)))
+    new = np.full(len(origin), -1, dtype=np.int64)
     new[index] = np.arange(len(index))
-    faces = new[draft.faces]
+    faces, index = new[draft.faces], origin[index]
     loops = loops_of(
         vertices[index], faces, draft.mesh.twin, SentNames(index, draft.polygon, vertices[index])
     )
@@ -169,6 +171,24 @@ def _uncap(draft: _Draft) -> None:
         draft.faces, draft.polygon = draft.faces[keep], draft.polygon[keep]
 
 
+def _untouching(draft: _Draft, n: int) -> Ints:
+    """(k,) vertices in which the surface touches itself, once for every copy that they got."""
+    mesh = draft.mesh
+    faces, copied = apart(mesh.faces, n, mesh.twin)
+    if len(copied):
+        places = np.unique(copied)
+        at = ", ".join(str(np.round(mesh.vertices[v], 6).tolist()) for v in places[:2])
+        draft.note(
+            len(places),
+            "vertex",
+            "vertices",
+            f"in which the surface touches itself {{was}} taken apart, at {at}"
+            + (f" and {len(places) - 2} more" if len(places) > 2 else ""),
+        )
+        draft.mesh = Triangles(np.concatenate([mesh.vertices, mesh.vertices[copied]]), faces)
+    return copied
+
+
 def _mark(faces: Ints, n: int) -> Bools:
     """(n,) the vertices that faces use."""
     mark = np.zeros(n, dtype=bool)
@@ -211,6 +231,10 @@ def _flatten(draft: _Draft) -> None:
             f"Face {polygons[0]} has no area: its corners lie on one line, and it cannot be merged into its "
             f"neighbours ({len(polygons)} such in all). Move its middle corner off the line or delete it.",
             faces=polygons[:LISTED],
+        )
+    if not keep.any():
+        raise DegeneratePolygonError(
+            "No face has an area beside the size of the whole: send faces that have one."
         )
     draft.note(int(bad.sum()), "triangle", "triangles", "without area {was} merged into the neighbours")
     draft.faces, draft.polygon = draft.faces[keep], draft.polygon[keep]

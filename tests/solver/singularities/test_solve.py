@@ -278,59 +278,68 @@ def test_where_they_cannot_be_closed_there_are_none(monkeypatch, count):
     assert len(found.map.cones) == 0
     assert any("left out: It did not close." in note for note in found.quality.notes)
     assert found.quality.singularities.number[found.quality.singularities.taken] == 0
-    with pytest.raises(ConvergenceError):
-        solved(shapes.waist(), count=None, at=(SingularityAt(1, vertex=200),), around=16)
+
+
+def test_where_they_cannot_be_moved_the_pattern_is_bent(monkeypatch):
+    """A closed surface, and places that are asked for, cannot go without: the map is still conformal, and the
+    pattern closes."""
+
+    def fails(*args):
+        raise ConvergenceError("It did not close.")
+
+    monkeypatch.setattr(module, "closed_at", fails)
+    found = solved(shapes.ellipsoid(), kind="triangle", edge_length=0.3)
+    assert len(found.map.cones) == 12
+    assert found.map.fitted is None
+    assert found.map.residual < 1e-9
+    laid = found.pattern
+    assert 0 < laid.distortion < 0.5
+    assert (laid.neighbours.values >= 0).all()
+    assert len(laid.vertices) - len(laid.faces.values) // 2 + laid.n_cells == 2
+    assert any("bent beside them" in note for note in found.quality.notes)
+    listed = solved(shapes.waist(), count=None, at=(SingularityAt(1, vertex=200),), around=16)
+    assert listed.map.cones.index.tolist() == [1]
 
 
 @dataclass(frozen=True)
 class Made:
     """Stands for a map."""
 
-    width: float
     count: int
     notes: tuple[str, ...] = ()
 
 
-def first_that_closes(monkeypatch, sized, fewest, failing):
-    """The map that is made where so many attempts fail, and those attempts: width and number."""
+def first_that_closes(monkeypatch, failing):
+    """The map that is made where so many attempts fail, and those attempts' numbers."""
     asked = []
 
     def close(surface, frame, proposal, progress, work):
-        asked.append((frame.width, proposal.count))
+        asked.append(proposal.count)
         if len(asked) <= failing:
             raise ConvergenceError(f"Reason {len(asked)}.")
         return None, None
 
     monkeypatch.setattr(module, "closed_at", close)
     monkeypatch.setattr(
-        module, "as_map", lambda frame, chart, found, placing, _: Made(frame.width, placing.proposal.count)
+        module, "as_map", lambda frame, chart, found, placing, _: Made(placing.proposal.count)
     )
     proposals = tuple(
-        Proposal(np.arange(n), np.ones(n, dtype=np.int64), (), 0.1, 0.1, 1.0) for n in (fewest, 12, 14)
+        Proposal(np.arange(n), np.ones(n, dtype=np.int64), (), 0.1, 0.1, 1.0) for n in (10, 12, 14)
     )
-    frame = module.Frame(LATTICES["hex"], None, 1.0, None, (), None, 0.05, sized)
+    frame = module.Frame(LATTICES["hex"], None, 1.0, None, (), None, 0.05)
     placing = Proposals(proposals, 1, others=(2, 0))
-    return module.first_that_closes(None, frame, placing, no_progress), asked
+    return module.first_that_closes(None, frame, placing, no_progress, module.Work(1)), asked
 
 
 def test_where_those_chosen_do_not_close_others_do(monkeypatch):
-    """A size that nobody asked for must not be what a closed surface fails for."""
-    made, asked = first_that_closes(monkeypatch, False, 10, 0)
-    assert asked == [(1.0, 12)]
+    made, asked = first_that_closes(monkeypatch, 0)
+    assert asked == [12]
     assert not made.notes
-    made, _ = first_that_closes(monkeypatch, False, 10, 1)
-    assert (made.width, made.count) == (1.0, 14)
+    made, _ = first_that_closes(monkeypatch, 1)
+    assert made.count == 14
     assert any("12 pentagons" in note and "cannot be moved" in note for note in made.notes)
-    made, _ = first_that_closes(monkeypatch, False, 10, 2)
-    assert (made.width, made.count) == (0.5, 12)
-    assert any("1/2 of the default size" in note for note in made.notes)
-
-
-@pytest.mark.parametrize(("sized", "fewest"), [(True, 10), (False, 0)])
-def test_cells_do_not_shrink_that_need_not(monkeypatch, sized, fewest):
-    """Where a size is asked for, or a map without any singularities will do; the first reason is given."""
     with pytest.raises(ConvergenceError, match=r"^Reason 1\.$"):
-        first_that_closes(monkeypatch, sized, fewest, 2)
+        first_that_closes(monkeypatch, 2)
 
 
 def windowed():

@@ -20,7 +20,6 @@ from hexwrap_solver.surface.errors import (
     IndexRangeError,
     NonFiniteError,
     NonManifoldEdgeError,
-    NonManifoldVertexError,
     NotOrientableError,
     PolygonSizeError,
     SeveralComponentsError,
@@ -119,27 +118,25 @@ def test_an_edge_with_three_faces() -> None:
     assert len(error.faces) == 3
 
 
-def test_parts_that_touch_in_one_vertex() -> None:
+@pytest.mark.parametrize(("missing", "touching", "loops"), [([10, 18], 18, 3), ([0, 8], 8, 2)])
+def test_a_boundary_that_touches_itself_is_taken_apart(missing: list[int], touching: int, loops: int) -> None:
+    """Two holes with a corner in common become one, and so a notch with one in the end."""
     vertices, quads = tube(6, 7)
-    holes = np.delete(quads, [10, 18], axis=0)  # two holes with one corner in common
-    error = refused(mesh(vertices, holes), NonManifoldVertexError)
-    assert error.vertices == [18]
+    found = surface_from_mesh(mesh(vertices, np.delete(quads, missing, axis=0)))
+    assert len(found.loops) == loops
+    assert (found.input_vertex == touching).sum() == 2
+    assert any("touches itself was taken apart, at [" in sentence for sentence in found.repairs)
 
 
-def test_a_boundary_that_touches_itself() -> None:
-    vertices, quads = tube(6, 7)
-    notched = np.delete(quads, [0, 8], axis=0)
-    error = refused(mesh(vertices, notched), NonManifoldVertexError)
-    assert error.vertices == [8]
-
-
-def test_an_inner_vertex_shared_by_two_sheets() -> None:
-    """Two inner vertices of a tube, far from each other, made one."""
+def test_an_inner_vertex_shared_by_two_sheets_is_taken_apart() -> None:
+    """Two inner vertices of a tube, far from each other, made one: the tube is what it was."""
     vertices, quads = tube(9, 8)
     pinched = quads.copy()
     pinched[pinched == 20] = 52
-    error = refused(mesh(vertices, pinched), NonManifoldVertexError)
-    assert error.vertices == [52]
+    found = surface_from_mesh(mesh(vertices, pinched))
+    assert len(found.loops) == 2
+    assert len(found.vertices) == len(vertices)
+    assert (found.input_vertex == 52).sum() == 2
 
 
 def test_several_pieces() -> None:

@@ -14,7 +14,6 @@ from hexwrap_solver.arrays import Floats
 
 #: Blocks within blocks, at most this deep, and this many objects in all.
 DEEPEST, MOST_OBJECTS = 32, 200_000
-_NO_LAYER = "00000000-0000-0000-0000-000000000000"
 
 
 class TooManyObjectsError(Exception):

@@ -99,7 +99,7 @@ def _placed(
     if alignment is None and not len(motions.words) and not np.any(net.crossing):
         own = _home(cmap)
         place = factor * (own - own[anchor_vertex(cmap)]) + phase
-        return _placement(cmap, lattice, settings, rows, place, factor, angle, 0.0)
+        return _placement(cmap, lattice, rows, place, factor, angle, 0.0)
     tried, system = [], None
     if fitted is None:
         choices = _choices(cmap, lattice, settings, motions, factor, phase, alignment)
@@ -126,7 +126,7 @@ def _placed(
         if distortion < FINE:
             break
     distortion, glued, rows, place, A = min(tried, key=lambda one: one[0])
-    found = _placement(cmap, lattice, settings, rows, place, A, angle, distortion)
+    found = _placement(cmap, lattice, rows, place, A, angle, distortion)
     return replace(found, glued=glued)
 
 
@@ -148,7 +148,6 @@ def _home(cmap: ConformalMap) -> Complexes:
 def _placement(
     cmap: ConformalMap,
     lattice: Lattice,
-    settings: PatternSettings,
     rows: Ints,
     place: Complexes,
     scale: complex,

@@ -21,7 +21,7 @@ from hexwrap_solver.surface.mesh_sizes import ROW, cumulated
 from hexwrap_solver.surface.nurbs import evaluate_points, tangents
 from hexwrap_solver.surface.projection import project
 from hexwrap_solver.surface.topology import edge_lengths, half_edges, sum_rows, twins
-from hexwrap_solver.tolerances import TINY
+from hexwrap_solver.tolerances import RELATIVE, TINY
 
 #: Points inside keep away from the boundary by this part of its edges' lengths, which are looked at in so
 #: many places each.
@@ -123,7 +123,7 @@ def piece_of(
             data={"face": name},
         )
     points = np.concatenate([outline.points, evaluate_points(patch.opened, inner)])
-    merged = _one_per_pole(outline, points, len(uv))
+    merged = _one_per_pole(outline, len(uv))
     faces = merged[faces]
     faces = faces[(faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])]
     lines = merged[outline.lines]
@@ -168,7 +168,7 @@ def _without_doubles(patch: Patch, piece: Piece, id: Ints, taken: set[int]) -> P
     return piece
 
 
-def _one_per_pole(outline: Outline, points: Floats, n: int) -> Ints:
+def _one_per_pole(outline: Outline, n: int) -> Ints:
     """(n,) vertices, neighbours on the outline at one and the same place (a pole) being one."""
     label = np.arange(n)
     for a, b in zip(outline.loops[:-1], outline.loops[1:], strict=True):
@@ -202,7 +202,7 @@ class Chart:
         rates = []
         for speed in (field.speed_u, field.speed_v):
             s = speed / field.h
-            rates.append((s, density / np.maximum(s, 1e-9 * s.max()) / ROW))
+            rates.append((s, density / np.maximum(s, RELATIVE * s.max()) / ROW))
         uneven = [_unevenness(rates[0][1], field.inside), _unevenness(rates[1][1].T, field.inside.T)]
         swapped = uneven[1] < 0.9 * uneven[0]
         s, t = (field.v, field.u) if swapped else (field.u, field.v)

@@ -98,10 +98,8 @@ def mesh_brep(brep: Brep, settings: MeshSettings | None = None) -> BrepMesh:
     sizes = Sizes.of(settings, area)
     for side in sides:
         side.field = sized(side.field, sizes)
-    uses = _uses(brep, sides)
-    wanted = {
-        e: _wanted(sizes, first[e], at[e], [uv for _, uv in uses[e]], [s for s, _ in uses[e]]) for e in used
-    }
+    uses = _uses(sides)
+    wanted = {e: _wanted(sizes, at[e], [uv for _, uv in uses[e]], [s for s, _ in uses[e]]) for e in used}
     for e in used:
         for side, uv in uses[e]:
             side.field = meeting(side.field, at[e][0], uv, wanted[e])
@@ -120,7 +118,7 @@ def _side(face: Face, name: int, brep: Brep, points: dict[int, Floats]) -> _Side
     return _Side(face, patch, loops, coarse, kinks_of(patch, coarse), field_of(patch, coarse))
 
 
-def _uses(brep: Brep, sides: list[_Side]) -> dict[int, list[tuple[_Side, Floats]]]:
+def _uses(sides: list[_Side]) -> dict[int, list[tuple[_Side, Floats]]]:
     """For every edge, the faces it bounds and its first places in their parameters, in its own direction."""
     out: dict[int, list[tuple[_Side, Floats]]] = {}
     for side in sides:
@@ -131,9 +129,7 @@ def _uses(brep: Brep, sides: list[_Side]) -> dict[int, list[tuple[_Side, Floats]
     return out
 
 
-def _wanted(
-    sizes: Sizes, t: Floats, at: tuple[Floats, Floats, Floats], uvs: list[Floats], sides: list[_Side]
-) -> Floats:
+def _wanted(sizes: Sizes, at: tuple[Floats, Floats, Floats], uvs: list[Floats], sides: list[_Side]) -> Floats:
     """(k,) edge lengths along an edge: its own curvature and the faces beside it, slowly changing."""
     point, tangent, bend = at
     h = sizes.at(curvature(tangent, bend))
@@ -191,7 +187,7 @@ def _divided(
         edge = brep.edges[e]
         ends = frozenset((edge.start, edge.end))
         least = 3 if len(ends) == 1 else 2 if alike[ends] > 1 else 1
-        t = _parameters(edge, first[e], at[e], wanted[e], marks[e], least, sizes)
+        t = _parameters(edge, first[e], wanted[e], marks[e], least, sizes)
         points = evaluate_curve(edge.curve, t)[0]
         points[0], points[-1] = brep.vertices[edge.start], brep.vertices[edge.end]
         inner = np.arange(next_id, next_id + len(t) - 2)
@@ -203,7 +199,6 @@ def _divided(
 def _parameters(
     edge: Edge,
     t: Floats,
-    at: tuple[Floats, Floats, Floats],
     wanted: Floats,
     marks: Floats,
     least: int,

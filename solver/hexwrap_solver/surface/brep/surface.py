@@ -18,7 +18,6 @@ from hexwrap_solver.surface.brep.types import Brep
 from hexwrap_solver.surface.brep.whole import brep_of_surface
 from hexwrap_solver.surface.errors import (
     NonManifoldEdgeError,
-    NonManifoldVertexError,
     NotClosedError,
     PoleError,
     TrimError,
@@ -46,7 +45,7 @@ def surface_from_brep(brep: Brep, settings: SurfaceSettings | None = None) -> Su
             surface = surface_from_mesh(_sent(mesh, turned=True), settings)
             return replace(surface, repairs=(INSIDE_OUT, *surface.repairs)).knowing(surface)
         return surface_from_mesh(_sent(mesh), settings)
-    except (TrimError, NonManifoldEdgeError, NonManifoldVertexError) as error:
+    except (TrimError, NonManifoldEdgeError) as error:
         render = [face.render for face in brep.faces if face.render is not None]
         if len(render) < len(brep.faces):
             raise
