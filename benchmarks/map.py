@@ -1,12 +1,14 @@
 """Time and memory of the conformal map against its floor.
 
-    python benchmarks/map.py [--vertices 2000 20000 200000] [--route plain flips meshes]
+    python benchmarks/map.py [--vertices 2000 20000 200000] [--route plain flips nets meshes]
 
 The floor is (Newton steps) × (one sparse Cholesky factorisation + two triangular solves) on the same matrix.
 It is measured with the solver's own factorisation and, where installed (``pip install cvxopt pypardiso``),
 with CHOLMOD (cvxopt) and MKL PARDISO, analysis not counted. Newton steps are those of Newton's method with
 a factorisation in each step. Beside it stands what a solver takes for a new mesh: analysis and first
-factorisation. ``flips`` is the robust route on the same towers, ``meshes`` the whole map of those meshes of
+factorisation. ``flips`` is the robust route on the same towers, ``nets`` a tower slit open
+along its height (a disk), and one with 24 windows cut out, beside the whole one, isometric. ``meshes`` the
+whole map of those meshes of
 the torture table that need it, each beside a tower of equal size. Times are processor seconds of one thread,
 the best of a few runs.
 """
@@ -34,15 +36,15 @@ from hexwrap_solver.conformal.fixed import minimise
 from hexwrap_solver.conformal.robust import solve_with_flips
 from hexwrap_solver.conformal.types import BoundaryCondition
 from hexwrap_solver.linalg.factor import Factorisation
-from hexwrap_solver.surface import surface_from_mesh
-from hexwrap_solver.surface.types import SentMesh
+from hexwrap_solver.surface import surface_from_mesh, with_openings
+from hexwrap_solver.surface.types import SentMesh, Surface
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # for tests.*, where this runs as a script
 
 from tests.solver.conformal.shared import MESHES, load
 from tests.solver.conformal.torture import TORTURE
 
-ROUTES = ["plain", "flips", "meshes"]
+ROUTES = ["plain", "flips", "nets", "meshes"]
 
 
 def tower(n: int) -> SentMesh:
@@ -64,6 +66,32 @@ def tower(n: int) -> SentMesh:
     return SentMesh(
         np.stack(place, axis=1), Ragged.from_table(np.concatenate([first, second], axis=1).T.copy())
     )
+
+
+def without(sent: SentMesh, left_out: Callable[[Any, Any], Any]) -> Surface:
+    """The tower without the faces for which that holds, of places (k, 3) around and along it, from 0 to 1."""
+    corners = sent.faces.values.reshape(-1, 3)
+    around = round(np.sqrt(2.0 * len(sent.vertices)))
+    place = [np.mod(corners, around) / around, corners // around / (corners.max() // around)]
+    faces = corners[~left_out(*place)]
+    used, faces = np.unique(faces, return_inverse=True)
+    return surface_from_mesh(SentMesh(sent.vertices[used], Ragged.from_table(faces.reshape(-1, 3))))
+
+
+def slit(sent: SentMesh) -> Surface:
+    return without(sent, lambda around, along: np.ptp(around, axis=1) > 0.5)
+
+
+def windows(sent: SentMesh) -> Surface:
+    """Eight around in three storeys."""
+
+    def inside(around: Any, along: Any) -> Any:
+        inner = (
+            (8 * around % 1 < 0.35) & (abs(4 * along - np.rint(4 * along)) < 0.2) & (abs(along - 0.5) < 0.3)
+        )
+        return inner.all(axis=1)
+
+    return with_openings(without(sent, inside), "cut")
 
 
 def best(run: Callable[[], Any], repeats: int) -> tuple[float, Any]:
@@ -184,6 +212,20 @@ def flips(n: int, repeats: int) -> None:
     )
 
 
+def nets(n: int, repeats: int) -> None:
+    """Other surfaces beside the tower that they were cut out of, in turn, isometric."""
+    sent, seconds = tower(n), dict[str, list[float]]()
+    surfaces = {"tower": surface_from_mesh(sent), "disk": slit(sent), "windows": windows(sent)}
+    for _ in range(repeats):
+        for name, surface in surfaces.items():
+            took, _ = best(lambda s=surface: conformal_map(s, BoundaryCondition("isometric")), 1)
+            seconds.setdefault(name, []).append(took)
+    for name in ("disk", "windows"):
+        ratio = np.median(np.divide(seconds[name], seconds["tower"]))
+        took = np.median(seconds[name])
+        print(f"{n:>9,} vertices: {name}, isometric, {took:.3f} s, {ratio:.2f} × the tower")
+
+
 def hard_meshes(repeats: int) -> None:
     """Meshes that need flips, beside towers of as many vertices that need none."""
     generated = {name: make(np.random.default_rng(0)) for name, make in TORTURE.items()}
@@ -227,6 +269,9 @@ def main() -> None:
     if "flips" in args.route:
         for n in args.vertices:
             flips(n, args.repeats)
+    if "nets" in args.route:
+        for n in args.vertices:
+            nets(n, args.repeats)
     if "meshes" in args.route:
         hard_meshes(args.repeats)
 

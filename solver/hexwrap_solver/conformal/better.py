@@ -18,9 +18,12 @@ from hexwrap_solver.conformal.types import Targets
 from hexwrap_solver.linalg.factor import Factorisation
 from hexwrap_solver.surface.types import Surface
 from hexwrap_solver.tolerances import ANGLE
+from hexwrap_solver.words import place
 
 #: Places that are tried for each corner, at most, and corners that are looked at.
 TRIED, CORNERS = 24, 12
+#: Scales are foreseen at about so many vertices.
+SAMPLE = 4000
 #: Of the area, this part is left out at either end when scales are compared: next to a corner they have none.
 TAIL = 0.01
 #: Told only where cells differ in scale by this factor, and by this factor less with the corner moved.
@@ -46,11 +49,12 @@ def corner_notes(surface: Surface, targets: Targets, u: Floats) -> tuple[str, ..
     factor.factorise(*energy.hessian(energy.corners(u)))
     taken = np.array([v for v, _, _ in corners])
     best: tuple[float, int, int] | None = None
+    few = slice(None, None, max(1, len(u) // SAMPLE))
     for v, loop, i in corners:
         places = _between(loop, i, taken)
         response = _response(energy, factor, np.append(places, v))
-        moved = u[:, None] + (np.pi - targets.angle[v]) * (response[:, :-1] - response[:, -1:])
-        ratios = np.array([_ratio(column, area) for column in moved.T])
+        moved = u[few, None] + (np.pi - targets.angle[v]) * (response[few, :-1] - response[few, -1:])
+        ratios = np.array([_ratio(column, area[few]) for column in moved.T])
         k = int(np.argmin(ratios)) if len(ratios) else 0
         # at the end of the stretch it would rather meet its neighbour: no place of its own is better
         if 0 < k < len(ratios) - 1 and (best is None or ratios[k] < best[0]):
@@ -69,8 +73,8 @@ def corner_notes(surface: Surface, targets: Targets, u: Floats) -> tuple[str, ..
     far = float(np.linalg.norm(surface.vertices[v] - surface.vertices[w]))
     return (
         f"With its corner of {np.degrees(targets.angle[v]):.4g}° at vertex {sent[v]}, "
-        f"{_at(surface.vertices[v])}, the map stretches some parts {ratio:.2g} times as much as others; "
-        f"{far:.3g} away, at vertex {sent[w]}, {_at(surface.vertices[w])}, it would be {after:.2g} times.",
+        f"{place(surface.vertices[v])}, the map stretches some parts {ratio:.2g} times as much as others; "
+        f"{far:.3g} away, at vertex {sent[w]}, {place(surface.vertices[w])}, it would be {after:.2g} times.",
     )
 
 
@@ -110,7 +114,3 @@ def _ratio(u: Floats, area: Floats) -> float:
     share = np.cumsum(area[order]) / area.sum()
     low, high = np.searchsorted(share, [TAIL, 1 - TAIL])
     return float(np.exp(u[order[min(high, len(u) - 1)]] - u[order[low]]))
-
-
-def _at(point: Floats) -> str:
-    return "({})".format(", ".join(f"{x:.4g}" for x in point))

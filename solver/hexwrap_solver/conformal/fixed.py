@@ -15,7 +15,8 @@ from hexwrap_solver.linalg.factor import Factorisation
 #: Accepted residual, radians: boundary angles are promised to 1e-9.
 ACCEPTED = 3e-10
 #: Degenerate triangles make Newton leap: no single step may change the logarithm of a length by more than
-#: ``leap``. A chord step that is tried in vain costs a fourth of a step.
+#: ``leap``. A chord step costs a fourth of one with a
+#: factorisation.
 RULES = Rules(
     steps=60,
     leap=8.0,
@@ -25,7 +26,7 @@ RULES = Rules(
     share=0.1,
     settled=0.05,
     usual=10,
-    promising=0.25,
+    promising=0.5,
 )
 #: Multiples of its largest diagonal entry that make a singular Hessian definite.
 SHIFTS = (0.0, 1e-12, 1e-9, 1e-6)
@@ -121,8 +122,8 @@ class _Fixed:
         direction[among] = found
         return direction
 
-    def chord_direction(self, point: _Point) -> Floats:
-        return -self.factorisation.solve(point.gradient)
+    def solve(self, right: Floats) -> Floats:
+        return self.factorisation.solve(right)
 
     def is_hopeless(self, point: _Point, iterations: int, settled: bool) -> bool:
         count = int(point.corners.violating.sum())

@@ -9,6 +9,7 @@ number of vertices) long before the gradient does.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
@@ -34,8 +35,10 @@ MAX_TRIALS = 40
 #: much of the residual as the last one did, would reach rounding: a step costs a fourth of one with a
 #: factorisation, after which two or three chord steps would follow all the same.
 CHORDS = 6
-#: What a chord step may leave of the residual to be kept.
-CHORD_GAIN = 0.2
+#: What a chord step may leave of the residual for another one to follow, if many would be needed.
+CHORD_GAIN = 0.25
+#: Steps that a chord step learns from (L-BFGS; Nocedal 1980).
+LEARNED = 8
 #: Where a step was cut short, the unknowns with a large residual, and RINGS of their neighbours, are brought
 #: near the minimum first, where these are at most the share FEW of all; by at most LOCAL_STEPS steps.
 RINGS, FEW, LOCAL_STEPS = 3, 0.25, 8
@@ -76,8 +79,8 @@ class Convex(Protocol[P]):
     def local_direction(self, point: P, among: Ints) -> Floats | None:
         """The same where only the unknowns ``among`` may change; (n,), 0 elsewhere."""
 
-    def chord_direction(self, point: P) -> Floats:
-        """The same with the Hessian of the last ``direction``."""
+    def solve(self, right: Floats) -> Floats:
+        """H⁻¹ · right with the Hessian of the last ``direction``."""
 
     def is_hopeless(self, point: P, iterations: int, settled: bool) -> bool:
         """Whether to give up. settled: the point is near the minimum, such as it is."""
@@ -90,8 +93,8 @@ class Rules:
     residuals above this, radians, and this share of the largest are brought down locally; at_first: before
     the first step, too. settled: a step that leaves at most this share of the residual is near the minimum.
     usual: steps expected, for the progress. words: what the steps are called. promising: where a full
-    step with its own Hessian left at most this share of the residual, a chord step is tried even if many of
-    that gain would be needed: they mostly leave a tenth of that or less."""
+    step left at most this share of the residual, a chord step is tried even if many of that gain would be
+    needed: the more they are, the more they have learned."""
 
     steps: int
     leap: float
@@ -128,18 +131,21 @@ def descend(
     if rules.at_first:
         point = relaxed(energy, point, rules)
     iterations, factorisations, fruitless, stalls, chord = 0, 0, 0, 0, False
+    secants = _Secants()
     while (residual := largest(point.gradient)) > tolerance and iterations < rules.steps:
         words = f"Newton step {iterations + 1}{rules.words}, residual {residual:.1e} rad"
         progress(min(0.9, iterations / rules.usual), words)
-        step = _chord(energy, point) if chord else None
+        step = _chord(energy, point, secants) if chord else None
         fresh = step is None
         if step is None:
             factorisations += 1
+            secants = _Secants()
             step = _newton(energy, energy.again(point) if chord else point, rules.leap)
         if step is None:
             point = energy.again(point)
             break
         iterations += 1
+        secants.learn(point, step.point)
         gain = largest(step.point.gradient) / residual
         settled = step.full and gain <= rules.settled
         if not step.full and fruitless < FRUITLESS and not energy.is_hopeless(step.point, iterations, False):
@@ -156,7 +162,7 @@ def descend(
         if energy.is_hopeless(point, iterations, settled):
             break
         few = _chords_left(largest(point.gradient), gain, tolerance) <= CHORDS
-        chord = step.full and (few or (fresh and gain <= rules.promising))
+        chord = step.full and (few or gain <= (rules.promising if fresh else CHORD_GAIN))
     return Descended(point, iterations, factorisations)
 
 
@@ -210,13 +216,39 @@ def _chords_left(residual: float, gain: float, tolerance: float) -> float:
     return float(np.log(tolerance / residual) / np.log(gain)) if gain < 1 else np.inf
 
 
-def _chord(energy: Convex[P], point: P) -> _Step[P] | None:
-    """A step with the Hessian of an earlier one; None where that is not good enough. Among the last roundings
-    any gain is: the Hessian is not what is missing there."""
-    following = energy.at(point.x + energy.chord_direction(point))
+class _Secants:
+    """What steps since the last factorisation have shown of the Hessian: pairs of differences of x and of
+    the gradient (L-BFGS). Mostly it changes in a few places, at corners and rough spots."""
+
+    def __init__(self) -> None:
+        self._pairs: list[tuple[Floats, Floats, float]] = []
+
+    def learn(self, before: Point, after: Point) -> None:
+        step, change = after.x - before.x, after.gradient - before.gradient
+        along = float(step @ change)
+        if along > 0 and largest(before.gradient) > LAST_ROUNDINGS:
+            self._pairs = [*self._pairs[1 - LEARNED :], (step, change, along)]
+
+    def direction(self, solve: Callable[[Floats], Floats], gradient: Floats) -> Floats:
+        """−H⁻¹∇E with what is known of H; solve: with the factorised one."""
+        right, shares = -gradient, []
+        for step, change, along in reversed(self._pairs):
+            shares.append(float(step @ right) / along)
+            right = right - shares[-1] * change
+        found = solve(right)
+        for (step, change, along), share in zip(self._pairs, reversed(shares), strict=True):
+            found = found + (share - float(change @ found) / along) * step
+        return found
+
+
+def _chord(energy: Convex[P], point: P, secants: _Secants) -> _Step[P] | None:
+    """A step with the Hessian of an earlier one; None where that lowers nothing. Among the last roundings it
+    need not: the Hessian is not what is missing there."""
     residual = largest(point.gradient)
-    enough = CHORD_GAIN if residual > LAST_ROUNDINGS else np.inf
-    return _Step(following, full=True) if largest(following.gradient) <= enough * residual else None
+    last = residual <= LAST_ROUNDINGS
+    known = _Secants() if last else secants
+    following = energy.at(point.x + known.direction(energy.solve, point.gradient))
+    return _Step(following, full=True) if last or largest(following.gradient) < residual else None
 
 
 def _newton(energy: Convex[P], point: P, leap: float) -> _Step[P] | None:

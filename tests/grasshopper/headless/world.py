@@ -29,7 +29,7 @@ except ImportError:
 PYTHON = os.environ["HEXWRAP_PYTHON"]
 SERVE = (
     "from hexwrap_server.http.app import serve; from hexwrap_server.settings import Settings; "
-    "serve(Settings.from_environment())"
+    "from tests.server import forked; forked.fork_from_here(); serve(Settings.from_environment())"
 )
 
 

@@ -173,7 +173,7 @@ def test_steps_that_were_tried_in_vain_leave_no_trace(monkeypatch: pytest.Monkey
         energy = FlipEnergy(Energy(surface, boundary.straight(surface)), _mirrored(surface))
         return descend(energy, np.zeros(len(surface.vertices)), no_progress).iterations
 
-    def astray(energy: FlipEnergy, point: FlipPoint) -> None:
+    def astray(energy: FlipEnergy, point: FlipPoint, _: object) -> None:
         energy.at(point.x + _random_u(len(point.x), 0.5))
 
     monkeypatch.setattr(newton, "CHORDS", -1)

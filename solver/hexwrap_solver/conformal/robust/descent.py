@@ -111,10 +111,10 @@ class FlipEnergy:
         direction[among] = _Laplacian(self, among).solve(point.metric, -point.gradient[among])
         return direction
 
-    def chord_direction(self, point: FlipPoint) -> Floats:
+    def solve(self, right: Floats) -> Floats:
         """Flips since then do not spoil the Hessian: it is continuous."""
         assert self._system is not None
-        return self._system.factorisation.solve(-point.gradient)
+        return self._system.factorisation.solve(right)
 
     def is_hopeless(self, point: FlipPoint, iterations: int, settled: bool) -> bool:
         return bool(np.ptp(point.x) > RUNAWAY * self.span)
