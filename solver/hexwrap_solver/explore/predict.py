@@ -26,6 +26,7 @@ from hexwrap_solver.pattern.lay_pattern import CLOSE, off_by
 from hexwrap_solver.pattern.place.choose import PlacementFamily
 from hexwrap_solver.pattern.place.rotation import with_rotation
 from hexwrap_solver.pattern.types import Kind, PatternSettings
+from hexwrap_solver.tolerances import RELATIVE, TINY
 
 #: Half a row of cells, in edges, where every other cell of a row stands half a cell higher.
 ROW: dict[Kind, float] = {"hex": 3**0.5 / 4}
@@ -150,7 +151,7 @@ def _outlook(cmap: ConformalMap, placing: PlacementFamily, settings: PatternSett
     square = (size**2)[surface.faces].mean(axis=1) / wider**2
     size *= np.sqrt(area.sum() / (unit * float(cells @ square)))
     slope: Floats = np.bincount(surface.faces.ravel(), np.repeat(area * _slope(cmap, area), 3)).astype(float)
-    slope = slope / np.maximum(np.bincount(surface.faces.ravel(), np.repeat(area, 3)), 1e-300)
+    slope = slope / np.maximum(np.bincount(surface.faces.ravel(), np.repeat(area, 3)), TINY)
     face, weight, sides = _middles(lattice, placed)
     here, slope, middle = (
         np.einsum("kc,kc...->k...", weight, values[surface.faces[face]])
@@ -200,7 +201,7 @@ def shortened(outline: Complexes, gradient: Complexes, skew: Complexes) -> Float
     normal = -1j * edge / abs(edge)
     first, second = ((normal.conj() * m).real for m in (moved, np.roll(moved, -1, axis=1)))
     lost = -np.minimum(first, second) / (normal.conj() * outline).real
-    one, other = np.nonzero(abs(normal[:, None] + normal) < 1e-9)
+    one, other = np.nonzero(abs(normal[:, None] + normal) < RELATIVE)
     if not len(one):
         return np.asarray(lost.mean(axis=1))
     return np.asarray((lost[:, one] + lost[:, other]).max(axis=1) / 2)
@@ -258,7 +259,7 @@ def _slope(cmap: ConformalMap, area: Floats) -> Floats:
     corner = surface.vertices[surface.faces]
     opposite = np.roll(corner, -2, axis=1) - np.roll(corner, -1, axis=1)  # of corner k: from k+1 to k+2
     turned = (cmap.log_scale[surface.faces][..., None] * opposite).sum(axis=1)  # the gradient, turned by 90°
-    return np.asarray(np.linalg.norm(turned, axis=1) / np.maximum(2 * area, 1e-300))
+    return np.asarray(np.linalg.norm(turned, axis=1) / np.maximum(2 * area, TINY))
 
 
 def _levels(length: Floats) -> tuple[Floats, Floats]:

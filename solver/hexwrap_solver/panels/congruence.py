@@ -43,8 +43,8 @@ def _letters(polygons: Ragged, angle: Floats) -> Ints:
     edge = edge_vectors(polygons)
     length = np.sqrt(dot(edge, edge))
     unit = float(length.mean()) if len(length) else 1.0
-    ahead = edge[following]
-    twist = dot(np.cross(edge, ahead), ahead[following]) / unit**3
+    ahead = edge.take(following, axis=0)
+    twist = dot(np.cross(edge, ahead), ahead.take(following, axis=0)) / unit**3
     merged = [_merge(figure, polygons) for figure in (length / unit, angle, twist)]
     return _joined(np.stack(merged, axis=1))
 

@@ -49,6 +49,7 @@ from hexwrap_solver.pattern.types import Pattern, PatternSettings
 from hexwrap_solver.surface.features import FeatureEdges
 from hexwrap_solver.surface.normals import with_tangents
 from hexwrap_solver.surface.projection import project, start_parameters
+from hexwrap_solver.tolerances import RELATIVE
 
 #: Relative error of an edge length asked for that calls for a second attempt.
 CLOSE = 0.005
@@ -206,7 +207,7 @@ def layout_of(cmap: ConformalMap, lattice: Lattice, placement: Placement) -> Lay
     net = cmap.net
     corners = placement.glued.corners(cmap.surface.faces, placement.place)
     extent = float(abs(corners).max())
-    tolerance = max(1e-9, ROUNDING * extent, 2 * cmap.closing_error * extent)
+    tolerance = max(RELATIVE, ROUNDING * extent, 2 * cmap.closing_error * extent)
     return Layout(
         corners,
         net.across,

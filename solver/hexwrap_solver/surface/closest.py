@@ -10,6 +10,7 @@ from scipy.spatial import KDTree
 
 from hexwrap_solver.arrays import Floats, Ints
 from hexwrap_solver.geometry import dot
+from hexwrap_solver.tolerances import RELATIVE
 
 #: Points searched together, pairs of points and triangles looked at together, and compared together; they
 #: bound the memory of the search, not its result. A point on the axis of a tube is as near to whole rings.
@@ -135,7 +136,7 @@ class TriangleTree:
         close = bound <= np.abs(corners[:, 1] - corners[:, 0]).max(axis=1)
         some, least = points[close], bound.copy()
         scale = np.maximum(np.abs(some).max(axis=1, initial=0.0), np.abs(self.corners).max())
-        reach = bound[close] * (1 + 1e-9) + ROUNDINGS * np.finfo(float).eps * scale
+        reach = bound[close] * (1 + RELATIVE) + ROUNDINGS * np.finfo(float).eps * scale
         found = self._within(some, reach) if len(some) else None
         if found is None:
             close[:] = False
@@ -199,7 +200,7 @@ class TriangleTree:
         first = np.asarray(self.centroids.query(points)[1])
         bound = nearest_in_triangles(points, self.corners[first])[1]
         # Rounding, of the distance as of the boxes, must not prune the guess itself.
-        reach = bound * (1 + 1e-9) + ROUNDINGS * np.finfo(float).eps * np.abs(points).max(axis=1)
+        reach = bound * (1 + RELATIVE) + ROUNDINGS * np.finfo(float).eps * np.abs(points).max(axis=1)
         reach += np.finfo(float).tiny
         found = self._within(points, reach)
         if found is None:

@@ -17,6 +17,7 @@ from hexwrap_solver.pattern.place.rows import Rows, rows_along
 from hexwrap_solver.pattern.place.sides import is_line
 from hexwrap_solver.pattern.place.size import edges_around, fitting_number, size_spread, width_per_cell
 from hexwrap_solver.pattern.types import PatternSettings
+from hexwrap_solver.tolerances import ANGLE, RELATIVE
 
 #: Of the numbers of cells around that come near what is asked, this many are compared.
 MOST_COUNTS = 200
@@ -119,7 +120,7 @@ def _translations(
     row = lattice.shortest_towards(toward)
     count = abs(wanted) / abs(complex(lattice.position(row)))
     spread = 0.0 if settings.around is not None else size_spread(settings)
-    counts = np.arange(np.ceil(count * (1 - spread)), count * (1 + spread) + 1e-9)
+    counts = np.arange(np.ceil(count * (1 - spread)), count * (1 + spread) + RELATIVE)
     counts = np.unique(np.append(counts, max(1, round(count)))).astype(np.int64)
     nearest = np.argsort(abs(counts - count), kind="stable")[:MOST_COUNTS]
     return np.asarray(counts[nearest][:, None] * row), int(lattice.cells_around(row))
@@ -153,7 +154,7 @@ def _heights(strip: _Strip, rows: Rows, loops: list[int], scale: float) -> Float
 def _direction_notes(lattice: Lattice, angle: float, along: complex) -> list[str]:
     notes = []
     taken = angle_taken(lattice, along, angle)
-    if abs(taken - angle) > 1e-9:
+    if abs(taken - angle) > ANGLE:
         notes.append(
             f"Edges stand at {np.rad2deg(taken):.4f}° to the boundary instead of {np.rad2deg(angle):.4f}°: "
             "the nearest angle at which the pattern closes up."

@@ -12,6 +12,7 @@ import numpy as np
 from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.pattern.lattice import Isometry, Lattice
+from hexwrap_solver.tolerances import RELATIVE
 
 #: A boundary is straight where it turns by less than this altogether, a corner quantized within it; rad.
 QUANTIZED = 0.02
@@ -160,7 +161,7 @@ def lines_of(n: int, sides: Sides, normal: Complexes, motion: Isometry) -> Lines
     once = np.ones(len(order), dtype=bool)
     for step in range(1, int(np.bincount(vertex).max(initial=1))):
         same = vertex[step:] == vertex[:-step]
-        once[step:] &= ~(same & (abs(own[order][step:] - own[order][:-step]) < 1e-9))
+        once[step:] &= ~(same & (abs(own[order][step:] - own[order][:-step]) < RELATIVE))
     order, vertex = order[once], vertex[once]
     again = np.arange(len(vertex)) - np.searchsorted(vertex, vertex)
     normals, side, sheet = (
