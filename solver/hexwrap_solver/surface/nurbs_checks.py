@@ -13,6 +13,7 @@ from hexwrap_solver.surface.errors import HandlesError, NotClosedError, NurbsDat
 from hexwrap_solver.surface.nurbs import domain, evaluate_points
 from hexwrap_solver.surface.types import NurbsSurface
 from hexwrap_solver.tolerances import RELATIVE
+from hexwrap_solver.words import place
 
 NAMES = "uv"
 HIGHEST_DEGREE = 32
@@ -176,9 +177,9 @@ def check_pinches(nurbs: NurbsSurface) -> None:
             )
             line = _line(nurbs, direction, x)
             if float(np.ptp(line, axis=0).max()) <= TOLERANCE * size:
-                place = ", ".join(f"{c:.4g}" for c in line.mean(axis=0))
+                at = place(line.mean(axis=0))
                 raise PoleError(
-                    f"The surface is pinched to a point at ({place}), where {NAMES[direction]} = {x:.4g}: no "
+                    f"The surface is pinched to a point at {at}, where {NAMES[direction]} = {x:.4g}: no "
                     "panels can pass through a point. Split it there and clad the parts one by one, or give "
                     "it a width there."
                 )
