@@ -2,6 +2,7 @@
 
     python benchmarks/explore.py [--write] [SAMPLE …]  the table
     python benchmarks/explore.py --run [SAMPLE]        an exploration of 200 variants on two processes
+    python benchmarks/explore.py --run --vertices 20000  the same of a doubly curved tower with that many
     python benchmarks/explore.py --same [SAMPLE]       ten explorations of 20 variants with the same seed
 
 Foreseen / measured: the part of the cells that is left uncovered, per cent. Samples with their own pattern,
@@ -16,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import orjson
+from service import tower
 
 from hexwrap_server import samples
 from hexwrap_server.cli.explore import explore_here
@@ -47,9 +49,14 @@ def main() -> None:
     parser.add_argument("--write", action="store_true", help="write the table into docs/results.md")
     parser.add_argument("--run", action="store_true", help="explore the first sample, or the tower")
     parser.add_argument("--same", action="store_true", help="explore it ten times with the same seed")
+    parser.add_argument("--vertices", type=int, help="run: a tower of that many, not a sample")
     asked = parser.parse_args()
-    if asked.run or asked.same:
-        (run if asked.run else same)((asked.samples or ["tower"])[0])
+    first = (asked.samples or ["tower"])[0]
+    if asked.run:
+        run(first, asked.vertices)
+        return
+    if asked.same:
+        same(first)
         return
     worst = 0.0
     columns = ("sample", "ends", "cells", *(f"{k or 'own'} sizes" for k in SIZES), "s")
@@ -93,15 +100,16 @@ def row(name: str, surface: Surface, mode: str, pattern: PatternSettings) -> tup
     return line, max(abs(foreseen - measured) for foreseen, measured in figures)
 
 
-def explored(name: str, variants: int) -> dict[str, Any]:
-    body = {"name": name, "surface": samples.load(name)["surface"], "variants": variants}
+def explored(name: str, variants: int, vertices: int | None = None) -> dict[str, Any]:
+    surface = samples.load(name)["surface"] if vertices is None else tower(vertices)
+    body = {"name": name, "surface": surface, "variants": variants}
     request = parse_exploration(body, 10**7, 10**6)
     return explore_here(name, request.surface, request.wanted, nobody)  # type: ignore[arg-type]
 
 
-def run(name: str) -> None:
+def run(name: str, vertices: int | None) -> None:
     start, used = time.perf_counter(), time.process_time()
-    result = explored(name, 200)
+    result = explored(name, 200, vertices)
     spent = time.perf_counter() - start, time.process_time() - used
     print(f"{name}: {result['notes'][0]} {spent[0]:.0f} s, {spent[1]:.0f} s of this process")
     for i in sorted(result["front"], key=lambda i: result["variants"][i]["measured"]["uncovered"]):

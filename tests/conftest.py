@@ -18,18 +18,24 @@ def pytest_sessionfinish() -> None:
     forked.TEMPLATE.stop()
 
 
-#: Files that take a minute or more are begun first: begun last, one would keep the others' processes idle.
+#: Files that take long are begun first, the longest before the others: begun last, one would keep the others'
+#: processes idle.
 LONG_FILES = (
     "test_components.py",
-    "test_tools.py",
     "test_viewer.py",
-    "test_mutations.py",
-    "test_jobs.py",
-    "test_crash.py",
-    "test_engine.py",
     "test_dask_engine.py",
-    "test_choosing.py",
+    "test_contract.py",
     "test_demo.py",
+    "test_choosing.py",
+    "test_jobs.py",
+    "test_mutations.py",
+    "test_crash.py",
+    "test_align.py",
+    "test_openapi.py",
+    "test_bounds.py",
+    "test_building_files.py",
+    "test_brep.py",
+    "test_torture_nets.py",
 )
 
 

@@ -190,6 +190,7 @@ def run_scenarios(request: pytest.FixtureRequest, unpacked: Path) -> Runner:
         "HEXWRAP_BUILT": str(unpacked / form.name),
         "HEXWRAP_RULES": form.name,
         "HEXWRAP_PYTHON": sys.executable,
+        "PYTHONPATH": forked.paths(),
     }
 
     def run(name: str, environment: dict[str, str]) -> None:

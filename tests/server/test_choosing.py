@@ -11,7 +11,7 @@ import pytest
 import rhino3dm
 
 from hexwrap_server.cli.main import main
-from hexwrap_server.errors import NoObjectError, SeveralObjectsError, UnreadableFileError
+from hexwrap_server.errors import FileTypeError, NoObjectError, SeveralObjectsError, UnreadableFileError
 from hexwrap_server.input.choose import Chosen, choose
 from hexwrap_server.input.readers.rhino_brep import control_net
 from hexwrap_server.input.surface_files import read_file, sent_surface
@@ -562,6 +562,37 @@ def test_pieces_of_a_ply_and_solids_of_an_stl_are_chosen() -> None:
     assert used[:, 0].min() > 20
 
 
+def test_materials_are_objects_where_nothing_else_is_and_old_names_are_read() -> None:
+    n = len(VERTICES)
+    points = np.vstack([VERTICES, VERTICES * 0.9 + [50, 0, 0]])
+    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in points.tolist()]
+    for name, first in (("Glas", 0), ("D\u00e4mmung", n)):
+        faces = (np.asarray(QUADS) + first + 1).tolist()
+        lines += [f"usemtl {name}", *("f " + " ".join(map(str, face)) for face in faces)]
+    content = read_file("\n".join(lines).encode("cp1252"), "a.obj")
+    assert [found.name for found in content.objects] == ["Glas", "D\u00e4mmung"]
+
+
+def test_files_that_begin_like_others_are_told_so() -> None:
+    data = Model().add(mesh_at()).bytes()
+    for name in ("a.obj", "a.ply", "a.stl"):
+        with pytest.raises(UnreadableFileError, match=r"begins like a \.3dm file: give it the ending \.3dm"):
+            read_file(data, name)
+    with pytest.raises(UnreadableFileError, match="is empty"):
+        read_file(b"", "a.3dm")
+    with pytest.raises(FileTypeError, match="unpack it first"):
+        read_file(data, "a.3dm.zip")
+
+
+def test_closed_masses_that_touch_are_to_be_united() -> None:
+    floors = Model()
+    for k in range(3):
+        box = rhino3dm.BoundingBox(0, 0, 3 * k, 4, 4, 3 * k + 3)
+        floors.add(rhino3dm.Brep.CreateFromBox(rhino3dm.Box(box)), f"floor {k}")
+    with pytest.raises(SeveralObjectsError, match="BooleanUnion"):
+        floors.choose()
+
+
 # Clients
 
 
@@ -609,13 +640,14 @@ def test_inspect_says_what_would_be_mapped_as_the_options_ask(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "mass.3dm"
-    path.write_bytes(Model().add(cylinder(capped=True)).bytes())
+    base = [[0, 0], [4000, 0], [4000, 4000], [0, 4000]]
+    corners = np.array([[*xy, z] for z in (0, 12000) for xy in base], dtype=float)
+    sides = [[0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7], [3, 2, 1, 0], [4, 5, 6, 7]]
+    path.write_bytes(Model("Millimeters").add(rhino_mesh(corners, sides)).bytes())
     for options, walls in (((), 2), (("--caps", "keep"), 0)):
         assert main(["inspect", str(path), *options]) == 0
-        assert (
-            f"To be panelized: a surface of 2 × 2 × 4 m with {walls} boundary curves"
-            in capsys.readouterr().out
-        )
+        said = capsys.readouterr().out
+        assert f"To be panelized: a surface of 4,000 × 4,000 × 12,000 mm with {walls} boundary curves" in said
 
 
 def test_the_command_line_chooses(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

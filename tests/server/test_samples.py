@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import make_samples
 from hexwrap_server import samples
 from hexwrap_server.input.surface_files import read_surface
-from hexwrap_server.samples import make
 from hexwrap_solver.surface import NurbsSurface, surface_from_mesh, surface_from_nurbs
 from hexwrap_solver.surface.brep.surface import surface_from_brep
 from hexwrap_solver.surface.brep.types import Brep
@@ -52,11 +52,18 @@ def test_the_names() -> None:
             samples.path_3dm(name)
 
 
-def test_the_script_makes_what_is_bundled(tmp_path: Path) -> None:
-    make.make(tmp_path)
-    assert sorted(file.stem for file in tmp_path.glob("*.3dm")) == sorted(FIGURES + MESHES)
+@pytest.fixture(scope="module")
+def made_anew(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where the script has made them all."""
+    folder = tmp_path_factory.mktemp("samples")
+    make_samples.make(folder)
+    return folder
+
+
+def test_the_script_makes_what_is_bundled(made_anew: Path) -> None:
+    assert sorted(file.stem for file in made_anew.glob("*.3dm")) == sorted(FIGURES + MESHES)
     for name in FIGURES:
-        made = json.loads((tmp_path / f"{name}.json").read_text(encoding="utf-8"))
+        made = json.loads((made_anew / f"{name}.json").read_text(encoding="utf-8"))
         kept = samples.load(name)
         np.testing.assert_allclose(
             made["surface"]["nurbs"].pop("control_points"),
@@ -73,9 +80,8 @@ def test_the_script_makes_what_is_bundled(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", MESHES)
-def test_the_script_makes_the_meshes_that_are_bundled(tmp_path: Path, name: str) -> None:
-    make.make(tmp_path)
-    made = json.loads((tmp_path / f"{name}.json").read_text(encoding="utf-8"))
+def test_the_script_makes_the_meshes_that_are_bundled(made_anew: Path, name: str) -> None:
+    made = json.loads((made_anew / f"{name}.json").read_text(encoding="utf-8"))
     kept = samples.load(name)
     np.testing.assert_allclose(made["surface"].pop("vertices"), kept["surface"].pop("vertices"), atol=1.1e-4)
     assert made == kept

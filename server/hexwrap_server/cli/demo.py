@@ -105,7 +105,8 @@ def server(port: int, console: Console) -> Iterator[httpx.Client]:
 
 def start_server(port: int, data: Path, log: int) -> subprocess.Popen[bytes]:
     """``hexwrap serve`` as a process of its own, which a Ctrl-C in this console does not reach."""
-    command = [sys.executable, "-m", "hexwrap_server.cli", "serve", "--port", str(port), "--data", str(data)]
+    words = ["serve", "--port", str(port), "--data", str(data), "--workers", "1"]
+    command = [sys.executable, "-m", "hexwrap_server.cli", *words]
     return subprocess.Popen(
         command,
         stdin=subprocess.DEVNULL,

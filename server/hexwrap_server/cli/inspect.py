@@ -13,6 +13,7 @@ from hexwrap_server.input.surface_files import as_sent, chosen_of, read_file
 from hexwrap_server.jobs.work import take_in
 from hexwrap_solver.errors import HexwrapError
 from hexwrap_solver.surface.types import Surface, SurfaceSettings
+from hexwrap_solver.words import box
 
 #: Rows that are printed; the loops of more objects are not counted either.
 MOST_ROWS = 200
@@ -49,7 +50,7 @@ def print_content(console: Console, data: bytes, filename: str, settings: Surfac
 
 def _summary(surface: Surface) -> str:
     """What would be mapped."""
-    size = " × ".join(f"{x:.4g}" for x in np.ptp(surface.vertices, axis=0))
+    size = box(np.ptp(surface.vertices, axis=0))
     walls = len(surface.loops) - surface.openings
     parts = [
         f"{walls} boundary curve{'s' * (walls != 1)}",

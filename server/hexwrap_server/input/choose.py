@@ -12,6 +12,7 @@ import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
+from itertools import combinations
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -28,7 +29,6 @@ from hexwrap_server.input.object_words import (
     listed,
     odd_unit,
     others,
-    point,
     rows,
     spoilt,
     strays,
@@ -37,6 +37,7 @@ from hexwrap_server.input.parts import COARSEST, Part, brep_where_needed, parts_
 from hexwrap_server.input.readers.found import LINKED, FileContent, Found, Geometry
 from hexwrap_solver.surface.closest import TriangleTree
 from hexwrap_solver.surface.weld import TOLERANCE
+from hexwrap_solver.words import place
 
 #: Of several parts that could be meant, one that counts for this many times the next is meant.
 DOMINANT = 1.3
@@ -53,6 +54,9 @@ FLAT, LOW = 1e-4, 0.1
 NEARLY, SLIT, ALONG = 100.0, 20.0, 6.0
 #: A mesh and a surface meet that have so many points in common; a slit is looked for at so many places.
 MEETING, PLACES = 3, 100
+#: Said where closed masses touch; among more parts than these none are looked for.
+UNITE = "Closed masses that touch become one with Rhino's BooleanUnion (meshes: MeshBooleanUnion)."
+MOST_MASSES = 50
 #: At most this many such places are reported.
 SHOWN = 5
 #: Of more objects than these, only the largest are looked at.
@@ -94,6 +98,8 @@ def choose(
     if rivals:
         near = [other for other in fitting if other is best or any(other is one for one in rivals)]
         gaps = [apart[id(other)] for other in rivals if id(other) in apart]
+        if any(_touch(one, two, content.tolerance) for one, two in combinations(near[:MOST_MASSES], 2)):
+            gaps.append(UNITE)
         fins = sum(part.is_fin for part in near)
         raise several(content, [meant[i] for part in near for i in part.members], len(near), unit, gaps, fins)
     part = next((other for other in alike if _is_exact(other, meant)), best)
@@ -130,6 +136,12 @@ def _is_alike(one: Part, other: Part, meant: Sequence[Found]) -> bool:
     near = np.abs(size - other_size).max() <= ALIKE * np.linalg.norm(size)
     in_place = np.abs(one.box - other.box).max() <= ALIKE * np.linalg.norm(size)
     return bool(near and (in_place or abs(one.area - other.area) <= ALIKE * one.area))
+
+
+def _touch(one: Part, other: Part, tolerance: float | None) -> bool:
+    """Whether both are closed and their boxes meet."""
+    meet = (one.box[0] <= other.box[1] + (tolerance or 0)) & (other.box[0] <= one.box[1] + (tolerance or 0))
+    return one.loops == other.loops == 0 and bool(meet.all())
 
 
 def _shares(one: Part, other: Part) -> bool:
@@ -246,12 +258,12 @@ def _nearly(
         met = np.flatnonzero(distance <= tolerance)
         if len(met) >= MEETING and _is_mesh(part, meant) != _is_mesh(other, meant):
             notes[id(other)] = (
-                f"{name} meets the surface at {point(ends[met[0]])} and was not joined, because meshes "
+                f"{name} meets the surface at {place(ends[met[0]])} and was not joined, because meshes "
                 "are not joined with surfaces: make a mesh of both with Rhino's Mesh."
             )
         elif tolerance < distance[k] < reach:
             notes[id(other)] = (
-                f"{name} comes within {distance[k]:.3g} of the surface at {point(ends[k])}{allowed} and was "
+                f"{name} comes within {distance[k]:.3g} of the surface at {place(ends[k])}{allowed} and was "
                 f"not joined: close the gap with Rhino's {_commands([part, other], meant)}."
             )
     return notes
@@ -280,9 +292,9 @@ def _slits(part: Part, tolerance: float | None, commands: str) -> list[str]:
         return []
     apart = np.linalg.norm(points[near[:, 0]] - points[near[:, 1]], axis=1)
     k = int(apart.argmin())
-    place = point(points[near[k, 0]])
+    at = place(points[near[k, 0]])
     return [
-        f"Edges of the surface come within {apart[k]:.3g} of each other at {place}, more than the file's "
+        f"Edges of the surface come within {apart[k]:.3g} of each other at {at}, more than the file's "
         f"tolerance of {tolerance:g}, and were left open: close the gap with Rhino's {commands}."
     ]
 

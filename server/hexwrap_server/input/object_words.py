@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from hexwrap_server.input.readers.found import FileContent, Found, Geometry
 from hexwrap_solver.arrays import Floats
 from hexwrap_solver.surface import SentMesh
 from hexwrap_solver.surface.pieces import Joint, Piece
+from hexwrap_solver.words import box, place
 
 #: Sentences name at most this many objects, problems list at most this many.
 SHOWN, LISTED = 5, 200
@@ -26,7 +27,7 @@ def joint(joint: Joint, tolerance: float | None, objects: int) -> list[str]:
     if is_exact:
         return [f"{what}."]
     return [
-        f"{what}: the greatest gap closed was {joint.gap:.3g}, at {point(joint.place)}, within the file's "
+        f"{what}: the greatest gap closed was {joint.gap:.3g}, at {place(joint.place)}, within the file's "
         f"tolerance of {tolerance:g}."
     ]
 
@@ -70,7 +71,7 @@ def apart_from(boxes: Sequence[Floats]) -> list[str]:
     """About further pieces of what was taken, by their boxes (2, 3)."""
     if not boxes:
         return []
-    places = ", ".join(point(box.mean(axis=0)) for box in boxes[:SHOWN])
+    places = ", ".join(place(box.mean(axis=0)) for box in boxes[:SHOWN])
     more = f" and {len(boxes) - SHOWN} more" if len(boxes) > SHOWN else ""
     count = "1 other piece" if len(boxes) == 1 else f"{len(boxes)} other pieces"
     return [f"{count} of the same object left out, at {places}{more} (Rhino's SplitDisjointMesh parts them)."]
@@ -83,7 +84,7 @@ def strays(strays: Sequence[Piece]) -> list[str]:
 
 
 def _left_out(noun: str, some: Sequence[Piece]) -> str:
-    places = ", ".join(point((piece.low + piece.high) / 2) for piece in some[:SHOWN])
+    places = ", ".join(place((piece.low + piece.high) / 2) for piece in some[:SHOWN])
     more = f" and {len(some) - SHOWN} more" if len(some) > SHOWN else ""
     faces = sum(len(piece.faces) for piece in some)
     count = f"{len(some)} {noun}{'s' * (len(some) > 1)} of {faces} face{'s' * (faces > 1)} in all"
@@ -108,7 +109,7 @@ def listed(objects: Sequence[Found], unit: str | None, among: Sequence[Found] | 
 
 def described(found: Found, number: int, unit: str | None) -> str:
     """Name, kind, layer and size in one phrase."""
-    size = " × ".join(f"{x:.4g}" for x in found.size)
+    size = box(found.size)
     layer = f" on layer {found.layer}" if found.layer else ""
     return f"{label(found, number)} ({found.kind}{layer}, {size}{' ' + unit if unit else ''})"
 
@@ -132,7 +133,3 @@ def rows(objects: Sequence[Found], used: Sequence[Found] = ()) -> list[dict[str,
         }
         for found in objects[:LISTED]
     ]
-
-
-def point(place: Iterable[float]) -> str:
-    return "(" + ", ".join(f"{x:.6g}" for x in place) + ")"

@@ -16,8 +16,8 @@ from hexwrap_solver.surface.types import NurbsSurface, Origin, SentMesh, Surface
 class SentSurface:
     """A surface as it was sent: a mesh, a NURBS surface or a Brep.
 
-    settings: how to take it in, for requests that say nothing of that beside its id. unit, tolerance, origin:
-    of the file it is from. notes: what was found and done when that was read, a sentence each.
+    settings: how to take it in, for requests that say nothing of that beside its id. unit, origin: of
+    the file it is from. notes: what was found and done when that was read, a sentence each.
     """
 
     mesh: SentMesh | None = None
@@ -25,7 +25,6 @@ class SentSurface:
     settings: SurfaceSettings | None = None
     brep: Brep | None = None
     unit: str | None = None
-    tolerance: float | None = None
     origin: Origin = field(default_factory=Origin)
     notes: tuple[str, ...] = ()
 

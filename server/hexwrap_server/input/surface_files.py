@@ -25,19 +25,37 @@ from hexwrap_solver.surface.types import MeshSettings, Origin, SurfaceSettings
 
 T = TypeVar("T")
 
-#: What to do with files that hold something else, or that Rhino reads and we do not.
+#: Formats that Rhino reads and we do not.
+IMPORTED = (
+    ".step .stp .igs .iges .sat .x_t .dwg .dgn .skp .fbx .3ds .dae .3mf .amf .wrl .glb .gltf .usd .usdz .ifc"
+)
+#: What to do with files that hold something else.
 INSTEAD = {
     **dict.fromkeys(
         (".dxf", ".csv", ".txt", ".svg"),
-        "it holds curves or points, which hexwrap lift lays on a surface once that is solved, and which "
-        "--feature-lines makes lines of the pattern",
+        "curves and points in it are for hexwrap lift, which lays them on a surface once that is solved, and "
+        "for --feature-lines; if it holds a surface, open it in Rhino and run ExportSelected on that",
     ),
+    **dict.fromkeys(IMPORTED.split(), "open or import it in Rhino and run ExportSelected on what is meant"),
     **dict.fromkeys(
-        (".step", ".stp", ".igs", ".iges", ".sat", ".dwg", ".skp", ".ifc", ".fbx", ".3ds", ".dae", ".glb"),
-        "open it in Rhino and run ExportSelected on what is meant",
+        (".las", ".laz", ".e57", ".pts", ".ptx", ".xyz"),
+        "it holds points: import it in Rhino and make a mesh with ShrinkWrap",
     ),
     **dict.fromkeys((".gh", ".ghx"), "bake the definition's surface in Grasshopper and save the Rhino file"),
+    **dict.fromkeys((".zip", ".gz", ".7z", ".rar", ".tar"), "unpack it first"),
     ".3dmbak": "rename it so that it ends in .3dm",
+    ".json": "it may be a request, which hexwrap solve and POST /v1/jobs take",
+}
+#: How files begin, and what their names end with then.
+BEGINNINGS = {
+    b"3D Geometry File Format": ".3dm",
+    b"ply": ".ply",
+    b"OFF": ".off",
+    b"PK\3\4": ".zip",
+    b"ISO-10303-21": ".step",
+    b"AC10": ".dwg",
+    b"glTF": ".glb",
+    b"Kaydara FBX": ".fbx",
 }
 
 
@@ -65,7 +83,22 @@ def read_file(data: bytes, filename: str) -> FileContent:
 
     Raises FileTypeError for other suffixes, UnreadableFileError for files that are broken.
     """
-    return _guarded(filename, lambda suffix: READERS[suffix](data))
+    return _guarded(filename, lambda suffix: _read(data, suffix))
+
+
+def _read(data: bytes, suffix: str) -> FileContent:
+    if not data:
+        raise UnreadableFileError("The file is empty: save or export it again.")
+    try:
+        return READERS[suffix](data)
+    except UnreadableFileError as error:
+        other = next((end for start, end in BEGINNINGS.items() if data.startswith(start)), suffix)
+        if other in (suffix, ".zip" if suffix == ".npz" else suffix):
+            raise
+        instead = f" Of files of that type: {INSTEAD[other]}." if other in INSTEAD else ""
+        raise UnreadableFileError(
+            f"The file begins like a {other} file: give it the ending {other}.{instead}"
+        ) from error
 
 
 def read_surface(data: bytes, filename: str, settings: SurfaceSettings | None = None) -> Chosen:
@@ -103,8 +136,7 @@ def as_sent(
         brep=geometry if isinstance(geometry, Brep) else None,
         settings=None if isinstance(geometry, SentMesh) else replace(settings, mesh=meshing),
         unit=settings.unit or content.unit,
-        tolerance=content.tolerance,
-        origin=Origin(first.name, first.layer, tuple(sorted(first.attributes.items()))),
+        origin=Origin(first.name, first.layer, tuple(sorted(first.attributes.items())), content.tolerance),
         notes=chosen.notes,
     )
 
@@ -113,9 +145,9 @@ def _guarded(filename: str, read: Callable[[str], T]) -> T:
     suffix = PurePath(filename).suffix.lower()
     if suffix not in READERS:
         what = f"Files of type {suffix}" if suffix else "Files without a suffix"
-        instead = f": {INSTEAD[suffix]}" if suffix in INSTEAD else ""
+        instead = INSTEAD.get(suffix, "export it from the program that made it, as 3DM or OBJ")
         raise FileTypeError(
-            f"{what} cannot be read as a surface{instead}. Send the surface as one of {', '.join(READERS)}."
+            f"{what} cannot be read as a surface: {instead}. Send the surface as one of {', '.join(READERS)}."
         )
     try:
         return read(suffix)

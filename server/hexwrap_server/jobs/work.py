@@ -99,7 +99,7 @@ def take_in(sent: SentSurface, asked: SurfaceSettings | None = None) -> Surface:
         surface = surface_from_brep(sent.brep, settings)
     else:
         assert sent.nurbs is not None
-        surface = surface_from_patch(sent.nurbs, settings, sent.tolerance)
+        surface = surface_from_patch(sent.nurbs, settings, sent.origin.tolerance)
     if settings.features is not None:
         surface = with_lines(surface, settings.features.lines)
     surface = with_openings(surface, settings.openings)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from hexwrap_server.output.layers import size_layers
 from hexwrap_server.output.meta import Meta
@@ -58,13 +58,13 @@ class Entities:
     def point(self, place: Sequence[float], layer: str) -> None:
         self._add("POINT", layer, "Point", _point(place))
 
-    def polyline(self, points: Sequence[Sequence[float]], layer: str, *, close: bool = False) -> None:
+    def polyline(self, points: Sequence[Any], layer: str, *, close: bool = False) -> None:
         """Of points in the plane."""
         count = f" 90\n{len(points)}\n 70\n{int(close)}\n"
         corners = "".join(f" 10\n{x}\n 20\n{y}\n" for x, y in points)
         self._add("LWPOLYLINE", layer, "Polyline", count, corners)
 
-    def path(self, points: Sequence[Sequence[float]], layer: str, *, close: bool = False) -> None:
+    def path(self, points: Sequence[Any], layer: str, *, close: bool = False) -> None:
         """A polyline in space."""
         flags = f" 70\n{8 + close}\n"
         owner = self._add("POLYLINE", layer, "3dPolyline", " 66\n1\n", _point((0.0, 0.0)), flags)

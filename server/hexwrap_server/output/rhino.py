@@ -46,6 +46,8 @@ def panels_3dm(solution: Solution, meta: Meta) -> bytes:
     model = rhino3dm.File3dm()
     model.ApplicationName = "hexwrap"
     model.Settings.ModelUnitSystem = getattr(rhino3dm.UnitSystem, unit_of(meta.unit).rhino)
+    if surface.origin.tolerance is not None:
+        model.Settings.ModelAbsoluteTolerance = surface.origin.tolerance
     model.Strings["hexwrap"] = one_line(meta.name)
     known = {key: values for key, values in columns(solution).items() if key in KEYS}
     names = [str(label) for label in known["label"]]

@@ -18,6 +18,7 @@ from hexwrap_solver.conformal.types import Targets
 from hexwrap_solver.linalg.factor import Factorisation
 from hexwrap_solver.surface.types import Surface
 from hexwrap_solver.tolerances import ANGLE
+from hexwrap_solver.words import place
 
 #: Places that are tried for each corner, at most, and corners that are looked at.
 TRIED, CORNERS = 24, 12
@@ -72,8 +73,8 @@ def corner_notes(surface: Surface, targets: Targets, u: Floats) -> tuple[str, ..
     far = float(np.linalg.norm(surface.vertices[v] - surface.vertices[w]))
     return (
         f"With its corner of {np.degrees(targets.angle[v]):.4g}° at vertex {sent[v]}, "
-        f"{_at(surface.vertices[v])}, the map stretches some parts {ratio:.2g} times as much as others; "
-        f"{far:.3g} away, at vertex {sent[w]}, {_at(surface.vertices[w])}, it would be {after:.2g} times.",
+        f"{place(surface.vertices[v])}, the map stretches some parts {ratio:.2g} times as much as others; "
+        f"{far:.3g} away, at vertex {sent[w]}, {place(surface.vertices[w])}, it would be {after:.2g} times.",
     )
 
 
@@ -113,7 +114,3 @@ def _ratio(u: Floats, area: Floats) -> float:
     share = np.cumsum(area[order]) / area.sum()
     low, high = np.searchsorted(share, [TAIL, 1 - TAIL])
     return float(np.exp(u[order[min(high, len(u) - 1)]] - u[order[low]]))
-
-
-def _at(point: Floats) -> str:
-    return "({})".format(", ".join(f"{x:.4g}" for x in point))

@@ -21,6 +21,7 @@ from hexwrap_solver.conformal.types import (
 )
 from hexwrap_solver.errors import BoundaryError, GaussBonnetError, SingularitiesError
 from hexwrap_solver.surface.types import Surface
+from hexwrap_solver.words import length, place
 
 #: A point belongs to the boundary up to this part of its size away, or up to its longest edge.
 FAR = 0.02
@@ -214,10 +215,9 @@ def _nearest(surface: Surface, points: Floats, entries: Ints, field: list[Field]
     far = np.flatnonzero(distance > allowed)
     if len(far):
         entry = entries[far[0]]
-        place, foot = (", ".join(f"{x:.6g}" for x in p) for p in (points[entry], at[nearest[far[0]]]))
         raise BoundaryError(
-            f"The point ({place}) is {distance[far[0]]:.4g} away from the boundary, whose nearest vertex "
-            f"stands at ({foot}): angles are for points on the boundary.",
+            f"The point {place(points[entry])} is {length(distance[far[0]])} away from the boundary, whose "
+            f"nearest vertex stands at {place(at[nearest[far[0]]])}: angles are for points on the boundary.",
             field=(*field[entry], "point"),
         )
     return np.asarray(boundary[nearest])

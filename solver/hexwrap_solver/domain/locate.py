@@ -8,7 +8,7 @@ import numpy as np
 
 from hexwrap_solver.arrays import Complexes, Floats, Ints
 from hexwrap_solver.conformal.types import ConformalMap
-from hexwrap_solver.tolerances import TINY
+from hexwrap_solver.tolerances import RELATIVE, TINY
 
 #: A place this far outside of a triangle, in barycentric coordinates, still counts as on its edge.
 ON_EDGE = 1e-9
@@ -55,7 +55,7 @@ class TriangleIndex:
         high = np.stack([corners.real.max(axis=1), corners.imag.max(axis=1)], axis=1)
         self.low, self.high = low, high
         self.origin = low.min(axis=0)
-        size = np.maximum((high - low).max(axis=1), 1e-9 * float((high.max(axis=0) - self.origin).max()))
+        size = np.maximum((high - low).max(axis=1), RELATIVE * float((high.max(axis=0) - self.origin).max()))
         level = np.ceil(np.log2(size)).astype(np.int64)
         self.levels = [self._level(low, high, np.flatnonzero(level == e), int(e)) for e in np.unique(level)]
 

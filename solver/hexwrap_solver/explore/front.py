@@ -8,6 +8,7 @@ import numpy as np
 
 from hexwrap_solver.arrays import Bools, Floats, Ints
 from hexwrap_solver.explore.types import Figures, Limits
+from hexwrap_solver.tolerances import TINY
 
 #: Variants that are solved, at most.
 MOST_SOLVED = 30
@@ -22,7 +23,7 @@ NEARLY = 1.05
 def objectives(figures: Sequence[Figures]) -> Floats:
     """(v, 3) less is better: uncovered, types, log cost."""
     return np.array(
-        [[f.uncovered, f.types, np.log(max(f.cost, 1e-300))] for f in figures], dtype=np.float64
+        [[f.uncovered, f.types, np.log(max(f.cost, TINY))] for f in figures], dtype=np.float64
     ).reshape(-1, 3)
 
 

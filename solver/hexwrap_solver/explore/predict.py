@@ -1,17 +1,17 @@
 """What panels will come to, foreseen from the map and the place of the lattice on it, without a pattern.
 
 The cell that would stand at a point has an edge in proportion to e^−u, so that over the surface the sizes of
-the cells are known, and how many there are of each. Their largest regular panels are smaller for one reason
-that the map says: where u has a gradient, the cell is not regular. To first order the map carries the
-polygon P around 0 by z + a z²/2, where |a| is the gradient of u; its edges turn, and the largest regular
-polygon between them is shorter by a part of |a|·ℓ of its edge ℓ (``floor``). With these lengths the exact
-programme over the size classes (``partition_by_area``), of each kind of cell by itself, says how much is left
-uncovered.
+the cells are known, and how many there are of each. Their largest regular panels are smaller for two reasons.
+Where u has a gradient g, and where the domain was stretched for the lattice to fit its boundary or features,
+the cell is no regular polygon: to first order the polygon P around 0 is carried by z − ḡ z²/2 + μ z̄. Its
+edges turn, and the largest regular polygon between them is shorter by a part of its edge (``shortened``).
+With these lengths the exact programme over the size classes (``partition_by_area``), of each kind of cell by
+itself, says how much is left uncovered.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -22,16 +22,16 @@ from hexwrap_solver.domain.locate import barycentric
 from hexwrap_solver.panels.sizes import partition_by_area
 from hexwrap_solver.pattern.lattice import LATTICES, Lattice
 from hexwrap_solver.pattern.lay.nodes import lattice_points_in_triangles
+from hexwrap_solver.pattern.lay_pattern import CLOSE, off_by
 from hexwrap_solver.pattern.place.choose import PlacementFamily
 from hexwrap_solver.pattern.place.rotation import with_rotation
 from hexwrap_solver.pattern.types import Kind, PatternSettings
+from hexwrap_solver.tolerances import RELATIVE, TINY
 
 #: Half a row of cells, in edges, where every other cell of a row stands half a cell higher.
 ROW: dict[Kind, float] = {"hex": 3**0.5 / 4}
 #: Cells stand on either side of a line of other patterns; those nearer to it are cut by it in two.
 HALVED = 0.25
-#: Directions of the gradient over which the floor is averaged.
-DIRECTIONS = 360
 #: Cells that a boundary cuts, per cell of area that is left of them: those whose middle is nearer to it than
 #: they reach, on either side, of which half the area is inside.
 TRIMMED = 2.0
@@ -66,7 +66,7 @@ class Outlook:
     the boundary as they reach, on the average over all directions (perimeter/2π); along a loop that is a line
     of the pattern, half a row. special: cells with another number of sides; trimmed: those cut at the
     boundary; folded: pieces of those that features cut, of that many kinds; rest: area of all these, which
-    their panels are taken to cover.
+    their panels are taken to cover. distortion: of the placement.
     """
 
     lattice: Lattice
@@ -78,6 +78,12 @@ class Outlook:
     folded: int = 0
     kinds: int = 0
     rest: float = 0.0
+    distortion: float = 0.0
+
+    @property
+    def edge(self) -> float:
+        """Mean edge of the cells."""
+        return float(self.size.mean()) if len(self.size) else np.inf
 
     def foresee(self, sizes: int | None, joint: float = 0.0) -> Foreseen:
         """With this many size classes (None: a length for each panel) and joints at least so wide."""
@@ -123,28 +129,40 @@ def outlook(cmap: ConformalMap, settings: PatternSettings, progress: Progress = 
     settings, _ = with_rotation(cmap, lattice, settings)
     placing = PlacementFamily.of(cmap, lattice, settings)
     progress(0.5, "placing the lattice")
-    placement = placing.at(settings)
-    surface = cmap.surface
-    p, q, r = placement.glued.corners(surface.faces, placement.place).T
+    seen = _outlook(cmap, placing, settings)
+    wanted, edge = settings.edge_length, seen.edge
+    if wanted is None or abs(edge / wanted - 1) <= CLOSE:
+        return seen
+    # As ``lay_pattern`` does, which may come to other numbers of cells and rows.
+    again = _outlook(cmap, placing, replace(settings, edge_length=wanted**2 / edge))
+    return min(seen, again, key=lambda one: off_by(one.edge, wanted, one.distortion))
+
+
+def _outlook(cmap: ConformalMap, placing: PlacementFamily, settings: PatternSettings) -> Outlook:
+    lattice, placement, surface = placing.lattice, placing.at(settings), cmap.surface
+    placed = placement.glued.corners(surface.faces, placement.place)
+    p, q, r = placed.T
     cells = abs(((q - p).conj() * (r - p)).imag) / (2 * lattice.cell_area)
     a, b, c = (surface.vertices[corner] for corner in surface.faces.T)
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
-    n = len(surface.vertices)
-    around: Floats = np.bincount(surface.faces.ravel(), np.repeat(cells, 3) / 3, n).astype(np.float64)
+    wider, skew = _stretched(placing.cmap.corners(), placed)
     unit = lattice.cell_area / lattice.edge**2
     size: Floats = np.exp(-(cmap.log_scale - cmap.log_scale.mean()))
-    size *= np.sqrt(area.sum() / (unit * float(around @ size**2)))
+    square = (size**2)[surface.faces].mean(axis=1) / wider**2
+    size *= np.sqrt(area.sum() / (unit * float(cells @ square)))
     slope: Floats = np.bincount(surface.faces.ravel(), np.repeat(area * _slope(cmap, area), 3)).astype(float)
-    slope = slope / np.maximum(np.bincount(surface.faces.ravel(), np.repeat(area, 3)), 1e-300)
-    face, weight, sides = _middles(lattice, placement.glued.corners(surface.faces, placement.place))
+    slope = slope / np.maximum(np.bincount(surface.faces.ravel(), np.repeat(area, 3)), TINY)
+    face, weight, sides = _middles(lattice, placed)
     here, slope, middle = (
         np.einsum("kc,kc...->k...", weight, values[surface.faces[face]])
         for values in (np.log(size), slope, surface.vertices)
     )
-    size = np.exp(here)
-    unit_area, lost = np.zeros(lattice.sides + 1), np.zeros(lattice.sides + 1)
+    size = np.exp(here) / wider[face]
+    uphill = _uphill(placed, cmap.log_scale[surface.faces])[face]
+    unit_area, shorter = np.zeros(lattice.sides + 1), np.zeros(len(face))
     for kind, outline in lattice.centred.items():
-        unit_area[kind], lost[kind] = _area(outline), floor(outline)
+        unit_area[kind], own = _area(outline), sides == kind
+        shorter[own] = shortened(outline, (slope * size * uphill)[own], skew[face[own]])
     reach: Floats = np.asarray(sides / (2 * np.pi) * size)
     regular, alone = np.ones(len(face), dtype=bool), len(cmap.cones)
     if alone:
@@ -163,26 +181,47 @@ def outlook(cmap: ConformalMap, settings: PatternSettings, progress: Progress = 
     if settings.boundary == "trim":
         beside, cut = ~whole, round(TRIMMED * float((regular & ~whole & ~bent).sum()))
     rest = float((unit_area[sides] * size**2)[beside].sum())
-    shorter = np.minimum(lost[sides] * slope * size, 1.0)
+    shorter = np.minimum(shorter, 1.0)
     folded, kinds = 2 * int(bent.sum()), 2 * len(_levels(size[bent])[0]) if bent.any() else 0
     size, shorter, sides = size[whole], shorter[whole], sides[whole]
-    return Outlook(lattice, sides, size, size * (1 - shorter), alone, cut, folded, kinds, rest)
+    limit = size * (1 - shorter)
+    return Outlook(lattice, sides, size, limit, alone, cut, folded, kinds, rest, placement.distortion)
 
 
-def floor(outline: Complexes) -> float:
-    """By how much the largest polygon of the same shape in the image of a cell, (p,) corners around 0, under
-    z + a z²/2 is shorter, to first order, divided by |a| and averaged over the directions of a.
+def shortened(outline: Complexes, gradient: Complexes, skew: Complexes) -> Floats:
+    """(k,) by which part the largest polygon of the same shape in the image of a cell, (p,) corners around 0,
+    under z − ḡ z²/2 + μ z̄ is shorter, to first order, for each g and μ (k,).
 
-    An edge with normal n turns by Im(a n) times its distance from 0, and lowers that by its distance times
-    t·|Im(a n)|, t its farther end's distance from the foot. How far its middle moves, a shift of the polygon
-    makes up for. Of edges in opposite pairs the worst counts; three give way to each other.
+    An edge that comes nearer to 0 at one of its ends costs a part of its distance from 0. A shift of the
+    polygon makes up for what opposite edges lose unequally, so that the worst pair counts; three, of which
+    none are opposite, give way to each other.
     """
+    moved = skew[:, None] * outline.conj() - gradient.conj()[:, None] * outline**2 / 2
     edge = np.roll(outline, -1) - outline
-    along = edge / abs(edge)
-    end = np.maximum(abs((along.conj() * outline).real), abs((along.conj() * np.roll(outline, -1)).real))
-    turn = np.exp(2j * np.pi * np.arange(DIRECTIONS) / DIRECTIONS)
-    lost = end * abs((turn[:, None] * -1j * along).imag)
-    return float((lost.mean(axis=1) if len(outline) == 3 else lost.max(axis=1)).mean())
+    normal = -1j * edge / abs(edge)
+    first, second = ((normal.conj() * m).real for m in (moved, np.roll(moved, -1, axis=1)))
+    lost = -np.minimum(first, second) / (normal.conj() * outline).real
+    one, other = np.nonzero(abs(normal[:, None] + normal) < RELATIVE)
+    if not len(one):
+        return np.asarray(lost.mean(axis=1))
+    return np.asarray((lost[:, one] + lost[:, other]).max(axis=1) / 2)
+
+
+def _stretched(conformal: Complexes, placed: Complexes) -> tuple[Floats, Complexes]:
+    """(m,) by what the lattice is larger on the triangles, (m, 3) each, where it was placed than on the map;
+    and (m,) μ: a circle of the lattice is drawn as z + μ z̄ on the map."""
+    (e, f), (g, h) = ((t[:, 1] - t[:, 0], t[:, 2] - t[:, 0]) for t in (conformal, placed))
+    area = e * f.conj() - e.conj() * f
+    turn, skew = (g * f.conj() - h * e.conj()) / area, (e * h - f * g) / area  # g = turn·e + skew·ē
+    return np.sqrt(abs(abs(turn) ** 2 - abs(skew) ** 2)), -skew / turn.conj()
+
+
+def _uphill(placed: Complexes, values: Floats) -> Complexes:
+    """(m,) unit vectors, or 0, along the gradients of values at the corners (m, 3) of triangles."""
+    e, f = placed[:, 1] - placed[:, 0], placed[:, 2] - placed[:, 0]
+    turned = (values[:, 1] - values[:, 0]) * f - (values[:, 2] - values[:, 0]) * e
+    length = abs(turned)
+    return np.asarray(-1j * turned / np.where(length > 0, length, 1.0))
 
 
 def _area(outline: Complexes) -> float:
@@ -220,7 +259,7 @@ def _slope(cmap: ConformalMap, area: Floats) -> Floats:
     corner = surface.vertices[surface.faces]
     opposite = np.roll(corner, -2, axis=1) - np.roll(corner, -1, axis=1)  # of corner k: from k+1 to k+2
     turned = (cmap.log_scale[surface.faces][..., None] * opposite).sum(axis=1)  # the gradient, turned by 90°
-    return np.asarray(np.linalg.norm(turned, axis=1) / np.maximum(2 * area, 1e-300))
+    return np.asarray(np.linalg.norm(turned, axis=1) / np.maximum(2 * area, TINY))
 
 
 def _levels(length: Floats) -> tuple[Floats, Floats]:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from hexwrap_solver.arrays import Floats, Ints
+from hexwrap_solver.tolerances import TINY
 
 #: Lovász' constant.
 DELTA = 0.99
@@ -21,7 +22,7 @@ class NearestIntegers:
 
     def __init__(self, gram: Floats) -> None:
         n = len(gram)
-        self._gram = gram + RIDGE * max(float(np.trace(gram)), 1e-300) / max(n, 1) * np.eye(n)
+        self._gram = gram + RIDGE * max(float(np.trace(gram)), TINY) / max(n, 1) * np.eye(n)
         root = np.asarray(np.linalg.cholesky(self._gram).T, dtype=np.float64)
         self._change = _reduced(root)
         self._upper = _triangular(root @ self._change)

@@ -22,6 +22,7 @@ from hexwrap_solver.panels.polygons import (
     take_rows,
 )
 from hexwrap_solver.panels.types import Components, ComponentSettings, Panels
+from hexwrap_solver.tolerances import RELATIVE
 
 #: Interior angles above this are reflex; a straight corner's is π to rounding.
 REFLEX = np.pi + 1e-6
@@ -61,7 +62,7 @@ def _inset(panels: Panels, inset: float) -> Ragged:
     width = np.where(thin, np.maximum(room, 0.0) / 2, inset)
     # The mitred corner lies at distance ``width`` from both edges' lines: the bisector, scaled.
     bend = 1 + dot(before, inward)[:, None]
-    moved = points + width[row, None] * (before + inward) / np.maximum(bend, 1e-9)
+    moved = points + width[row, None] * (before + inward) / np.maximum(bend, RELATIVE)
     folded = row_minima(dot(moved[polygons.next()] - moved, edge_vectors(polygons)), polygons.offsets)
     # Where a short edge would turn round, the outline shrinks about the centre instead.
     factor = 1 - (width / np.where(room > 0, room, np.inf))[row, None]

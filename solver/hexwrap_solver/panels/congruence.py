@@ -10,6 +10,8 @@ from hexwrap_solver.panels.polygons import edge_vectors, row_maxima, row_minima
 
 #: Figures (relative to the mean edge, or radians) that differ by less are the same.
 TOLERANCE = 1e-7
+#: Numbers made of several stay below.
+LARGEST = 2**62
 
 
 def congruence_classes(polygons: Ragged, angle: Floats) -> Ints:
@@ -36,27 +38,35 @@ def congruence_classes(polygons: Ragged, angle: Floats) -> Ints:
 
 
 def _letters(polygons: Ragged, angle: Floats) -> Ints:
-    """(·,) one integer per corner for its edge length, angle and twist."""
+    """(·,) an integer per corner for its edge length, angle and twist."""
     following = polygons.next()
     edge = edge_vectors(polygons)
     length = np.sqrt(dot(edge, edge))
     unit = float(length.mean()) if len(length) else 1.0
-    ahead = edge[following]
-    twist = dot(np.cross(edge, ahead), ahead[following]) / unit**3
+    ahead = edge.take(following, axis=0)
+    twist = dot(np.cross(edge, ahead), ahead.take(following, axis=0)) / unit**3
     merged = [_merge(figure, polygons) for figure in (length / unit, angle, twist)]
-    return _numbered(np.stack(merged, axis=1))
+    return _joined(np.stack(merged, axis=1))
 
 
 def _numbered(words: Ints) -> Ints:
-    """(q,) number of each row (q, n) of small integers ≥ 0, in lexicographic order.
+    """(q,) number of each row (q, n) of integers ≥ 0, in lexicographic order."""
+    return np.asarray(np.unique(_joined(words), return_inverse=True)[1], dtype=np.int64)
+
+
+def _joined(words: Ints) -> Ints:
+    """(q,) an integer for each row (q, n) of integers ≥ 0, in lexicographic order.
 
     Column by column two numbers become one; sorting whole rows takes many times as long.
     """
-    number = words[:, 0]
-    for letter in words.T[1:]:
-        pair = number * (int(letter.max(initial=0)) + 1) + letter
-        number = np.unique(pair, return_inverse=True)[1]
-    return np.asarray(np.unique(number, return_inverse=True)[1], dtype=np.int64)
+    number, span = np.zeros(len(words), dtype=np.int64), 1
+    for letter in words.T:
+        size = int(letter.max(initial=0)) + 1
+        if span * size > LARGEST:
+            number, letter = (np.unique(part, return_inverse=True)[1] for part in (number, letter))
+            span, size = (int(part.max(initial=0)) + 1 for part in (number, letter))
+        number, span = number * size + letter, span * size
+    return number
 
 
 def _merge(values: Floats, polygons: Ragged) -> Ints:

@@ -44,7 +44,7 @@ def edge_ends(polygons: Ragged, panel: Ints, corner: Ints) -> tuple[Floats, Floa
     """(k, 3) both ends of the panels' edges that start at the given corners."""
     start, count = polygons.offsets[panel], polygons.lengths[panel]
     points = np.asarray(polygons.values, dtype=np.float64)
-    return points[start + corner], points[start + (corner + 1) % count]
+    return points.take(start + corner, axis=0), points.take(start + (corner + 1) % count, axis=0)
 
 
 def widths(polygons: Ragged, facing: Facing) -> Floats:

@@ -14,6 +14,7 @@ import numpy as np
 from hexwrap_solver.arrays import Bools, Floats, Ints
 from hexwrap_solver.geometry import cross_2d
 from hexwrap_solver.panels.regular import Poses
+from hexwrap_solver.tolerances import RELATIVE
 
 #: Multipliers of a dual vertex count as non-negative down to this (their sum is of order 1).
 DUAL_TOLERANCE = 1e-12
@@ -102,11 +103,11 @@ def _touching_centre(flat: Floats, h: Floats, room: Floats, triple: Ints) -> Flo
     right = room[rows, triple]
     # Two parallel sides bound a panel that can still slide between them; least norm keeps it near the
     # centroid.
-    singular = np.abs(np.linalg.det(matrix)) < 1e-9
+    singular = np.abs(np.linalg.det(matrix)) < RELATIVE
     solution = np.zeros((len(flat), 3))
     solution[~singular] = np.linalg.solve(matrix[~singular], right[~singular][..., None])[..., 0]
     solution[singular] = np.einsum(
-        "qij,qj->qi", np.linalg.pinv(matrix[singular], rcond=1e-9), right[singular]
+        "qij,qj->qi", np.linalg.pinv(matrix[singular], rcond=RELATIVE), right[singular]
     )
     return solution[:, :2]
 

@@ -67,13 +67,15 @@ def _lie_apart(
     apart."""
     mean = normal[first] + normal[second]
     flat = across - (dot(across, mean) / dot(mean, mean))[:, None] * mean
-    axis = np.ascontiguousarray(normalize(flat).T)
+    axis = normalize(flat).T
     points = np.ascontiguousarray(polygons.values.T)
     origin = points[:, polygons.offsets[first]]
-    own, other = (
-        np.einsum("dck,dk->ck", points[:, _corners(polygons, which)] - origin[:, None], axis)
-        for which in (first, second)
-    )
+
+    def shadow(which: Ints) -> Floats:
+        corner = _corners(polygons, which)
+        return np.asarray(sum((points[d].take(corner) - origin[d]) * axis[d] for d in range(3)))
+
+    own, other = shadow(first), shadow(second)
     return np.asarray((other.min(axis=0) >= own.max(axis=0) - slack) & flat.any(axis=1))
 
 

@@ -37,7 +37,7 @@ def means(polygons: Ragged) -> Floats:
 
 def edge_vectors(polygons: Ragged) -> Floats:
     """(·, 3) from each corner to the next."""
-    return np.asarray(polygons.values[polygons.next()] - polygons.values, dtype=np.float64)
+    return np.asarray(polygons.values.take(polygons.next(), axis=0) - polygons.values, dtype=np.float64)
 
 
 def edge_lengths(polygons: Ragged) -> Floats:
@@ -51,16 +51,21 @@ def mean_edges(polygons: Ragged) -> Floats:
     return row_sums(edge_lengths(polygons), polygons.offsets) / polygons.lengths
 
 
+def _spokes(polygons: Ragged) -> Floats:
+    """(·, 3) from the mean of the corners to each."""
+    return np.asarray(polygons.values - means(polygons).take(polygons.row, axis=0))
+
+
 def area_vectors(polygons: Ragged) -> Floats:
     """(q, 3) ½ Σ p_k × p_{k+1} about the mean: the area for flat polygons, along the normal."""
-    spoke = polygons.values - means(polygons)[polygons.row]
-    return row_sums(np.cross(spoke, spoke[polygons.next()]) / 2, polygons.offsets)
+    spoke = _spokes(polygons)
+    return row_sums(np.cross(spoke, spoke.take(polygons.next(), axis=0)) / 2, polygons.offsets)
 
 
 def fan_areas(polygons: Ragged) -> Floats:
     """(q,) area of the fan of triangles around the mean of the corners."""
-    spoke = polygons.values - means(polygons)[polygons.row]
-    triangle = np.linalg.norm(np.cross(spoke, spoke[polygons.next()]), axis=1) / 2
+    spoke = _spokes(polygons)
+    triangle = np.linalg.norm(np.cross(spoke, spoke.take(polygons.next(), axis=0)), axis=1) / 2
     return row_sums(triangle, polygons.offsets)
 
 
@@ -69,7 +74,7 @@ def interior_angles(polygons: Ragged, normal: Floats) -> Floats:
     ahead = edge_vectors(polygons)
     back = np.empty_like(ahead)
     back[polygons.next()] = -ahead
-    n = normal[polygons.row]
+    n = normal.take(polygons.row, axis=0)
     turn = np.cross(ahead, back)
     sine, cosine = dot(turn, n), dot(ahead, back)
     # The full length of the cross product, not its part along n, gives the angle of bent corners.
@@ -89,9 +94,9 @@ def best_plane_distances(polygons: Ragged) -> Floats:
     The area vector stands on the plane of a flat polygon; of the others the moments are needed.
     """
     row = polygons.row
-    spoke = np.asarray(polygons.values - means(polygons)[row])
-    normal = normalize(row_sums(np.cross(spoke, spoke[polygons.next()]), polygons.offsets))
-    distance = dot(spoke, normal[row])
+    spoke = _spokes(polygons)
+    normal = normalize(row_sums(np.cross(spoke, spoke.take(polygons.next(), axis=0)), polygons.offsets))
+    distance = dot(spoke, normal.take(row, axis=0))
     reach = row_maxima(dot(spoke, spoke), polygons.offsets)
     bent = np.flatnonzero(
         ~(row_maxima(np.abs(distance), polygons.offsets) <= FLAT * np.sqrt(reach)) | ~normal.any(axis=1)

@@ -56,7 +56,8 @@ def measure(
     facing = _facing(pattern, edges, parts)
     between = gaps(facing, parts, len(edges.cell))
     angle = interior_angles(polygons, panels.normal)
-    part_angle = interior_angles(parts.polygons, parts.normal)
+    flat = parts is panels  # none is bent
+    part_angle = angle if flat else interior_angles(parts.polygons, parts.normal)
     row, count, edge = polygons.row, polygons.lengths, edge_lengths(polygons)
     mean = row_sums(edge, polygons.offsets) / count
     ideal = _ideal_angles(pattern, panels, angle, (np.pi * (count - 2) / count)[row])
@@ -113,7 +114,8 @@ def _surface_distances(surface: Surface, pattern: Pattern, panels: Panels) -> Fl
     corner = np.arange(len(polygons.values)) - polygons.offsets[polygons.row]  # a trimmed panel may have more
     corner = np.minimum(corner, pattern.faces.lengths[panels.face][polygons.row] - 1)
     beside = pattern.triangle[pattern.faces.values[start[polygons.row] + corner].astype(np.int64)]
-    return tree.farthest(points, row, n, np.concatenate([beside, tree.centroids.query(panels.center)[1]]))
+    near = tree.walked(points, np.concatenate([beside, beside[polygons.offsets[:-1]]]), surface.twin)
+    return tree.farthest(points, row, n, near)
 
 
 def _facing(pattern: Pattern, edges: HalfEdges, panels: Panels) -> Facing:

@@ -23,6 +23,7 @@ from hexwrap_solver.panels.sizes import (
     partition,
 )
 from hexwrap_solver.panels.types import FittedPanels, Panels, PanelSettings, TradeOff
+from hexwrap_solver.words import place
 
 #: The trade-off curve is computed for 1 … this many classes.
 TRADE_OFF_CLASSES = 40
@@ -231,11 +232,11 @@ def _wide_note(fitted: FittedPanels, found: Fewest, max_gap: float) -> tuple[str
         return ()
     worst = int(np.where(found.over, found.width, -np.inf).argmax())
     pair = (fitted.facing.left[worst], fitted.facing.right[worst])
-    x, y, z = np.mean([fitted.center[panel] for panel in pair], axis=0)
+    middle = np.mean([fitted.center[panel] for panel in pair], axis=0)
     return (
         f"{int(found.over.sum())} joints are wider than max_gap {max_gap:g} even where every panel has a"
         f" length of its own, the widest {found.width[worst]:.4g}, between panels {pair[0]} and {pair[1]} at"
-        f" ({x:.4g}, {y:.4g}, {z:.4g}): smaller cells, another boundary condition or a max_gap of at least"
+        f" {place(middle)}: smaller cells, another boundary condition or a max_gap of at least"
         f" {found.width[worst]:.4g} would help.",
     )
 
@@ -280,8 +281,8 @@ def _polygons(fitted: FittedPanels, length: Floats) -> Ragged:
     offsets = np.concatenate([[0], np.cumsum(count)]).astype(np.int64)
     points = np.zeros((int(offsets[-1]), 3))
     is_regular = np.repeat(regular, count)
-    center = fitted.center[regular]
-    points[is_regular] = center[spokes.row] + length[spokes.row, None] * spokes.values
+    center, row = fitted.center[regular], spokes.row
+    points[is_regular] = center.take(row, axis=0) + length.take(row)[:, None] * spokes.values
     points[~is_regular] = fitted.shapes.values
     return Ragged(points, offsets)
 

@@ -13,6 +13,7 @@ from hexwrap_solver.pattern.place.placement import Placement
 from hexwrap_solver.pattern.trim.folds import Seams
 from hexwrap_solver.pattern.types import PatternFeature
 from hexwrap_solver.surface.features import FeatureEdges
+from hexwrap_solver.tolerances import RELATIVE
 
 
 def on_features(
@@ -62,7 +63,7 @@ def _prices(cmap: ConformalMap, placement: Placement) -> np.ndarray:
     """(m,) ratios of singular values − 1."""
     change = derivatives(cmap, placement.glued)
     bent, kept = change.strains(placement.place, change.of_shift(placement.glued.shift))
-    return np.asarray(2 * bent / np.maximum(kept - bent, 1e-9 * kept))
+    return np.asarray(2 * bent / np.maximum(kept - bent, RELATIVE * kept))
 
 
 def _cut_along(chain: Ints, corner: Ints, shape: Ragged, whole: Bools) -> int:

@@ -40,6 +40,7 @@ import numpy as np
 
 from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints
 from hexwrap_solver.pattern.types import Kind
+from hexwrap_solver.tolerances import RELATIVE
 
 Point = tuple[int, int]
 
@@ -241,7 +242,7 @@ class Lattice:
         """(sides, 2) corners, about their mean, of a cell that is not a regular polygon; else None."""
         outline = self.outlines[sides]
         edge = np.roll(outline, -1) - outline
-        if np.ptp((np.roll(edge, -1) / edge).real) < 1e-9:
+        if np.ptp((np.roll(edge, -1) / edge).real) < RELATIVE:
             return None
         about = self.centred[sides]
         return np.stack([about.real, about.imag], axis=1)

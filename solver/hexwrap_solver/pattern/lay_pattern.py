@@ -49,6 +49,7 @@ from hexwrap_solver.pattern.types import Pattern, PatternSettings
 from hexwrap_solver.surface.features import FeatureEdges
 from hexwrap_solver.surface.normals import with_tangents
 from hexwrap_solver.surface.projection import project, start_parameters
+from hexwrap_solver.tolerances import RELATIVE
 
 #: Relative error of an edge length asked for that calls for a second attempt.
 CLOSE = 0.005
@@ -88,8 +89,7 @@ def lay_pattern(cmap: ConformalMap, settings: PatternSettings, progress: Progres
     if wanted is not None and abs(pattern.edge_length / wanted - 1) > CLOSE:
         corrected = replace(settings, edge_length=wanted**2 / pattern.edge_length)
         again = _lay(cmap, placing, corrected, no_progress)
-        if abs(again.edge_length / wanted - 1) < abs(pattern.edge_length / wanted - 1):
-            pattern = again
+        pattern = min(pattern, again, key=lambda one: off_by(one.edge_length, wanted, one.distortion))
         if abs(pattern.edge_length / wanted - 1) > ASKED:
             notes.append(
                 f"The mean edge length is {pattern.edge_length:.6g} instead of {wanted:.6g}, so that the "
@@ -97,6 +97,12 @@ def lay_pattern(cmap: ConformalMap, settings: PatternSettings, progress: Progres
                 "had with around."
             )
     return replace(pattern, notes=(*notes, *pattern.notes))
+
+
+def off_by(edge: float, wanted: float, distortion: float) -> float:
+    """How far a pattern is from what is wanted: of two that miss the length by as much the less stretched one
+    is taken."""
+    return abs(edge / wanted - 1) + distortion
 
 
 class _CoarseError(PatternError):
@@ -201,7 +207,7 @@ def layout_of(cmap: ConformalMap, lattice: Lattice, placement: Placement) -> Lay
     net = cmap.net
     corners = placement.glued.corners(cmap.surface.faces, placement.place)
     extent = float(abs(corners).max())
-    tolerance = max(1e-9, ROUNDING * extent, 2 * cmap.closing_error * extent)
+    tolerance = max(RELATIVE, ROUNDING * extent, 2 * cmap.closing_error * extent)
     return Layout(
         corners,
         net.across,

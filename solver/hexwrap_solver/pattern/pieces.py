@@ -12,6 +12,7 @@ from hexwrap_solver.arrays import Bools, Complexes, Ints, Ragged
 from hexwrap_solver.pattern.lattice import Lattice
 from hexwrap_solver.pattern.lay.cells import Cells
 from hexwrap_solver.pattern.types import FoldPieces, PatternFeature
+from hexwrap_solver.tolerances import TINY
 
 #: Places in the lattice, edge 1, that differ by less are the same; areas, too.
 SAME = 1e-6
@@ -78,6 +79,6 @@ def _from_the_fold(shape: Ragged, place: Complexes, step: Complexes, side: Ints)
     within = np.arange(len(row)) - offsets[row]
     at = shape.offsets[cell][row] + (side[row] - shape.offsets[cell][row] + within) % count[row]
     middle = place[side] + step[side] / 2
-    along = step[side] / np.maximum(abs(step[side]), 1e-300)
+    along = step[side] / np.maximum(abs(step[side]), TINY)
     seen = (place[at] - middle[row]) / along[row]
     return Ragged(np.stack([seen.real, seen.imag], axis=-1), offsets)

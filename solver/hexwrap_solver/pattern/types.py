@@ -164,7 +164,7 @@ class Pattern:
     @property
     def cells(self) -> Ragged:
         """The corners of the cells on the surface."""
-        return Ragged(self.vertices[self.faces.values.astype(np.int64)], self.faces.offsets)
+        return Ragged(self.vertices.take(self.faces.values.astype(np.int64), axis=0), self.faces.offsets)
 
     def labels(self) -> list[str]:
         """Ring and place, as ``R03-P017``; at least two and three digits."""

@@ -28,6 +28,7 @@ from hexwrap_solver.singularities.solvable import solvable
 from hexwrap_solver.singularities.types import End
 from hexwrap_solver.surface.topology import next_half_edge
 from hexwrap_solver.surface.types import Surface
+from hexwrap_solver.tolerances import RELATIVE, TINY
 
 #: Units of the unknowns beside moves by a cell: a dipole's amplitude, a uniform stretch, a turn of the
 #: lattice, a change of its scale.
@@ -276,7 +277,7 @@ class Chart:
             new = energy.gradient(seen)
             after = float(np.abs(new).max())
             good = after < residual and not seen.violating.any()
-            gain = after / max(residual, 1e-300)
+            gain = after / max(residual, TINY)
             if good:
                 x, corners, gradient, residual = trial, seen, new, after
             if residual <= SMALL and gain > CHORD_GAIN:
@@ -452,7 +453,7 @@ class Closing:
     def _least(self, changed: list[Holonomy], factors: Complexes) -> complex:
         """Of many places of the lattice the one whose nearest translations ask for the least moves."""
         image = self.base.image[self.kept]
-        inverse = np.linalg.pinv(self._slopes(changed, 1.0), rcond=1e-9)
+        inverse = np.linalg.pinv(self._slopes(changed, 1.0), rcond=RELATIVE)
         wanted = factors[:, None] * image
         zeta = self.zeta ** np.arange(2)
         nearest = near_lattice(wanted / self.divisor, self.order) @ zeta * self.divisor
@@ -483,7 +484,7 @@ class Closing:
         here = self._values(self.base, factor)
         slopes = self._slopes(changed, factor)
         steps, rest = self._lattice(factor)
-        inverse = np.linalg.pinv(slopes, rcond=1e-9)
+        inverse = np.linalg.pinv(slopes, rcond=RELATIVE)
         weighted = inverse @ steps
         centre = np.linalg.lstsq(weighted, inverse @ (here - rest), rcond=None)[0]
         z, _ = nearest_integers(
@@ -539,7 +540,7 @@ class Closing:
     def moves(self) -> Floats:
         """(s, 2) cells, by which the singularities would have to move if the map were linear in them."""
         factor, wanted, slopes = self._linear
-        step = np.linalg.lstsq(slopes, wanted - self._values(self.base, factor), rcond=1e-9)[0]
+        step = np.linalg.lstsq(slopes, wanted - self._values(self.base, factor), rcond=RELATIVE)[0]
         return np.asarray(step[: 2 * len(self.chart.cones)].reshape(-1, 2), dtype=np.float64)
 
     @property
@@ -559,9 +560,9 @@ class Closing:
         for _ in range(STEPS):
             if best <= DONE:
                 break
-            d: Floats = np.linalg.lstsq(slopes, off, rcond=1e-9)[0].astype(np.float64)
+            d: Floats = np.linalg.lstsq(slopes, off, rcond=RELATIVE)[0].astype(np.float64)
             stride = float(np.hypot(d[0:s:2], d[1:s:2]).max())
-            d *= min(1.0, STRIDE / max(stride, 1e-300))
+            d *= min(1.0, STRIDE / max(stride, TINY))
             d, new_seen = self._stepped(x, d, ROUGH * best)
             new_x, new_factor = x + d[:-2], factor * complex(np.exp(1j * TURN * d[-2] + SCALE * d[-1]))
             new_off = wanted - self._values(new_seen.holonomy, new_factor)

@@ -23,6 +23,7 @@ from hexwrap_solver.conformal.types import Targets
 from hexwrap_solver.linalg.factor import Factorisation
 from hexwrap_solver.singularities.types import Rules
 from hexwrap_solver.surface.types import Surface
+from hexwrap_solver.tolerances import TINY
 
 #: The surface is seen in about this many patches: u is smooth, and a patch is as large as a cell or so.
 PATCHES = 1200
@@ -62,7 +63,7 @@ class Steepness:
         degree = np.maximum(np.bincount(pairs.ravel(), minlength=n), 1)
         row = pairs.T.ravel()
         share = csr_array((1.0 / degree[row], (row, np.concatenate([at, at]))), shape=(n, len(pairs)))
-        return cls(pairs, 1 / np.maximum(far, 1e-300), share)
+        return cls(pairs, 1 / np.maximum(far, TINY), share)
 
 
 @dataclass(frozen=True)
@@ -343,7 +344,7 @@ def _patches(surface: Surface, area: Floats, wanted: int) -> tuple[Ints, Ints]:
 
 
 def _means(points: Floats, group: Ints, weight: Floats) -> Floats:
-    total = np.maximum(np.bincount(group, weight), 1e-300)
+    total = np.maximum(np.bincount(group, weight), TINY)
     return np.stack([np.bincount(group, weight * x) / total for x in points.T], axis=1)
 
 
@@ -375,7 +376,7 @@ def distance_to(place: Floats, line: Floats) -> Floats:
     """(q,) of points (q, 3) from a polyline (k, 3), or from its one point."""
     start, end = (line[:-1], line[1:]) if len(line) > 1 else (line, line)
     along = end - start
-    square = np.maximum((along**2).sum(axis=1), 1e-300)
+    square = np.maximum((along**2).sum(axis=1), TINY)
     least = np.full(len(place), np.inf)
     for a, step, length in zip(
         *(np.array_split(part, range(256, len(start), 256)) for part in (start, along, square)), strict=True

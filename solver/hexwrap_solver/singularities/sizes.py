@@ -6,6 +6,7 @@ import numpy as np
 
 from hexwrap_solver.arrays import Floats
 from hexwrap_solver.panels.sizes import partition_by_area
+from hexwrap_solver.tolerances import RELATIVE
 
 #: Patches whose sizes differ by less than this (relatively) count as one.
 ALIKE = 2e-3
@@ -42,7 +43,7 @@ def uncovered_of_many(u: Floats, weight: Floats, sizes: int) -> Floats:
     """
     columns = np.arange(u.shape[1])
     above = u.max(axis=0) - u
-    width = np.maximum(above.max(axis=0), 1e-9) / STEPS
+    width = np.maximum(above.max(axis=0), RELATIVE) / STEPS
     step = np.minimum((above / width).astype(np.int64), STEPS - 1) * len(columns) + columns
     flat = np.broadcast_to(weight[:, None], u.shape).ravel()
     share = np.bincount(step.ravel(), flat, STEPS * len(columns)).reshape(STEPS, -1).T

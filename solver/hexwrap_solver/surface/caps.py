@@ -21,6 +21,7 @@ from hexwrap_solver.geometry import angles_between, face_normals, normalize
 from hexwrap_solver.surface.orient import is_inside_out
 from hexwrap_solver.surface.topology import boundary_loops, face_graph, half_edges, sum_rows
 from hexwrap_solver.surface.types import Triangles
+from hexwrap_solver.words import length, place
 
 #: Regions are bounded by folds sharper than this, radians …
 SHARP = np.deg2rad(44.0)
@@ -103,7 +104,7 @@ def caps_of(mesh: Triangles) -> tuple[list[Cap], str]:
     points = mesh.vertices[mesh.faces[inner].ravel()]
     court = Cap(inner, np.zeros(3), (points.min(axis=0) + points.max(axis=0)) / 2, 0.0, inner[:0])
     walls = "walls of a courtyard" if len(area) == 2 else f"walls of {len(area) - 1} courtyards"
-    sentence = f" The {walls} around {_at(court.centre)} were left out: panelize them by themselves."
+    sentence = f" The {walls} around {place(court.centre)} were left out: panelize them by themselves."
     return [*chosen, court], _sentence(chosen, len(pairs)) + sentence
 
 
@@ -209,7 +210,7 @@ def kept(mesh: Triangles, chosen: list[Cap]) -> Bools:
 def _sentence(chosen: list[Cap], pairs: int) -> str:
     chosen = sorted(chosen, key=lambda cap: cap.normal[2])
     places = " and ".join(
-        f"the {_side(cap.normal)} (around {_at(cap.centre)}, area {cap.area:.4g})" for cap in chosen
+        f"the {_side(cap.normal)} (around {place(cap.centre)}, area {length(cap.area)})" for cap in chosen
     )
     what = f"A flat cap at {places} was" if len(chosen) == 1 else f"Flat caps at {places} were"
     if pairs > 1 and len(chosen) == 2:
@@ -229,7 +230,3 @@ def _side(normal: Floats) -> str:
     if axis == 2 or abs(normal[2]) > UPRIGHT:
         return "top" if normal[2] > 0 else "bottom"
     return f"side facing {'−+'[int(normal[axis] > 0)]}{'xyz'[axis]}"
-
-
-def _at(point: Floats) -> str:
-    return "({})".format(", ".join(f"{x:.4g}" for x in point))

@@ -10,6 +10,7 @@ from scipy.spatial import KDTree
 
 from hexwrap_solver.arrays import Floats, Ints
 from hexwrap_solver.geometry import dot
+from hexwrap_solver.tolerances import RELATIVE
 
 #: Points searched together, pairs of points and triangles looked at together, and compared together; they
 #: bound the memory of the search, not its result. A point on the axis of a tube is as near to whole rings.
@@ -18,6 +19,11 @@ CHUNK, MOST_PAIRS, COMPARED = 65536, 1 << 22, 1 << 18
 #: At most this many points descend the tree together: as many as there are for each triangle, since the box
 #: of points that lie further apart than triangles meets too many of these.
 LARGEST_GROUP = 8
+#: So many of these groups descend the upper half of the tree together, where boxes are large.
+BUNDLE = 16
+
+#: A point walks over at most this many sides of triangles.
+MOST_STEPS = 12
 
 #: A point further away than this many sizes of the mesh is moved straight towards it, to this distance, for
 #: the search. From there rays to the mesh differ from parallel ones by the inverse part of its size; much
@@ -91,22 +97,37 @@ class TriangleTree:
         found.distance[far] = _length(gap)
         return found
 
-    def farthest(self, points: Floats, row: Ints, rows: int, near: Ints | None = None) -> Floats:
+    def farthest(self, points: Floats, row: Ints, rows: int, near: Ints) -> Floats:
         """(rows,) the greatest distance from the mesh among the points of each row, exactly; 0 for none.
 
         points: (k, 3), finite. row: (k,) row of each. near: (k,) a triangle believed to be near each point.
         Its distance bounds the point's own from above, so that most points need not be searched for.
         """
-        if near is None:
-            near = np.asarray(self.centroids.query(points)[1])
         bound = self._distance(points, near)
-        greatest = np.zeros(rows)
-        order = np.lexsort((-bound, row))
-        first = order[np.diff(row[order], prepend=-1) > 0]
+        greatest = np.full(rows, -1.0)
+        np.maximum.at(greatest, row, bound)
+        first = np.flatnonzero(bound == greatest[row])
+        greatest[:] = 0.0
         greatest[row[first]] = self._least_distance(points[first], near[first], bound[first])
-        rest = np.setdiff1d(np.flatnonzero(bound > greatest[row]), first, assume_unique=True)
+        rest = np.flatnonzero(bound > greatest[row])
         np.maximum.at(greatest, row[rest], self._least_distance(points[rest], near[rest], bound[rest]))
         return greatest
+
+    def walked(self, points: Floats, face: Ints, twin: Ints) -> Ints:
+        """(k,) triangles nearer to the points (k, 3), as a rule, than those given: while a point lies beyond
+        a side of its own, the one across. twin: of half-edges, as ``Triangles.twin``."""
+        face, left = face.copy(), np.arange(len(face))
+        for _ in range(MOST_STEPS):
+            here = face[left]
+            second, third, _ = self._placed(points[left], here)
+            weight = np.stack([1 - second - third, second, third])
+            side = weight.argmin(axis=0)  # the half-edge from the next corner on lies opposite
+            across = np.where(weight.min(axis=0) < 0, twin[3 * here + (side + 1) % 3], -1)
+            left, across = left[across >= 0], across[across >= 0]
+            if not len(left):
+                break
+            face[left] = across // 3
+        return face
 
     def _least_distance(self, points: Floats, near: Ints, bound: Floats) -> Floats:
         """(k,) distances from the mesh. bound: from the triangles near (k,); where these are not near, the
@@ -115,14 +136,14 @@ class TriangleTree:
         close = bound <= np.abs(corners[:, 1] - corners[:, 0]).max(axis=1)
         some, least = points[close], bound.copy()
         scale = np.maximum(np.abs(some).max(axis=1, initial=0.0), np.abs(self.corners).max())
-        reach = bound[close] * (1 + 1e-9) + ROUNDINGS * np.finfo(float).eps * scale
+        reach = bound[close] * (1 + RELATIVE) + ROUNDINGS * np.finfo(float).eps * scale
         found = self._within(some, reach) if len(some) else None
         if found is None:
             close[:] = False
         else:
             point, leaf = found
             there = least[close]
-            np.minimum.at(there, point, self._distance(some[point], self.order[leaf]))
+            np.minimum.at(there, point, self._distance(some[point], self.order[leaf], there[point]))
             least[close] = there
         least[~close] = self.nearest(points[~close]).distance
         return least
@@ -138,11 +159,17 @@ class TriangleTree:
             rows = np.cross(ac, normal) / square, np.cross(normal, ab) / square, normal / np.sqrt(square)
         return np.stack(rows, axis=1)
 
-    def _distance(self, points: Floats, face: Ints) -> Floats:
-        """(k,) distance of each point from a triangle of its own."""
-        second, third, height = np.einsum("kij,kj->ik", self._frames[face], points - self.corners[face, 0])
+    def _placed(self, points: Floats, face: Ints) -> Floats:
+        """(3, k) barycentric coordinates for the second and third corner, and height above the triangle."""
+        return np.asarray(np.einsum("kij,kj->ik", self._frames[face], points - self.corners[face, 0]))
+
+    def _distance(self, points: Floats, face: Ints, most: Floats | float = np.inf) -> Floats:
+        """(k,) distance of each point from a triangle of its own; where it is not below ``most``, only
+        something that is not, either."""
+        second, third, height = self._placed(points, face)
         distance: Floats = np.abs(height)
-        outer = np.flatnonzero(~((second >= 0) & (third >= 0) & (second + third <= 1)))
+        outside = ~((second >= 0) & (third >= 0) & (second + third <= 1)) & ~(distance >= most)
+        outer = np.flatnonzero(outside)
         distance[outer] = nearest_in_triangles(points[outer], self.corners[face[outer]])[1]
         return distance
 
@@ -173,7 +200,7 @@ class TriangleTree:
         first = np.asarray(self.centroids.query(points)[1])
         bound = nearest_in_triangles(points, self.corners[first])[1]
         # Rounding, of the distance as of the boxes, must not prune the guess itself.
-        reach = bound * (1 + 1e-9) + ROUNDINGS * np.finfo(float).eps * np.abs(points).max(axis=1)
+        reach = bound * (1 + RELATIVE) + ROUNDINGS * np.finfo(float).eps * np.abs(points).max(axis=1)
         reach += np.finfo(float).tiny
         found = self._within(points, reach)
         if found is None:
@@ -199,12 +226,20 @@ class TriangleTree:
         Points that are neighbours along the curve descend the tree together, in one box.
         """
         together = min(LARGEST_GROUP, 1 + len(points) // len(self.order))
-        start = np.arange(0, len(points), together)
         place = np.ascontiguousarray(points.T)
-        low = np.minimum.reduceat(place - reach, start, axis=1)
-        high = np.maximum.reduceat(place + reach, start, axis=1)
+        below, above = place - reach, place + reach
+        bundle = BUNDLE if len(self.low) > 1 else 1
+        start = np.arange(0, len(points), together * bundle)
+        low, high = np.minimum.reduceat(below, start, axis=1), np.maximum.reduceat(above, start, axis=1)
         group, node = np.arange(len(start)), np.zeros(len(start), dtype=np.int64)
         for level in range(1, len(self.low)):
+            if level == max(1, len(self.low) // 2):
+                start = np.arange(0, len(points), together)
+                low = np.minimum.reduceat(below, start, axis=1)
+                high = np.maximum.reduceat(above, start, axis=1)
+                group = (BUNDLE * group[:, None] + np.arange(BUNDLE)).ravel()
+                node = np.repeat(node, BUNDLE)[group < len(start)]
+                group = group[group < len(start)]
             group = np.repeat(group, 2)
             node = np.repeat(2 * node, 2)
             node[1::2] += 1

@@ -28,6 +28,7 @@ from hexwrap_solver.surface.features import FeatureEdges
 from hexwrap_solver.surface.normals import with_tangents
 from hexwrap_solver.surface.projection import project, start_parameters
 from hexwrap_solver.surface.types import Feature, Surface
+from hexwrap_solver.tolerances import RELATIVE
 
 #: Points of a line may be away from the surface by this part of its size.
 FAR = 0.02
@@ -326,7 +327,8 @@ def _followed(mesh: _Mesh, line: _Line, size: float) -> list[int]:
             a, b, x, f = crossing
             way = x - p
             share = float(ahead @ way) / float(way @ way)
-            passed = share <= 1 + 1e-9 and np.linalg.norm(ahead - share * way) <= BESIDE * np.linalg.norm(way)
+            off = np.linalg.norm(ahead - share * way)
+            passed = share <= 1 + RELATIVE and off <= BESIDE * np.linalg.norm(way)
             if not passed:
                 if np.linalg.norm(x - mesh.at(b)) < np.linalg.norm(x - mesh.at(a)):
                     a, b = b, a
@@ -336,7 +338,7 @@ def _followed(mesh: _Mesh, line: _Line, size: float) -> list[int]:
                     raise line.lost(k)
             if passed:
                 if stop:
-                    v = mesh.put(goal, [f] if share <= 1 + 1e-9 else mesh.star(v))
+                    v = mesh.put(goal, [f] if share <= 1 + RELATIVE else mesh.star(v))
                     _append(chain, v)
                 break
             v = u
@@ -360,7 +362,7 @@ def _crossing(mesh: _Mesh, v: int, ahead: Floats, normal: Floats) -> tuple[int, 
     (ax, ay, az), (bx, by, bz) = ahead.tolist(), normal.tolist()  # np.cross takes as long as all the rest
     across = np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
     size = float(np.linalg.norm(across))
-    if size <= 1e-9 * float(np.linalg.norm(ahead) * np.linalg.norm(normal)):
+    if size <= RELATIVE * float(np.linalg.norm(ahead) * np.linalg.norm(normal)):
         return None
     across = across / size
     p = mesh.at(v)

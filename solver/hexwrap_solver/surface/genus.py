@@ -24,6 +24,7 @@ from hexwrap_solver.surface.topology import (
     next_half_edge,
     spanning_tree,
 )
+from hexwrap_solver.words import place
 
 #: A loop around a handle is searched through at most this many vertices.
 TRIALS = 24
@@ -39,7 +40,7 @@ class SentNames:
 
     def at(self, vertices: Ints) -> str:
         """The middle of vertices of the working mesh."""
-        return "at (" + ", ".join(f"{x:.6g}" for x in self.points[vertices].mean(axis=0)) + ")"
+        return f"at {place(self.points[vertices].mean(axis=0))}"
 
     def edges(self, faces: Ints, h: Ints) -> list[list[int]]:
         """Half-edges as pairs of sent vertices."""

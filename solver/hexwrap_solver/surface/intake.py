@@ -232,5 +232,9 @@ def _flatten(draft: _Draft) -> None:
             f"neighbours ({len(polygons)} such in all). Move its middle corner off the line or delete it.",
             faces=polygons[:LISTED],
         )
+    if not keep.any():
+        raise DegeneratePolygonError(
+            "No face has an area beside the size of the whole: send faces that have one."
+        )
     draft.note(int(bad.sum()), "triangle", "triangles", "without area {was} merged into the neighbours")
     draft.faces, draft.polygon = draft.faces[keep], draft.polygon[keep]

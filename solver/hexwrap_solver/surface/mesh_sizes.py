@@ -12,6 +12,7 @@ from hexwrap_solver.surface.errors import NurbsDataError
 from hexwrap_solver.surface.nurbs import Jet, evaluate
 from hexwrap_solver.surface.nurbs_checks import spans
 from hexwrap_solver.surface.types import MeshSettings, NurbsSurface
+from hexwrap_solver.tolerances import RELATIVE
 
 #: Vertices where neither edge length nor tolerance is given.
 DEFAULT_VERTICES = 6000
@@ -73,7 +74,7 @@ def sample_of(nurbs: NurbsSurface) -> Sample:
     ds, dt = (jet.du, jet.dv) if around == 0 else (jet.dv, jet.du)
     speed = np.linalg.norm(ds, axis=1)
     density = np.linalg.norm(np.cross(ds, dt), axis=1)
-    rise = density / np.maximum(speed, speed.max() * 1e-9)
+    rise = density / np.maximum(speed, speed.max() * RELATIVE)
     shape = grid_s.shape
     mean = density.reshape(shape)
     cells = (mean[1:, 1:] + mean[:-1, 1:] + mean[1:, :-1] + mean[:-1, :-1]) / 4

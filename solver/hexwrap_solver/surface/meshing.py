@@ -28,6 +28,7 @@ from hexwrap_solver.surface.nurbs_checks import checked
 from hexwrap_solver.surface.projection import chord_heights
 from hexwrap_solver.surface.topology import boundary_loops, edge_lengths, twins
 from hexwrap_solver.surface.types import MeshSettings, NurbsSurface, Surface
+from hexwrap_solver.tolerances import RELATIVE
 
 #: Rows with up to this ratio of needed vertices get the same number, which keeps most vertices regular.
 STEP = 1.08
@@ -153,8 +154,8 @@ def _numbers(needed: Floats) -> list[int]:
     """Whole numbers of vertices, at least 3, in few different steps; divisible by 12 or 6 where that costs
     little, so that symmetric surfaces have symmetric boundaries."""
     most = max(float(needed.max()), 3.0)
-    level = np.ceil(np.log(np.maximum(needed, 3) / most) / np.log(STEP) - 1e-9)
-    numbers = np.ceil(most * STEP**level - 1e-9)
+    level = np.ceil(np.log(np.maximum(needed, 3) / most) / np.log(STEP) - RELATIVE)
+    numbers = np.ceil(most * STEP**level - RELATIVE)
     unit = np.select([numbers >= 72, numbers >= 36], [12, 6], 1)
     numbers = unit * np.ceil(numbers / unit)
     return [int(x) for x in np.maximum(numbers, 3)]

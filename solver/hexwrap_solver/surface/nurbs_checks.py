@@ -12,6 +12,8 @@ from hexwrap_solver.surface.checks import LARGEST, SMALLEST, check_extent, check
 from hexwrap_solver.surface.errors import HandlesError, NotClosedError, NurbsDataError, PoleError
 from hexwrap_solver.surface.nurbs import domain, evaluate_points
 from hexwrap_solver.surface.types import NurbsSurface
+from hexwrap_solver.tolerances import RELATIVE
+from hexwrap_solver.words import place
 
 NAMES = "uv"
 HIGHEST_DEGREE = 32
@@ -175,9 +177,9 @@ def check_pinches(nurbs: NurbsSurface) -> None:
             )
             line = _line(nurbs, direction, x)
             if float(np.ptp(line, axis=0).max()) <= TOLERANCE * size:
-                place = ", ".join(f"{c:.4g}" for c in line.mean(axis=0))
+                at = place(line.mean(axis=0))
                 raise PoleError(
-                    f"The surface is pinched to a point at ({place}), where {NAMES[direction]} = {x:.4g}: no "
+                    f"The surface is pinched to a point at {at}, where {NAMES[direction]} = {x:.4g}: no "
                     "panels can pass through a point. Split it there and clad the parts one by one, or give "
                     "it a width there."
                 )
@@ -193,7 +195,7 @@ def _narrowest(nurbs: NurbsSurface, direction: int, low: float, high: float) -> 
         lambda x: _extent(nurbs, direction, x),
         bounds=(low, high),
         method="bounded",
-        options={"xatol": 1e-9 * (high - low), "maxiter": 100},
+        options={"xatol": RELATIVE * (high - low), "maxiter": 100},
     )
     return float(found.x)
 

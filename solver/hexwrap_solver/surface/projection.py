@@ -9,6 +9,7 @@ from hexwrap_solver.geometry import dot
 from hexwrap_solver.surface.nurbs import Jet, domain, evaluate, evaluate_points, wrap
 from hexwrap_solver.surface.topology import edges
 from hexwrap_solver.surface.types import NurbsSurface, Surface
+from hexwrap_solver.tolerances import RELATIVE
 
 STEPS = 30
 #: From the middle of the parameters one step is enough for the component along the normal.
@@ -116,7 +117,7 @@ def newton_step(nurbs: NurbsSurface, jet: Jet, points: Floats, uv: Floats) -> Fl
     gu, gv = dot(r, jet.du), dot(r, jet.dv)
     e, f, g = dot(jet.du, jet.du), dot(jet.du, jet.dv), dot(jet.dv, jet.dv)
     a, b, c = e + dot(r, jet.duu), f + dot(r, jet.duv), g + dot(r, jet.dvv)
-    convex = (a > 0) & (a * c - b * b > 1e-9 * e * g)
+    convex = (a > 0) & (a * c - b * b > RELATIVE * e * g)
     a, b, c = np.where(convex, a, e), np.where(convex, b, f), np.where(convex, c, g)
     a, c = a + 1e-12 * e.max(initial=0), c + 1e-12 * g.max(initial=0)  # singular points stay where they are
     stuck_u, stuck_v = _stuck(nurbs, uv, gu, 0), _stuck(nurbs, uv, gv, 1)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hexwrap_solver.arrays import Floats, Ints, Ragged
+from hexwrap_solver.tolerances import ANGLE
 
 
 def triangulate(vertices: Floats, faces: Ragged) -> tuple[Ints, Ints]:
@@ -49,7 +50,7 @@ def _split(vertices: Floats, quads: Ints) -> Ints:
     angle = _corner_angles(points)
     excess = angle[:, 1] + angle[:, 3] - angle[:, 0] - angle[:, 2]  # > 0: diagonal 0–2 is the worse one
     lowest_is_odd = np.argmin(quads, axis=1) % 2 == 1
-    odd = np.where(np.abs(excess) < 1e-9, lowest_is_odd, excess > 0)
+    odd = np.where(np.abs(excess) < ANGLE, lowest_is_odd, excess > 0)
     start = odd.astype(np.int64)[:, None]
     turned = np.take_along_axis(quads, (np.arange(4) + start) % 4, axis=1)
     return np.stack([turned[:, [0, 1, 2]], turned[:, [0, 2, 3]]], axis=1)

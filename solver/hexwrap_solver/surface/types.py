@@ -144,11 +144,13 @@ class SurfaceSettings:
 
 @dataclass(frozen=True)
 class Origin:
-    """What the surface was called where it comes from. attributes: further (key, value) pairs."""
+    """What the surface was called where it comes from. attributes: further (key, value) pairs. tolerance: of
+    the file, in its unit, None where it has none."""
 
     name: str = ""
     layer: str = ""
     attributes: tuple[tuple[str, str], ...] = ()
+    tolerance: float | None = None
 
 
 def premultiplied(control_points: Floats) -> Floats:

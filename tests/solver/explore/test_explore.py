@@ -12,7 +12,7 @@ from hexwrap_solver.conformal import conformal_map
 from hexwrap_solver.conformal.types import BoundaryCondition
 from hexwrap_solver.errors import SettingError
 from hexwrap_solver.explore.front import best_of, front_of, non_dominated, to_solve, within
-from hexwrap_solver.explore.predict import floor, outlook
+from hexwrap_solver.explore.predict import outlook, shortened
 from hexwrap_solver.explore.types import Costs, ExploreSettings, Figures, Limits, Vary
 from hexwrap_solver.explore.variants import SPARE, variants
 from hexwrap_solver.panels import fit_panels, measure, quantize
@@ -26,13 +26,15 @@ NEW = ("brick", "truncated-hexagonal", "truncated-square")
 
 
 @pytest.mark.parametrize("sides", [3, 4, 6, 8, 12])
-def test_the_floor_is_the_largest_regular_polygon_in_a_cell_of_growing_scale(sides: int) -> None:
-    """The linear programme itself, for the polygon under z + a z²/2 with small a, over all its directions."""
+def test_cells_are_shortened_as_the_linear_programme_itself_says(sides: int) -> None:
+    """The largest regular polygon in a cell whose scale grows, and which is stretched, both slightly."""
     corner = np.exp(2j * np.pi * np.arange(sides) / sides) / (2 * np.sin(np.pi / sides))
-    small, turns = 1e-4, np.exp(2j * np.pi * np.arange(120) / 120)
+    random, small = np.random.default_rng(sides), 1e-4
+    gradient, skew = (random.normal(size=(2, 60)) + 1j * random.normal(size=(2, 60))) * [[1], [0.4]]
+    skew[:20], gradient[20:40] = 0, 0
     lost = []
-    for a in small * turns:
-        image = corner + a * corner**2 / 2
+    for g, mu in zip(small * gradient, small * skew, strict=True):
+        image = corner - g.conjugate() * corner**2 / 2 + mu * corner.conj()
         edge = np.roll(image, -1) - image
         normal = -1j * edge / abs(edge)
         reach = (normal.conj()[:, None] * corner).real.max(axis=1)
@@ -40,7 +42,7 @@ def test_the_floor_is_the_largest_regular_polygon_in_a_cell_of_growing_scale(sid
         room = (normal.conj() * image).real
         found = linprog([0, 0, -1], A_ub=rows, b_ub=room, bounds=[(None, None)] * 3)
         lost.append((1 - found.x[2]) / small)
-    assert floor(corner) == pytest.approx(np.mean(lost), rel=2e-3)
+    assert shortened(corner, gradient, skew) == pytest.approx(np.array(lost), rel=2e-2, abs=2e-3)
 
 
 @pytest.mark.parametrize("surface", [bump(64, 40), catenoid(64, 40)], ids=["bump", "catenoid"])

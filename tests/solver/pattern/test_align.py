@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hexwrap_solver.conformal import conformal_map
-from hexwrap_solver.conformal.types import ConformalMap
+from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap
 from hexwrap_solver.errors import PatternError
 from hexwrap_solver.pattern import lay_pattern
 from hexwrap_solver.pattern.lattice import LATTICES
@@ -210,3 +210,23 @@ def test_of_one_pattern_every_loop_is_straightened_once(monkeypatch):
     for around in (60, 72, 96):
         placing.at(PatternSettings(around=around))
     assert made == [[0, 1], [0], [1]]
+
+
+def test_an_end_that_is_nearly_straight_is_made_so_gently_and_what_that_takes_is_told():
+    """A wavy end of a cylinder, whose map is its unrolling: so high is the wave in the domain."""
+    n, rows = 96, 24
+    base = annuli.revolution(lambda z: 1 + 0 * z, np.linspace(0, 2, rows + 1), n)
+    points = base.surface.vertices.copy()
+    wave = 0.015 * np.cos(np.arctan2(points[:, 1], points[:, 0]))
+    points[:, 2] += wave * points[:, 2] / 2
+    surface = annuli.make_map(points, base.surface.faces, base.sheet, base.uv, base.deck, n).surface
+    cmap = conformal_map(surface, BoundaryCondition("isometric"))
+    heights = np.imag(cmap.uv[surface.loops[1]] * np.conj(cmap.deck.translation)) / abs(cmap.deck.translation)
+    assert np.ptp(heights) > 0.025
+    placing = PlacementFamily.of(cmap, LATTICES["hex"], PatternSettings(around=96))
+    placement = placing.at(PatternSettings(around=96))
+    assert placing.loops == [0, 1]
+    assert np.ptp(placement.place[surface.loops[1]].imag) < 1e-9
+    ratio = distortion_of(placing.cmap, placement.glued, placement.place)
+    assert placement.distortion == pytest.approx(ratio)
+    assert ratio < 0.05

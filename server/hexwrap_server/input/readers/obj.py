@@ -47,16 +47,28 @@ def read_obj(data: bytes) -> FileContent:
 
 
 def _groups(lines: list[bytes], kinds: list[bytes], at_face: Ints) -> tuple[list[tuple[str, str]], Ints]:
-    """Name and group of every object (its name is the group's where it has none), and each face's object."""
+    """Name and group of every object (its name is the group's where it has none), and each face's object.
+    Where there is neither, faces of one material are one."""
     labels = []
-    for marks in ((b"o ", b"o\t"), (b"g ", b"g\t")):
+    for marks in ((b"o ", b"o\t"), (b"g ", b"g\t"), (b"us",)):
         at = [i for i, kind in enumerate(kinds) if kind in marks]
-        names = ["", *(b" ".join(lines[i][2:].split()).decode("utf-8", "replace") for i in at)]
+        names = ["", *(_name(lines[i].split(maxsplit=1)) for i in at)]
         labels.append([names[k] for k in np.searchsorted(at, at_face)])
+    material = labels.pop()
+    if not any(labels[0]) and not any(labels[1]) and len(set(material)) > 1:
+        labels[1] = material
     pairs = [(o, g) if o else (g, "") for o, g in zip(*labels, strict=True)]
     number: dict[tuple[str, str], int] = {}
     owner = np.array([number.setdefault(pair, len(number)) for pair in pairs], dtype=np.int64)
     return list(number), owner
+
+
+def _name(line: list[bytes]) -> str:
+    name = b" ".join(line[1].split()) if len(line) > 1 else b""
+    try:
+        return name.decode()
+    except UnicodeDecodeError:  # of an older Windows
+        return name.decode("cp1252", "replace")
 
 
 def _lines(data: bytes) -> list[bytes]:

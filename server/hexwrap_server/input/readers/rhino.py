@@ -40,7 +40,10 @@ def read_3dm(data: bytes) -> FileContent:
     """Raises UnreadableFileError."""
     model = Model.read(data)
     if model is None:
-        raise UnreadableFileError("The file is not a Rhino file, or is truncated: save it again from Rhino.")
+        raise UnreadableFileError(
+            "The file is not a Rhino file, is truncated, or is of a newer version: save it again with "
+            "Rhino's SaveAs."
+        )
     try:
         placed = model.objects()
     except TooManyObjectsError:

@@ -72,7 +72,7 @@ def nurbs_surface(surface: Any) -> NurbsSurface:
     """Rhino multiplies control points by their weights. Raises UnreadableFileError."""
     nurbs: Any = surface if isinstance(surface, rhino3dm.NurbsSurface) else surface.ToNurbsSurface()
     if nurbs is None:
-        raise UnreadableFileError("The surface in the Rhino file has no NURBS form: convert it to a mesh.")
+        raise UnreadableFileError("The surface in the Rhino file has no NURBS form: run Mesh in Rhino.")
     points = nurbs.Points
     net = np.array(
         [
@@ -95,7 +95,9 @@ def rhino_mesh(mesh: Any) -> SentMesh:
     vertices = np.array([_xyz(mesh.Vertices.Point3dAt(i)) for i in range(len(mesh.Vertices))], dtype=float)
     table = np.array([mesh.Faces[i] for i in range(len(mesh.Faces))], dtype=np.int64).reshape(-1, 4)
     if table.size == 0:
-        raise UnreadableFileError("The mesh in the Rhino file has no faces.")
+        raise UnreadableFileError(
+            "The mesh in the Rhino file has no faces: delete it (Rhino's SelBadObjects)."
+        )
     keep = np.ones(table.shape, dtype=bool)
     keep[:, 3] = table[:, 3] != table[:, 2]
     offsets = np.concatenate([[0], np.cumsum(keep.sum(axis=1))])

@@ -20,6 +20,7 @@ import numpy as np
 from hexwrap_solver.arrays import Bools, Floats, Ints
 from hexwrap_solver.panels.energy.seen import Seen
 from hexwrap_solver.pattern.types import Pattern
+from hexwrap_solver.tolerances import TINY
 
 FAN, HOLD = 0.4, 0.1
 EAR, BULGE = 0.2, 4.0
@@ -65,7 +66,7 @@ class Guard:
         p = seen.x.shape[1]
         fan, ear = seen.fan() / self.usual[:, :p], np.zeros((len(seen.x), 0))
         fan = np.where(np.isfinite(self.usual[:, :p]), fan, 1.0)
-        fan = np.where(fan > 0, np.maximum(FAN / np.maximum(fan, 1e-300) - 1, 0.0), np.inf)
+        fan = np.where(fan > 0, np.maximum(FAN / np.maximum(fan, TINY) - 1, 0.0), np.inf)
         if self.usual.shape[1] > p:
             ear = np.where(np.isfinite(self.usual[:, p:]), EAR - seen.ears() / self.usual[:, p:], 0.0)
         return fan, np.maximum(ear, 0.0)

@@ -37,6 +37,7 @@ from hexwrap_solver.panels.polygons import mean_edges
 from hexwrap_solver.panels.types import Weights
 from hexwrap_solver.pattern.types import Pattern
 from hexwrap_solver.surface.types import Surface
+from hexwrap_solver.tolerances import TINY
 
 #: Weights of the plane distances, stage by stage; the surface weighs 1.
 FLATNESS: tuple[float, ...] = (1e2, 1e3, 1e4, 1e5, 1e6, 1e8)
@@ -481,7 +482,7 @@ def _beside(points: Floats, surface: Surface) -> tuple[Floats, Floats]:
     # On coarse meshes normals may turn so much within a face that none of them leads to the point.
     found = np.einsum("nd,nd->n", normal, lifted) > ALIKE
     normal, along = np.where(found[:, None], lifted, normal), np.where(found, height, along)
-    direction = np.where(beyond[:, None], spoke / np.maximum(nearest.distance, 1e-300)[:, None], normal)
+    direction = np.where(beyond[:, None], spoke / np.maximum(nearest.distance, TINY)[:, None], normal)
     return np.where(beyond, nearest.distance, along), direction
 
 

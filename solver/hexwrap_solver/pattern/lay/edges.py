@@ -18,6 +18,7 @@ from hexwrap_solver.domain.locate import runs
 from hexwrap_solver.pattern.lay.layout import Layout
 from hexwrap_solver.pattern.lay.nodes import Nodes, edge_distances
 from hexwrap_solver.pattern.lay.trace import trace
+from hexwrap_solver.tolerances import ANGLE, TINY
 
 
 @dataclass(frozen=True)
@@ -264,7 +265,7 @@ class _Found:
             cone = self.cones[self.cone_of[node[k]]]
             counted = cone.ways[slot[k]]
             angle = np.angle(lattice.headings[0]) + counted / lattice.directions * 2 * np.pi
-            sector = int(np.searchsorted(cone.begins, angle + 1e-9, side="right")) - 1
+            sector = int(np.searchsorted(cone.begins, angle + ANGLE, side="right")) - 1
             sector = min(max(sector, 0), len(cone.incidence) - 1)
             seen[k] = cone.incidence[sector]
             way[k] = (counted - cone.isometry[sector, 0] * lattice.steps_per_turn) % lattice.directions
@@ -280,7 +281,7 @@ def _best_incidence(layout: Layout, nodes: Nodes, node: Ints, direction: Ints) -
     way = (direction[line] - nodes.isometry[seen, 0] * lattice.steps_per_turn) % lattice.directions
     corners = layout.corners[nodes.face[seen]]
     along = np.roll(corners, -1, axis=1) - corners
-    inward = 1j * along / np.maximum(abs(along), 1e-300)
+    inward = 1j * along / np.maximum(abs(along), TINY)
     heading = lattice.headings[way][:, None]
     into = heading.real * inward.real + heading.imag * inward.imag
     at_edge = abs(edge_distances(corners, lattice.stand(nodes.point[seen]))) <= 4 * layout.tolerance

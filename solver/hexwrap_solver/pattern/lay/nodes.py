@@ -13,6 +13,7 @@ from hexwrap_solver.domain.locate import runs
 from hexwrap_solver.errors import PatternError
 from hexwrap_solver.pattern.lattice import Lattice
 from hexwrap_solver.pattern.lay.layout import Layout
+from hexwrap_solver.tolerances import TINY
 
 #: Incidences are told apart by one integer each.
 MOST_KEYS = 1 << 62
@@ -102,7 +103,7 @@ def edge_distances(corners: Complexes, place: Complexes) -> Floats:
     along = np.roll(corners, -1, axis=1) - corners
     offset = place[:, None] - corners
     cross = along.real * offset.imag - along.imag * offset.real
-    return np.asarray(cross / np.maximum(abs(along), 1e-300))
+    return np.asarray(cross / np.maximum(abs(along), TINY))
 
 
 def find_nodes(layout: Layout) -> Nodes:

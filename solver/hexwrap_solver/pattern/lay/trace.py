@@ -15,6 +15,7 @@ import numpy as np
 from hexwrap_solver.arrays import Bools, Complexes, Ints
 from hexwrap_solver.pattern.lay.layout import Layout
 from hexwrap_solver.pattern.lay.nodes import edge_distances
+from hexwrap_solver.tolerances import TINY
 
 
 @dataclass(frozen=True)
@@ -100,7 +101,7 @@ def _which_edge(
     vertex = corners[np.arange(len(first)), (first + 1) % 3]
     heading = goal - origin
     offset = vertex - origin
-    side = (heading.real * offset.imag - heading.imag * offset.real) / np.maximum(abs(heading), 1e-300)
+    side = (heading.real * offset.imag - heading.imag * offset.real) / np.maximum(abs(heading), TINY)
     tie = abs(side) <= tolerance
     on_left = np.where(tie, pass_left, side > 0)  # of the vertex between the edges
     return np.where(on_left, first, (first + 1) % 3), tie

@@ -48,6 +48,7 @@ from hexwrap_solver.pattern.place.sides import Lines, Sides, lines_of, sides_of
 from hexwrap_solver.pattern.place.size import edges_around, size_spread, wanted_edge, width_per_cell
 from hexwrap_solver.pattern.place.strain import Strain
 from hexwrap_solver.pattern.types import PatternSettings
+from hexwrap_solver.tolerances import RELATIVE
 
 #: Scales tried, from the smallest to the largest admissible.
 SCALES = 241
@@ -233,10 +234,10 @@ def _sizes(frame: _Frame, size: float, spread: float) -> Floats:
         return np.linspace(-1, 1, SCALES_OF_FEATURES)
     row = frame.lattice.shortest_towards(frame.unit * frame.cmap.deck.translation)
     cells = size * abs(frame.cmap.deck.translation) / abs(complex(frame.lattice.position(row)))
-    near = np.arange(np.ceil(cells * (1 - spread)), cells * (1 + spread) + 1e-9)
+    near = np.arange(np.ceil(cells * (1 - spread)), cells * (1 + spread) + RELATIVE)
     near = np.unique(np.append(near, max(1.0, round(cells))))
     near = near[np.argsort(abs(near - cells), kind="stable")][:SCALES_OF_FEATURES]
-    return np.asarray((near / cells - 1) / max(spread, 1e-9))
+    return np.asarray((near / cells - 1) / max(spread, RELATIVE))
 
 
 def frame_of(
@@ -418,7 +419,7 @@ def symmetry_centres(lattice: Lattice, cone_index: int) -> list[tuple[Isometry, 
         shift = x * lattice.basis[0] + y * lattice.basis[1]
         centre = complex(lattice.position(shift)) / (1 - zeta)
         apart = [lattice.coordinates(np.array((centre - other) / e1)) for _, other in found]
-        if all(abs(a - np.rint(a)).max() > 1e-9 for a in apart):
+        if all(abs(a - np.rint(a)).max() > RELATIVE for a in apart):
             found.append((Isometry(lattice, cone_index, (int(shift[0]), int(shift[1]))), centre))
     return found
 

@@ -44,6 +44,7 @@ from hexwrap_solver.pattern.place.placement import (
 from hexwrap_solver.pattern.place.sides import has_corners, is_polygon
 from hexwrap_solver.pattern.place.size import FREE, mean_stretch, size_spread, wanted_edge
 from hexwrap_solver.pattern.types import PatternSettings
+from hexwrap_solver.words import place
 
 #: Features are made straight where that costs no more than this at all but one triangle of a hundred, as
 #: predicted, and than that at the worst; above FINE, a number of cells around at which they cost less than
@@ -287,10 +288,7 @@ class PlacementFamily:
         return f"{what} through {first}" if chain.closed else f"{what} from {first} to {last}"
 
     def _at(self, vertex: int) -> str:
-        points = self.cmap.surface.vertices
-        size = float(np.ptp(points, axis=0).max())
-        point = points[vertex]
-        return "(" + ", ".join(f"{x:.4g}" for x in np.where(abs(point) < 1e-9 * size, 0.0, point)) + ")"
+        return place(self.cmap.surface.vertices[vertex])
 
     @cached_property
     def cell(self) -> float:

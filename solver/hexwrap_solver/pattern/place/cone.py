@@ -15,6 +15,7 @@ from hexwrap_solver.pattern.place.placement import Placement, anchor_vertex, edg
 from hexwrap_solver.pattern.place.size import ASKED, edges_around, wanted_edge, width_per_cell
 from hexwrap_solver.pattern.types import PatternSettings
 from hexwrap_solver.surface.topology import half_edges
+from hexwrap_solver.tolerances import TINY
 
 #: A translation g shorter than this part of the circumference is none.
 NO_SHIFT = 1e-9
@@ -34,7 +35,7 @@ def boundary_direction(cmap: ConformalMap, lattice: Lattice, anchor: int) -> com
     on_boundary = (cmap.surface.twin < 0).reshape(-1, 3) & on_ends[faces]
     edges = (np.roll(corners, -1, axis=1) - corners)[on_boundary]
     length = abs(edges)
-    mean = complex((length * (edges / length) ** lattice.fold).sum() / max(length.sum(), 1e-300))
+    mean = complex((length * (edges / length) ** lattice.fold).sum() / max(length.sum(), TINY))
     if abs(mean) > 0.05:
         return complex(np.exp(1j * np.angle(mean) / lattice.fold))
     if cmap.kind == "net":

@@ -10,10 +10,14 @@ import numpy as np
 from hexwrap_solver.arrays import Complexes, Floats, Ints
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.pattern.lattice import Isometry, Lattice
+from hexwrap_solver.pattern.place.deform import distortion_of
+from hexwrap_solver.pattern.place.glued import Glued
 from hexwrap_solver.pattern.place.placement import BEARABLE, Placement, anchor_vertex, edge_angle, is_straight
 from hexwrap_solver.pattern.place.rows import Rows, rows_along
+from hexwrap_solver.pattern.place.sides import is_line
 from hexwrap_solver.pattern.place.size import edges_around, fitting_number, size_spread, width_per_cell
 from hexwrap_solver.pattern.types import PatternSettings
+from hexwrap_solver.tolerances import ANGLE, RELATIVE
 
 #: Of the numbers of cells around that come near what is asked, this many are compared.
 MOST_COUNTS = 200
@@ -37,7 +41,7 @@ def place_on_cylinder(
 ) -> Placement:
     """Scale and rotation follow from the translation; height and turn from the loops to align and ``phase``.
 
-    loops: straight ones, on each of which a lattice line shall lie.
+    loops: straight ones, or nearly, on each of which a lattice line shall lie.
     """
     angle = edge_angle(lattice, settings)
     strip = _strip(cmap, anchor_vertex(cmap), loops)
@@ -67,11 +71,13 @@ def place_on_cylinder(
         phase = lattice.without_translations((around_by + 1j * settings.phase[1] * rows.period) * unit) / unit
     place = strip.place.real * scale + 1j * _heights(strip, rows, loops, scale * stretch)
     place = (place + phase) * unit
-    distortion = max(stretch, 1 / stretch) - 1
+    distortion, motion = max(stretch, 1 / stretch) - 1, Isometry(lattice, 0, (int(T[0]), int(T[1])))
+    if not all(is_line(cmap, loop) for loop in loops):
+        distortion = distortion_of(cmap, Glued.by_sheets(cmap, motion), place)
     return Placement.on_annulus(
         cmap,
         place,
-        Isometry(lattice, 0, (int(T[0]), int(T[1]))),
+        motion,
         angle_taken(lattice, along, angle),
         around,
         distortion,
@@ -90,9 +96,12 @@ def _strip(cmap: ConformalMap, anchor: int, loops: list[int]) -> _Strip:
     t = cmap.deck.translation
     place = (cmap.uv - cmap.uv[anchor]) * np.conj(t) / abs(t)
     low, high = (float(place[loop].imag.mean()) for loop in cmap.surface.loops[:2])
-    for which in loops:
-        loop = cmap.surface.loops[which]
-        place[loop] = place[loop].real + 1j * (low, high)[which]  # straight but for rounding; made exactly so
+    for which in loops:  # nearly straight, made exactly so; what that takes fades towards the other loop
+        loop, height = cmap.surface.loops[which], (low, high)[which]
+        here = place[loop]
+        fade = np.clip(1 - abs(place.imag - height) / abs(high - low), 0.0, 1.0)
+        place -= 1j * fade * np.interp(place.real, here.real, here.imag - height, period=abs(t))
+        place[loop] = here.real + 1j * height
     return _Strip(place, abs(t), (low, high), int(anchor in cmap.surface.loops[1]))
 
 
@@ -111,7 +120,7 @@ def _translations(
     row = lattice.shortest_towards(toward)
     count = abs(wanted) / abs(complex(lattice.position(row)))
     spread = 0.0 if settings.around is not None else size_spread(settings)
-    counts = np.arange(np.ceil(count * (1 - spread)), count * (1 + spread) + 1e-9)
+    counts = np.arange(np.ceil(count * (1 - spread)), count * (1 + spread) + RELATIVE)
     counts = np.unique(np.append(counts, max(1, round(count)))).astype(np.int64)
     nearest = np.argsort(abs(counts - count), kind="stable")[:MOST_COUNTS]
     return np.asarray(counts[nearest][:, None] * row), int(lattice.cells_around(row))
@@ -145,7 +154,7 @@ def _heights(strip: _Strip, rows: Rows, loops: list[int], scale: float) -> Float
 def _direction_notes(lattice: Lattice, angle: float, along: complex) -> list[str]:
     notes = []
     taken = angle_taken(lattice, along, angle)
-    if abs(taken - angle) > 1e-9:
+    if abs(taken - angle) > ANGLE:
         notes.append(
             f"Edges stand at {np.rad2deg(taken):.4f}° to the boundary instead of {np.rad2deg(angle):.4f}°: "
             "the nearest angle at which the pattern closes up."

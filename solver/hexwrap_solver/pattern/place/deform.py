@@ -18,6 +18,7 @@ from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.linalg.normal_matrix import NormalMatrix
 from hexwrap_solver.pattern.place.glued import Glued
 from hexwrap_solver.pattern.place.meeting import meeting
+from hexwrap_solver.tolerances import TINY
 
 #: Weight of sizes against angles.
 SIZE = 0.1
@@ -58,7 +59,7 @@ def deform(system: System, glued: Glued, scale: complex, rest: Complexes, depth:
         if bent.max() <= EVEN * np.sqrt((bent**2).mean()):
             break
         # Half-way in the logarithm: full steps of reweighting oscillate for powers above three.
-        weight = np.sqrt(weight * even * (bent**2 / max((bent**2).mean(), 1e-300) + FLOOR))
+        weight = np.sqrt(weight * even * (bent**2 / max((bent**2).mean(), TINY) + FLOOR))
         weight /= weight.mean()
     return best
 

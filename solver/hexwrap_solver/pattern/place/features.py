@@ -14,6 +14,7 @@ from hexwrap_solver.pattern.lattice import Isometry, Lattice
 from hexwrap_solver.pattern.place.sides import Sides
 from hexwrap_solver.surface.features import FeatureEdges
 from hexwrap_solver.surface.types import Feature, Surface
+from hexwrap_solver.tolerances import RELATIVE
 
 #: A feature that strays more from its own straight line than this part of the circumference is not made
 #: straight.
@@ -317,6 +318,6 @@ def least_where_they_meet(cmap: ConformalMap, lattice: Lattice, chains: list[Cha
     following = np.arange(1, len(at) + 1)
     following[first + count - 1] = first
     sector = np.angle(heading[following] / heading) % (2 * np.pi)
-    ratio = np.maximum(sector + off[following] - off, 0.0) / np.maximum(sector, 1e-9)
+    ratio = np.maximum(sector + off[following] - off, 0.0) / np.maximum(sector, RELATIVE)
     high, low = np.maximum.reduceat(ratio, first), np.minimum.reduceat(ratio, first)
     return found, np.where(low > 1e-6, np.sqrt(high / np.maximum(low, 1e-12)) - 1, np.inf)

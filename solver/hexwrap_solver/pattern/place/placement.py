@@ -12,6 +12,7 @@ from hexwrap_solver.errors import NotAdaptedError, PatternError
 from hexwrap_solver.pattern.lattice import Isometry, Lattice
 from hexwrap_solver.pattern.place.glued import Glued
 from hexwrap_solver.pattern.types import PatternSettings
+from hexwrap_solver.tolerances import RELATIVE
 
 #: Largest |k| of a cone angle k·π/3 or k·π/2.
 MAX_TURNS = 12
@@ -158,4 +159,4 @@ def edge_angle(lattice: Lattice, settings: PatternSettings) -> float:
 def is_straight(lattice: Lattice, angle: float) -> bool:
     """Whether edges or corners run along the boundary: only then it can be a lattice line."""
     steps = 2 * angle / lattice.quantum
-    return bool(abs(steps - round(steps)) < 1e-9)
+    return bool(abs(steps - round(steps)) < RELATIVE)

@@ -18,6 +18,7 @@ from hexwrap_solver.pattern.lattice import Lattice
 from hexwrap_solver.pattern.place.rows import rows_along
 from hexwrap_solver.pattern.place.sides import corners_of, curvatures
 from hexwrap_solver.surface.topology import next_half_edge
+from hexwrap_solver.tolerances import ANGLE, TINY
 
 
 @dataclass(frozen=True)
@@ -87,7 +88,7 @@ class Polygons:
         return cls(
             loops,
             np.repeat(np.array(loops, dtype=np.int64), sides),
-            step / np.maximum(abs(step), 1e-300),
+            step / np.maximum(abs(step), TINY),
             np.concatenate([none, *(part[3] for part in parts)]),
             abs(step),
             np.concatenate([none, *(part[0] for part in parts)]),
@@ -182,7 +183,7 @@ class Alignment:
         found, at = np.zeros((len(place), 2), dtype=complex), np.zeros((len(place), 2))
         _, once = np.unique(vertex, return_index=True)
         found[vertex[once], 0], at[vertex[once], 0] = normal[once], line[once]
-        other = abs(normal - found[vertex, 0]) > 1e-9
+        other = abs(normal - found[vertex, 0]) > ANGLE
         found[vertex[other], 1], at[vertex[other], 1] = normal[other], line[other]
         return found, at
 

@@ -9,6 +9,7 @@ import numpy as np
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.errors import PatternError
 from hexwrap_solver.pattern.types import PatternSettings
+from hexwrap_solver.words import box
 
 #: Ratios of units that are mistaken for each other: metric ones, inches and feet.
 RATIOS = (10.0, 100.0, 1000.0, 12.0, 25.4, 39.37, 304.8)
@@ -77,8 +78,7 @@ def unit(cmap: ConformalMap) -> str:
 
 def model(cmap: ConformalMap) -> str:
     """Size of the bounding box in words."""
-    size = np.ptp(cmap.surface.vertices, axis=0).tolist()
-    return " × ".join(f"{x:,.0f}" if x >= 1000 else f"{x:.4g}" for x in size) + unit(cmap)
+    return box(np.ptp(cmap.surface.vertices, axis=0).tolist()) + unit(cmap)
 
 
 def _diagonal(cmap: ConformalMap) -> float:

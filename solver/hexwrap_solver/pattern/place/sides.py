@@ -12,9 +12,12 @@ import numpy as np
 from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.pattern.lattice import Isometry, Lattice
+from hexwrap_solver.tolerances import RELATIVE
 
 #: A boundary is straight where it turns by less than this altogether, a corner quantized within it; rad.
 QUANTIZED = 0.02
+#: Where it turns by less than this, it is straight but for rounding (of given angles, too).
+ROUNDING = 1e-5
 
 
 @dataclass(frozen=True)
@@ -54,6 +57,11 @@ def curvatures(cmap: ConformalMap, loop: int) -> Floats:
 def has_corners(cmap: ConformalMap, lattice: Lattice, loop: int) -> bool:
     """Whether a loop has corners of quantized angles."""
     return bool(corners_of(curvatures(cmap, loop), lattice).any())
+
+
+def is_line(cmap: ConformalMap, loop: int) -> bool:
+    """Whether a loop is straight but for rounding."""
+    return bool(abs(np.cumsum(curvatures(cmap, loop))).max() < ROUNDING)
 
 
 def is_polygon(cmap: ConformalMap, lattice: Lattice, loop: int) -> bool:
@@ -153,7 +161,7 @@ def lines_of(n: int, sides: Sides, normal: Complexes, motion: Isometry) -> Lines
     once = np.ones(len(order), dtype=bool)
     for step in range(1, int(np.bincount(vertex).max(initial=1))):
         same = vertex[step:] == vertex[:-step]
-        once[step:] &= ~(same & (abs(own[order][step:] - own[order][:-step]) < 1e-9))
+        once[step:] &= ~(same & (abs(own[order][step:] - own[order][:-step]) < RELATIVE))
     order, vertex = order[once], vertex[once]
     again = np.arange(len(vertex)) - np.searchsorted(vertex, vertex)
     normals, side, sheet = (

@@ -12,6 +12,7 @@ from hexwrap_solver.pattern.lattice import Lattice
 from hexwrap_solver.pattern.place.placement import is_disk, main_loops
 from hexwrap_solver.pattern.place.sense import too_many
 from hexwrap_solver.pattern.types import PatternSettings
+from hexwrap_solver.tolerances import TINY
 
 #: Where neither a number nor a length is asked for: this many cells around, but fewer where that would make
 #: more cells altogether, and more where fewer rows would fit between the loops, or where fewer cells
@@ -36,7 +37,7 @@ def face_areas(cmap: ConformalMap) -> tuple[Floats, Floats]:
 def mean_stretch(cmap: ConformalMap) -> float:
     """Length on the surface over length in the domain, averaged over the surface's area."""
     on_surface, in_domain = face_areas(cmap)
-    stretch = np.sqrt(on_surface / np.maximum(in_domain, 1e-300))
+    stretch = np.sqrt(on_surface / np.maximum(in_domain, TINY))
     return float(stretch @ on_surface / on_surface.sum())
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from hexwrap_solver.arrays import Complexes, Floats
 from hexwrap_solver.pattern.place.deform import System
 from hexwrap_solver.pattern.place.sides import Lines, Sides
+from hexwrap_solver.tolerances import RELATIVE
 
 #: Moves that are solved for together: a compromise of time and memory.
 TOGETHER = 8
@@ -57,7 +58,7 @@ class Strain:
     def ratios(self, moved: Floats, scale: float) -> Floats:
         """(m,) predicted ratios of singular values − 1."""
         bent = abs(self.response @ moved)
-        return np.asarray(2 * bent / np.maximum(scale - bent, 1e-9 * scale))
+        return np.asarray(2 * bent / np.maximum(scale - bent, RELATIVE * scale))
 
     def nearest(self, moved: Floats, period: Floats) -> Floats:
         """Moves of the first columns, one per period, changed by multiples of them, as long as any single

@@ -7,6 +7,7 @@ import numpy as np
 from hexwrap_solver.arrays import Floats
 from hexwrap_solver.geometry import angles_between
 from hexwrap_solver.surface.brep.types import Edge, NurbsCurve
+from hexwrap_solver.tolerances import RELATIVE
 
 #: An edge is sampled in at least PLACES places, and PER_SPAN between two knots.
 PLACES, PER_SPAN = 16, 2
@@ -39,7 +40,7 @@ def corners(edge: Edge) -> Floats:
     if not inner:
         return np.zeros(0)
     x = np.array(inner)
-    nudge = 1e-9 * (edge.interval[1] - edge.interval[0])
+    nudge = RELATIVE * (edge.interval[1] - edge.interval[0])
     before, after = (evaluate_curve(edge.curve, x + side * nudge)[1] for side in (-1, 1))
     return np.asarray(x[angles_between(before, after) > CORNER])
 
@@ -53,6 +54,6 @@ def curvature(tangent: Floats, bend: Floats) -> Floats:
 
 def _knots_inside(edge: Edge) -> Floats:
     low, high = edge.interval
-    margin = 1e-9 * (high - low)
+    margin = RELATIVE * (high - low)
     knots = edge.curve.knots
     return np.unique(knots[(knots > low + margin) & (knots < high - margin)])

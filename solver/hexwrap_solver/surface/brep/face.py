@@ -21,7 +21,7 @@ from hexwrap_solver.surface.mesh_sizes import ROW, cumulated
 from hexwrap_solver.surface.nurbs import evaluate_points, tangents
 from hexwrap_solver.surface.projection import project
 from hexwrap_solver.surface.topology import edge_lengths, half_edges, sum_rows, twins
-from hexwrap_solver.tolerances import TINY
+from hexwrap_solver.tolerances import RELATIVE, TINY
 
 #: Points inside keep away from the boundary by this part of its edges' lengths, which are looked at in so
 #: many places each.
@@ -202,7 +202,7 @@ class Chart:
         rates = []
         for speed in (field.speed_u, field.speed_v):
             s = speed / field.h
-            rates.append((s, density / np.maximum(s, 1e-9 * s.max()) / ROW))
+            rates.append((s, density / np.maximum(s, RELATIVE * s.max()) / ROW))
         uneven = [_unevenness(rates[0][1], field.inside), _unevenness(rates[1][1].T, field.inside.T)]
         swapped = uneven[1] < 0.9 * uneven[0]
         s, t = (field.v, field.u) if swapped else (field.u, field.v)

@@ -20,7 +20,7 @@ from hexwrap_solver.surface.brep.sizes import Field, bilinear
 from hexwrap_solver.surface.mesh_sizes import cumulated
 from hexwrap_solver.surface.nurbs import evaluate, evaluate_points
 from hexwrap_solver.surface.types import NurbsSurface
-from hexwrap_solver.tolerances import TINY
+from hexwrap_solver.tolerances import RELATIVE, TINY
 
 #: Normals that turn by more than this across a knot make a kink, radians.
 KINK = np.deg2rad(1.0)
@@ -42,7 +42,7 @@ def kinks_of(patch: Patch, outline: shapely.Geometry) -> list[tuple[int, float]]
         inner, count = np.unique(knots, return_counts=True)
         for x in inner[(count >= p) & (inner > box[0, d] + margin) & (inner < box[1, d] - margin)]:
             across = np.linspace(box[0, 1 - d], box[1, 1 - d], PLACES)[1:-1]
-            sides = x + np.array([-1e-9, 1e-9]) * patch.width[d]
+            sides = x + np.array([-RELATIVE, RELATIVE]) * patch.width[d]
             if _turn(patch, d, sides, across) > KINK:
                 found.append((d, float(x)))
     return found

@@ -20,6 +20,7 @@ from hexwrap_solver.surface.mesh_sizes import (
 )
 from hexwrap_solver.surface.nurbs import evaluate
 from hexwrap_solver.surface.types import MeshSettings
+from hexwrap_solver.tolerances import RELATIVE
 
 #: Grid lines per face in each direction, and at least PER_SPAN between two knots.
 LINES, PER_SPAN, MOST_LINES = 24, 3, 240
@@ -105,7 +106,7 @@ def field_of(patch: Patch, outline: shapely.Polygon) -> Field:
 
 
 def _lines(patch: Patch, direction: int, low: float, high: float) -> Floats:
-    knots, margin = patch.surface.knots[direction], 1e-9 * (high - low)
+    knots, margin = patch.surface.knots[direction], RELATIVE * (high - low)
     inner = np.unique(knots[(knots > low + margin) & (knots < high - margin)])
     marks = np.concatenate([[low], inner, [high]])
     per_span = max(-(-LINES // (len(marks) - 1)), PER_SPAN)
@@ -144,7 +145,7 @@ def sized(field: Field, sizes: Sizes) -> Field:
 
 
 def graded(field: Field, h: Floats) -> Floats:
-    if float(np.ptp(h)) <= 1e-9 * float(h.max()):
+    if float(np.ptp(h)) <= RELATIVE * float(h.max()):
         return h
     along_u, along_v = (
         cumulated(field.speed_u, np.diff(field.u)),
