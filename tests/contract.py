@@ -124,7 +124,8 @@ def check_map(result: Json) -> list[str]:
 
 
 def _quantum(pattern: Json | None) -> float:
-    return np.pi / 2 if pattern is not None and pattern["kind"] == "quad" else np.pi / 3
+    square = ("quad", "diamond", "truncated-square")
+    return np.pi / 2 if pattern is not None and pattern["kind"] in square else np.pi / 3
 
 
 def _check_motions(z: np.ndarray, faces: np.ndarray, where: dict, pattern: Json | None) -> list[str]:

@@ -81,10 +81,10 @@ def crunch(report: Report, n: int, mark: str) -> None:
 
 
 def hoard(report: Report, mib: int) -> int:
-    """Hold memory for a while."""
+    """Hold memory until somebody minds."""
     kept = bytearray(mib * 2**20)
     kept[::4096] = b"x" * len(kept[::4096])
-    time.sleep(5)
+    time.sleep(120)
     return len(kept)
 
 

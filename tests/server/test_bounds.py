@@ -100,7 +100,7 @@ def test_bodies_in_memory_have_a_limit_together(tmp_path: Path, monkeypatch: pyt
 
 
 def test_bodies_wait_no_longer_than_one_is_read(tmp_path: Path) -> None:
-    with running(tmp_path, workers=1, readers=1, read_seconds=0.5) as client:
+    with running(tmp_path, workers=1, readers=1, read_seconds=2.0) as client:
         client.run(client.service.free_readers.acquire())
         answer = client.post("/v1/surfaces?name=a.obj", content=b"v 0 0 0")
         assert (answer.status_code, answer.json()["type"]) == (503, "/problems/too-many-bodies")

@@ -33,6 +33,7 @@ from hexwrap_solver.pipeline import Solution, SolveSettings, solve
 from hexwrap_solver.singularities.types import SingularityAt, SingularitySettings
 from hexwrap_solver.surface.types import Origin
 from tests.server.analytic import cylinder
+from tests.server.patience import PATIENCE
 from tests.solver.singularities import shapes
 
 # ifcopenshell's rules leave files open.
@@ -224,14 +225,14 @@ def test_glb_opens_in_the_viewers_own_three(solution: Solution, tmp_path: Path) 
     package = HERE.parents[1] / "server" / "viewer" / "package.json"
     version = json.loads(package.read_text(encoding="utf-8"))["devDependencies"]["three"]
     got = subprocess.run(
-        [npm, "install", "--silent", f"three@{version}"], cwd=tmp_path, capture_output=True, timeout=300
+        [npm, "install", "--silent", f"three@{version}"], cwd=tmp_path, capture_output=True, timeout=PATIENCE
     )
     if got.returncode:
         pytest.skip("npm could not install three")
     shutil.copy(HERE / "read_glb.mjs", tmp_path)
     (tmp_path / "panels.glb").write_bytes(write("panels.glb", solution, ODD))
     done = subprocess.run(
-        [node, "read_glb.mjs", "panels.glb"], cwd=tmp_path, capture_output=True, timeout=120, check=True
+        [node, "read_glb.mjs", "panels.glb"], cwd=tmp_path, capture_output=True, timeout=PATIENCE, check=True
     )
     seen = json.loads(done.stdout)
     assert seen["geometries"] == 3 + 2

@@ -115,7 +115,9 @@ def torment(data: Path, kills: int, seed: int) -> None:
             assert job["status"] in ("done", "failed"), job
             if job["status"] == "failed":
                 assert job["problem"]["type"] in EXCUSES, job
-        assert sum(job["status"] == "done" for job in told.values()) > len(told) / 2
+        failed = sum(job["status"] == "failed" for job in told.values())
+        assert failed < len(told)
+        assert failed <= 2 * kills  # two workers, and what shares their work
         for id, before in load.done.items():
             assert fingerprint(base, id) == before
 

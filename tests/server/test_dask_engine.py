@@ -84,7 +84,7 @@ def run(story: Coroutine[Any, Any, None]) -> None:
     asyncio.run(story)
 
 
-async def call(e: Any, name: str, *arguments: Any, seconds: float = 60, mib: float = 4096) -> Any:
+async def call(e: Any, name: str, *arguments: Any, seconds: float = PATIENCE, mib: float = 4096) -> Any:
     return await e.run(CALLS + name, *arguments, report=nobody, seconds=seconds, mib=mib)
 
 
@@ -100,7 +100,7 @@ def test_same_promises_as_on_one_machine(tmp_path: Path) -> None:
     async def story() -> None:
         async with cluster() as made, engine(made) as e:
             assert (e.capacity, e.is_ready) == (2, True)
-            said = await e.run(CALLS + "talk", report=lambda *a: heard.append(a), seconds=60, mib=4096)
+            said = await e.run(CALLS + "talk", report=lambda *a: heard.append(a), seconds=PATIENCE, mib=4096)
             assert said == "talked"
             with pytest.raises(RequestError) as caught:
                 await call(e, "refuse")

@@ -34,6 +34,7 @@ from hexwrap_solver.panels.types import ComponentSettings, Support
 from hexwrap_solver.pipeline import Solution
 from hexwrap_solver.surface.types import Origin
 from tests.server.analytic import cylinder
+from tests.solver.pattern import nets
 
 ODD = Meta("Türme 塔 <&\"'> \n$x^2$")
 NEEDS_PANELS = [
@@ -365,6 +366,31 @@ def test_svg_marks_corners_with_their_angles(solution: Solution) -> None:
     ns = {"s": "http://www.w3.org/2000/svg"}
     assert [t.text for t in root.iterfind(".//s:text[@class='angle halo']", ns)] == ["4π/3", "π/3"]
     assert len(root.findall(".//s:circle[@class='corner']", ns)) == 2
+
+
+def test_names_of_openings_cross_no_frame(solution: Solution) -> None:
+    """Also where the cut reaches an opening, or splits it."""
+    net = replace(solution, map=nets.tower(3), pattern=None, panels=None)
+    root = ET.fromstring(write("domain.svg", net, ODD))
+    ns = {"s": "http://www.w3.org/2000/svg"}
+    sides = []
+    for path in root.iterfind(".//s:path", ns):
+        if path.attrib["class"].startswith("loop"):
+            for line in path.attrib["d"].replace("Z", "").split("M")[1:]:
+                z = np.array([point.split() for point in line.split("L")], dtype=float) @ [1, 1j]
+                sides += [z[:-1] + t * np.diff(z) for t in np.linspace(0, 1, 9)]
+    frame = np.concatenate(sides)
+    names = root.findall(".//s:text[@class='named halo']", ns)
+    assert len(names) == 5
+    for name in names:
+        size = float(name.attrib["style"].split(":")[1].removesuffix("px"))
+        if "transform" in name.attrib:
+            x, y, turn = map(float, re.findall(r"-?[\d.]+", name.attrib["transform"]))
+        else:
+            x, y, turn = float(name.attrib["x"]), float(name.attrib["y"]), 0.0
+        local = (frame - (x + 1j * y)) * np.exp(-1j * np.deg2rad(turn))
+        over = (abs(local.real) < 0.27 * size * len(name.text or "")) & (abs(local.imag) < 0.35 * size)
+        assert not over.any(), name.text
 
 
 def test_faces_laid_out_in_islands_are_cut_around_each(solution: Solution) -> None:

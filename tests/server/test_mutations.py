@@ -188,7 +188,7 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def client(data: Path) -> Iterator[httpx.Client]:
     port = free_port()
     with (
-        served(data, port, workers=2, job_seconds=60.0, max_panels=20_000),
+        served(data, port, workers=2, job_seconds=PATIENCE, max_panels=20_000),
         httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=PATIENCE, trust_env=False) as client,
     ):
         yield client

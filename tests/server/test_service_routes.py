@@ -21,7 +21,7 @@ from hexwrap_server.jobs import reading
 from hexwrap_server.jobs.engine import nobody
 from tests.server.bodies import request, tube
 from tests.server.live import Live, finished, running
-from tests.server.patience import until
+from tests.server.patience import PATIENCE, until
 
 
 @pytest.fixture(scope="module")
@@ -307,7 +307,12 @@ def test_small_bodies_do_not_wait_for_large_ones_and_files(client: Live, tmp_pat
         until(lambda: len(list(tmp_path.iterdir())) == service.settings.readers, "all readers")
         assert client.post("/v1/solve", json=request(pattern={"around": 9})).status_code == 200
         with pytest.raises(httpx.ReadTimeout):
-            client.post("/v1/surfaces", params={"name": "a.obj"}, content=b"v 0 0 0", timeout=0.3)
+            client.post(
+                "/v1/surfaces",
+                params={"name": "a.obj"},
+                content=b"v 0 0 0",
+                timeout=httpx.Timeout(PATIENCE, read=0.3),
+            )
     finally:
         client.run(free())
     assert client.post("/v1/surfaces", params={"name": "a.obj"}, content=b"v 0 0 0").status_code == 422

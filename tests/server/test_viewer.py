@@ -19,6 +19,7 @@ import pytest
 
 from hexwrap_server.input.form import Body, leaves
 from tests.server import forked
+from tests.server.live import finished
 from tests.server.patience import PATIENCE, until
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -266,9 +267,9 @@ class TestResult:
 
     def test_hover_is_linked_between_space_and_domain(self, tower: Page) -> None:
         tower.mouse.move(*on_screen(tower, "panels.center", facing_panel(tower)))
-        tower.wait_for_timeout(300)
-        shown_lines = f"() => {{ {INSIDE} return [space, domain].map((v) => v.layer.pointed.group.visible) }}"
-        assert tower.evaluate(shown_lines) == [True, True]
+        tower.wait_for_function(
+            f"() => {{ {INSIDE} return [space, domain].every((v) => v.layer.pointed.group.visible) }}"
+        )
 
     def test_files_are_downloaded(self, tower: Page) -> None:
         with tower.expect_download() as download:
@@ -514,7 +515,7 @@ def test_no_setting_is_lost_when_one_is_changed(browser, server: Server, asked: 
     surface = obj_surface(tube())
     with httpx.Client(base_url=server.url, trust_env=False, timeout=PATIENCE) as client:
         id = client.post("/v1/jobs", json={"name": "all", "surface": surface} | asked).json()["id"]
-        assert client.get(f"/v1/jobs/{id}?wait=60").json()["status"] == "done"
+        assert finished(client, id)["status"] == "done"
         adopted = client.get(f"/v1/jobs/{id}/request").json()
     for section, settings in asked.items():  # the recalled request says what was asked for
         if isinstance(settings, dict):
@@ -555,7 +556,7 @@ def test_corners_are_found_at_vertices_that_were_welded_away(browser, server: Se
     body = {"surface": surface, "boundary": {"mode": "angles", "angle_unit": "deg", "angles": angles}}
     with httpx.Client(base_url=server.url, trust_env=False, timeout=PATIENCE) as client:
         id = client.post("/v1/jobs", json=body | {"pattern": None}).json()["id"]
-        assert client.get(f"/v1/jobs/{id}?wait=60").json()["status"] == "done"
+        assert finished(client, id)["status"] == "done"
     with opened(browser, server, f"/#job/{id}") as page:
         shown(page)
         found = page.evaluate("window.hexwrapViewer.corners()")
@@ -598,7 +599,7 @@ def test_a_failed_job_is_never_shown_on_another_surface(browser, server: Server)
     fan = {"vertices": corners, "faces": [[0, 1, 2], [1, 0, 3], [0, 1, 4]]}  # three faces at an edge
     with httpx.Client(base_url=server.url, trust_env=False, timeout=PATIENCE) as client:
         failed = client.post("/v1/jobs", json={"surface": fan, "name": "fan"}).json()["id"]
-        assert client.get(f"/v1/jobs/{failed}?wait=30").json()["status"] == "failed"
+        assert finished(client, failed)["status"] == "failed"
     with opened(browser, server) as page:
         page.select_option("#sample", "tower")
         shown(page)
@@ -614,7 +615,7 @@ def test_work_that_stops_early_is_shown_without_complaint(browser, server: Serve
         tower = client.get("/v1/samples/tower").json()
         for early in ({"panels": None}, {"panels": None, "pattern": None}):
             id = client.post("/v1/jobs", json=tower | early).json()["id"]
-            assert client.get(f"/v1/jobs/{id}?wait=60").json()["status"] == "done"
+            assert finished(client, id)["status"] == "done"
             with opened(browser, server, f"/#job/{id}") as page:
                 assert shown(page) == id
                 assert page.locator("#quality dd").count() >= 2

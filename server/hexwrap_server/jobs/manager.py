@@ -569,29 +569,16 @@ async def _patiently(write: Callable[[], None]) -> None:
 
 
 def _done(job: Job, outcome: Outcome) -> Job:
-    return replace(
-        job,
-        status="done",
-        stage="done",
-        progress=1.0,
-        finished=time.time(),
-        timings=outcome.timings,
-        found=outcome.found,
-    )
+    return _ended(job, timings=outcome.timings, found=outcome.found)
 
 
 def _reused(job: Job, work: Work) -> Job:
-    now = time.time()
-    return replace(
-        job,
-        status="done",
-        stage="done",
-        progress=1.0,
-        started=job.created,
-        finished=now,
-        timings=dict.fromkeys(work.timings, 0.0),
-        found=dict.fromkeys(work.timings, "result"),
-    )
+    timings, found = dict.fromkeys(work.timings, 0.0), dict.fromkeys(work.timings, "result")
+    return _ended(job, started=job.created, timings=timings, found=found)
+
+
+def _ended(job: Job, **changes: Any) -> Job:
+    return replace(job, status="done", stage="done", progress=1.0, finished=time.time(), **changes)
 
 
 def _failed(job: Job, error: HexwrapError) -> Job:

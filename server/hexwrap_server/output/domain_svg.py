@@ -29,6 +29,8 @@ MAX_NAMES = 40
 #: Names of loops, pixels: openings up to five times ROOM take theirs in their middle, in letters from
 #: SMALLEST to LARGEST, a letter being CHARACTER times as wide as high.
 ROOM, SMALLEST, LARGEST, CHARACTER = 34, 8.0, 20.0, 0.6
+#: Least cosine between the sides of a loop that one name runs along.
+STRAIGHT = 0.94
 #: The apex is shown where it is not further from the domain than this many times the domain's size.
 APEX_REACH = 0.6
 
@@ -200,17 +202,36 @@ def _loops(cmap: ConformalMap, frame: Frame, unrolled: Unrolled) -> list[str]:
         taken = np.append(places[np.isin(loop, marked)], unrolled.end[unrolled.cut])
         free = np.abs(places[:, None] - taken).min(axis=1, initial=np.inf)
         middle = sides[int(np.argmax(free)) if len(taken) else len(sides) // 2]
-        along = unrolled.end[middle] - unrolled.start[middle]
+        place = int(np.flatnonzero(sides == middle)[0])
+        first, last = _straight_piece(places, unrolled.end[sides], place, 1 / frame.scale)
+        along = last - first
+        size = float(
+            np.clip(0.8 * abs(along) * frame.scale / (CHARACTER * len(f"loop {number} →")), SMALLEST, LARGEST)
+        )
+        at = (unrolled.start[middle] + unrolled.end[middle] if size == LARGEST else first + last) / 2
         away = along / abs(along) * -1j * ROOM / frame.scale
-        x, y = frame.at(unrolled.start[middle] + away)
+        x, y = frame.at(at + away)
         turn = -np.degrees(np.angle(along))
         arrow, turn = ("→", turn) if abs(turn) <= 90 else ("←", turn - np.copysign(180, turn))
         words = f"loop {number} {arrow}" if arrow == "→" else f"{arrow} loop {number}"
         parts.append(
-            f'<text class="named halo" text-anchor="middle" dominant-baseline="central" '
-            f'transform="translate({x:.2f} {y:.2f}) rotate({turn:.2f})">{words}</text>'
+            f'<text class="named halo" style="font-size:{size:.1f}px" text-anchor="middle" '
+            f'dominant-baseline="central" transform="translate({x:.2f} {y:.2f}) rotate({turn:.2f})">'
+            f"{words}</text>"
         )
     return parts
+
+
+def _straight_piece(start: Complexes, end: Complexes, side: int, near: float) -> tuple[complex, complex]:
+    """Where the straight run of a loop's sides (k,) that holds one of them begins and ends. near: ends of
+    sides that are not further apart are one; others the cut has parted."""
+    first, last = np.roll(start, -side), np.roll(end, -side)
+    heading = (last - first) / np.maximum(abs(last - first), 1e-300)
+    straight = (np.conj(heading[0]) * heading).real > STRAIGHT
+    joined = abs(last - np.roll(first, -1)) <= near  # each with the next
+    ahead = int(np.cumprod((straight & np.roll(joined, 1))[1:]).sum())
+    behind = int(np.cumprod((straight & joined)[:0:-1]).sum())
+    return complex(first[-behind]), complex(last[ahead])
 
 
 def _name_inside(frame: Frame, start: Complexes, end: Complexes, name: str) -> str:
@@ -218,7 +239,8 @@ def _name_inside(frame: Frame, start: Complexes, end: Complexes, name: str) -> s
     start, end: (k,) of the loop's sides."""
     middle = (start + end) / 2
     width, height = np.ptp(middle.real) * frame.scale, np.ptp(middle.imag) * frame.scale
-    closed = np.abs(end - np.roll(start, -1)).max() * frame.scale < 1
+    # where the cut reaches it, it may stand a little open
+    closed = np.abs(end - np.roll(start, -1)).max() * frame.scale < 0.3 * max(width, height)
     inside_out = float((np.conj(start) * end).imag.sum()) < 0  # the domain lies around it
     if not (closed and inside_out and max(width, height) < 5 * ROOM):
         return ""

@@ -61,7 +61,8 @@ def place(
     if not proposals:
         raise SingularitiesError(
             f"No {rules.most} singularities or fewer can make the angles of this surface add up, "
-            f"{_index_rule(rules)}, and keep the distances asked for: allow more."
+            f"{_index_rule(rules)}, and stand as far apart, in cells, as they have to: smaller cells, "
+            "smaller distances or more singularities would help."
         )
     chosen = _choice(proposals, count)
     if proposals[chosen].count and not rules.symmetric:

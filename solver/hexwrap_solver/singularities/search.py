@@ -46,8 +46,8 @@ DIRECTION = 100.0
 #: What a panel leaves open in a cell whose size changes by the share |∇u| over one cell's width: so much of
 #: that share (measured: 0.46 to 0.53 on real panels of tubes and domes, hexagons inside their cells).
 FIT = 0.5
-#: Share left open that is much: more singularities than enough are tried then.
-MUCH = 0.15
+#: Share left open that is much: more singularities than enough are tried then, from so many random starts.
+MUCH, FEW = 0.15, 4
 #: Changes of the uncovered area that are none.
 SMALL = 2e-5
 
@@ -473,6 +473,9 @@ def ranked(search: Search, starts: int = STARTS, refine: bool = True) -> Iterato
     kinds = [k for size in range(1, search.rules.largest + 1) for k in (-size, size)]
     beam = search.settled([State((), (), (0,) * max(len(search.model.free) - 1, 0))])
     for number in range(search.rules.most + 1):
+        promising = PROMISING
+        if number > search.rules.enough:
+            starts, promising = min(starts, FEW), 1
         if number:
             added = [
                 one for one in _additions(search, beam, kinds) if search.count_of(one[1]) <= search.rules.most
@@ -482,7 +485,7 @@ def ranked(search: Search, starts: int = STARTS, refine: bool = True) -> Iterato
             ]
         whole = [one for one in beam if search.complete(one[1])][:REFINED]
         if refine:
-            whole = search.most_promising(whole, PROMISING)
+            whole = search.most_promising(whole, promising)
             whole = sorted(
                 (search.refined(state) for _, state in whole), key=lambda one: (one[0], one[1].seat)
             )

@@ -49,8 +49,8 @@ FAR, AGAIN = 0.6, 2
 #: Where those chosen do not close, this many other numbers of singularities are tried.
 OTHERS = 1
 #: Closing is not tried anew once it was tried on meshes of so many vertices together; those on which it fails
-#: count this many times more.
-WORK, HARD = 100_000, 2
+#: count this many times more, and those with more singularities than these in proportion.
+WORK, HARD, USUAL = 100_000, 2, 12
 #: Creases whose surroundings are more than this part of the surface are not lines to keep away from.
 FACETED = 0.5
 #: Sums of listed angles this near to a multiple of the quantum are one, radians.
@@ -356,7 +356,7 @@ class Work:
     """left: vertices of the meshes on which closing may still be tried. seats: those so far from which the
     longest move that would close is shortest, and off: that move, cells."""
 
-    left: int
+    left: float
     seats: Seats | None = None
     off: float = np.inf
 
@@ -372,6 +372,7 @@ def closed_at(
     slope = partial(_slope, surface, frame.tube) if frame.tube is not None else None
     quantum, ends, angles = frame.lattice.quantum, frame.rules.ends, frame.rules.angles
     chart: Chart | None = None
+    share = max(1.0, len(index) / USUAL)
     for again in range(AGAIN + 1):
         try:
             chart = None if chart is None or finer is not chart.surface else chart.reseated(vertex)
@@ -380,10 +381,10 @@ def closed_at(
             )
             closing = Closing(chart, frame.width, frame.line, frame.free_scale, frame.aligned)
         except ConvergenceError as error:
-            work.left -= HARD * len(finer.vertices)
+            work.left -= HARD * share * len(finer.vertices)
             raise failed or error from None
         finer = chart.surface
-        work.left -= len(finer.vertices)
+        work.left -= share * len(finer.vertices)
         off = float(np.linalg.norm(closing.moves, axis=1).max())
         if off < work.off:
             work.off, work.seats = off, Seats(finer, vertex, index, proposal.loops)
@@ -393,7 +394,7 @@ def closed_at(
                 return chart, closing.solve(progress)
             except ConvergenceError as error:
                 failed = failed or error
-                work.left -= HARD * len(finer.vertices)
+                work.left -= HARD * share * len(finer.vertices)
                 if last or work.left <= 0:
                     break
                 finer = refined(finer, closing.places, frame.width)

@@ -99,7 +99,7 @@ def free_port():
 
 def ask(port, method, path, body=None):
     """(status, document) straight from a server, past the components."""
-    connection = HTTPConnection("127.0.0.1", port, timeout=20)
+    connection = HTTPConnection("127.0.0.1", port, timeout=300)
     try:
         connection.request(method, str(path), body)
         answer = connection.getresponse()
@@ -150,7 +150,7 @@ class Spy(object):
             def handle_one(self):
                 body = self.rfile.read(int(self.headers.get("Content-Length") or 0)) or None
                 seen.append((self.command, self.path, body))
-                connection = HTTPConnection("127.0.0.1", target, timeout=60)
+                connection = HTTPConnection("127.0.0.1", target, timeout=300)
                 headers = {"Content-Type": self.headers.get("Content-Type") or "application/json"}
                 connection.request(self.command, self.path, body, headers)
                 answer = connection.getresponse()

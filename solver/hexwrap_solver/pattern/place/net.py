@@ -52,8 +52,9 @@ COST_OF_SIZE = 0.1
 SHORTLIST = 12
 #: Misfit of all motions together, in lattice units, below which nothing needs to be deformed.
 EXACT = 1e-7
-#: Places of the lattice, the best first, whose deformation is computed, until one distorts by less than FINE.
-DEFORMED, FINE = 4, 0.05
+#: Places of the lattice, the best first, whose deformation is computed, until one distorts by less than FINE;
+#: fewer around singularities on a mesh of more than LARGE vertices.
+DEFORMED, FINE, AROUND, LARGE = 4, 0.05, 2, 12_000
 
 
 def place_on_net(
@@ -229,7 +230,8 @@ def _choices(
             "cell; move it, or take indices of 1 and -1."
         )
     found.sort(key=lambda one: one[0])
-    return [one[1:] for one in found[:DEFORMED]]
+    few = len(cmap.cones) > 0 and len(cmap.surface.vertices) > LARGE
+    return [one[1:] for one in found[: AROUND if few else DEFORMED]]
 
 
 def _shifts(
