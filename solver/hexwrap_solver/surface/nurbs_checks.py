@@ -177,9 +177,9 @@ def check_pinches(nurbs: NurbsSurface) -> None:
             )
             line = _line(nurbs, direction, x)
             if float(np.ptp(line, axis=0).max()) <= TOLERANCE * size:
-                at = place(line.mean(axis=0))
+                tip = place(line.mean(axis=0))
                 raise PoleError(
-                    f"The surface is pinched to a point at {at}, where {NAMES[direction]} = {x:.4g}: no "
+                    f"The surface is pinched to a point at {tip}, where {NAMES[direction]} = {x:.4g}: no "
                     "panels can pass through a point. Split it there and clad the parts one by one, or give "
                     "it a width there."
                 )
