@@ -123,6 +123,16 @@ def test_a_mesh_alone_gives_panels(client: Live) -> None:
     assert "overlaps: 0" in json.loads(found["Report"]["{0}"][0]["data"])
 
 
+def test_strays_are_left_out_and_told_as_those_of_a_file_are(client: Live) -> None:
+    mesh = tube()
+    far = [mesh.Vertices.Add(50 + x, 50 + y, 0) for x, y in ((0, 0), (0.1, 0), (0, 0.1))]
+    mesh.Faces.AddFace(*far)
+    sent = value("Mesh", {"{0}": [geometry(mesh, "Mesh")]})
+    body = {"pointer": PANELS, "values": [sent], "absolutetolerance": 0.01, "modelunits": "Millimeters"}
+    report = json.loads(outputs(client.post("/solve", json=body))["Report"]["{0}"][0]["data"])
+    assert "note: 1 stray piece of 1 face in all left out, at (50.05, 50.05, 0)." in report
+
+
 def test_branches_keep_their_path(client: Live) -> None:
     found = outputs(solve(client, PANELS, mesh_at("{0;3}"), value("Around", {"{0}": [item(16, "Int32")]})))
     assert all(path.startswith("{0;3;") for path in found["Panels"])

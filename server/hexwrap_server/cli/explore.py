@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.table import Table
 
 from hexwrap_server.cli.local import MAX_PANELS, MAX_VERTICES, read_body
-from hexwrap_server.cli.options import asked_body, word
+from hexwrap_server.cli.options import asked_body, with_default, word
 from hexwrap_server.errors import UsageError
 from hexwrap_server.input.form import ExploreBody, Leaf, leaves
 from hexwrap_server.input.requests import CacheSettings, Exploration, Order, SentSurface
@@ -57,8 +57,16 @@ def add_explore_options(parser: argparse.ArgumentParser) -> None:
             type=word,
             default=argparse.SUPPRESS,
             metavar="X",
-            help=leaf.setting.help.replace("%", "%%"),
+            help=with_default(leaf.setting.help, leaf.default).replace("%", "%%"),
         )
+
+
+def table() -> str:
+    """These options as rows of the documentation's table."""
+    return "\n".join(
+        f"| `{flag}` | `{'.'.join(leaf.path)}` | {with_default(leaf.setting.help, leaf.default)} |"
+        for flag, leaf in _options()
+    )
 
 
 def check_outputs(outputs: list[str]) -> None:

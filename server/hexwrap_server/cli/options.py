@@ -65,10 +65,15 @@ class Option:
             return f"{text}: a {', '.join(READERS)} file, or X,Y,Z;X,Y,Z;… (any number of times)"
         if self.is_first:
             text += "; 'none' leaves it out"
-        if default is None or default is False or default == "":
-            return text
-        shown = default if isinstance(default, tuple) else (default,)
-        return f"{text} (default: {' '.join(f'{x:g}' if isinstance(x, float) else str(x) for x in shown)})"
+        return with_default(text, default)
+
+
+def with_default(text: str, default: Any) -> str:
+    """The default after what a setting does, where there is one."""
+    if default is None or default is False or default == "":
+        return text
+    shown = default if isinstance(default, tuple) else (default,)
+    return f"{text} (default: {' '.join(f'{x:g}' if isinstance(x, float) else str(x) for x in shown)})"
 
 
 def _options() -> Iterator[Option]:

@@ -13,10 +13,10 @@ import numpy as np
 import shapely
 from scipy.sparse import coo_array, csr_array, diags_array
 from scipy.sparse.linalg import splu
-from scipy.spatial import Delaunay
 
 from hexwrap_solver.arrays import Complexes, Floats, Ints
 from hexwrap_solver.geometry import dot, face_areas
+from hexwrap_solver.surface.brep.plane import triangulated
 from hexwrap_solver.surface.topology import vertex_normals
 from hexwrap_solver.surface.types import Openings, Surface
 from hexwrap_solver.tolerances import TINY
@@ -36,15 +36,19 @@ def fill_openings(surface: Surface) -> Surface:
     if not surface.openings:
         return surface
     kept = len(surface.loops) - surface.openings
-    n = len(surface.vertices)
-    points, faces = [surface.vertices], [surface.faces]
+    n = old = len(surface.vertices)
+    places, triangles, names, start = [], [], [], 0
     for loop in surface.loops[kept:]:
-        inner, triangles = _fill(surface.vertices[loop])
-        faces.append(np.concatenate([loop, n + np.arange(len(inner))])[triangles])
-        points.append(inner)
-        n += len(inner)
-    old, filled = len(surface.vertices), np.concatenate(faces)
-    vertices = _faired(np.concatenate(points), filled, old, len(surface.faces))
+        outline = loop[::-1]  # a loop runs with the surface on its left, and so clockwise around its hole
+        z, fill = _fill(surface.vertices[outline])
+        places.append(z)
+        triangles.append(start + fill)
+        names.append(np.concatenate([outline, n + np.arange(len(z) - len(loop))]))
+        n, start = n + len(z) - len(loop), start + len(z)
+    fills, name = np.concatenate(triangles), np.concatenate(names)
+    inner = _spanned(np.concatenate(places), fills, name, surface.vertices)
+    filled = np.concatenate([surface.faces, name[fills]])
+    vertices = _faired(np.concatenate([surface.vertices, inner]), filled, old, len(surface.faces))
     return replace(
         surface,
         vertices=vertices,
@@ -59,20 +63,14 @@ def fill_openings(surface: Surface) -> Surface:
     )
 
 
-def _fill(loop: Floats) -> tuple[Floats, Ints]:
-    """(p, 3) points inside a loop (k, 3), and (t, 3) triangles; of the loop's vertices first. The loop
-    runs with the surface on its left, and so clockwise around its hole."""
-    k = len(loop)
-    outline = loop[::-1]
+def _fill(outline: Floats) -> tuple[Complexes, Ints]:
+    """(k + p,) the outline (k, 3) and points inside it in a plane, and (t, 3) triangles."""
     z = _flattened(outline)
     found = _triangulated(z) if shapely.Polygon(np.stack([z.real, z.imag], axis=1)).is_valid else None
     if found is None:  # it does not lie flat: any disk will do, since the fill is bent anyway
-        z = _rounded(outline)
-        found = _triangulated(z)
-        assert found is not None, "the edges between neighbours on a circle are Delaunay"
-    inner, triangles = found
-    places = _spanned(np.concatenate([z, inner]), triangles, outline)
-    return places, np.concatenate([np.arange(k)[::-1], k + np.arange(len(inner))])[triangles]
+        found = _triangulated(_rounded(outline))
+        assert found is not None, "a circle does not touch itself"
+    return found
 
 
 def _flattened(outline: Floats) -> Complexes:
@@ -93,9 +91,8 @@ def _rounded(outline: Floats) -> Complexes:
 
 
 def _triangulated(z: Complexes) -> tuple[Complexes, Ints] | None:
-    """Points inside a counter-clockwise polygon (k,), about as far from each other as its vertices, and
-    (t, 3) triangles over both. None where an edge of the polygon is not among the sides of the Delaunay
-    triangles."""
+    """A counter-clockwise polygon (k,) with points inside, about as far from each other as its vertices, and
+    (t, 3) triangles. None where the polygon all but touches itself."""
     k = len(z)
     polygon = shapely.Polygon(np.stack([z.real, z.imag], axis=1))
     step = float(np.abs(np.roll(z, -1) - z).mean())
@@ -105,29 +102,13 @@ def _triangulated(z: Complexes) -> tuple[Complexes, Ints] | None:
     columns = np.arange(-1, int((high - low).real / step) + 2)
     j, i = (a.ravel() for a in np.meshgrid(rows, columns, indexing="ij"))
     lattice = low + step * (i + 0.5 * (j % 2) + 0.25 + 1j * np.sqrt(0.75) * (j + 0.25))
-    inner = lattice[shapely.contains_xy(polygon, lattice.real, lattice.imag)]
-    apart = shapely.distance(polygon.exterior, shapely.points(inner.real, inner.imag))
-    inner = inner[apart > CLEARANCE * step]
-    middle, reach = (z + np.roll(z, -1)) / 2, np.abs(np.roll(z, -1) - z) / 2
-    if len(inner):  # an edge whose diametral circle is empty is Delaunay (Gabriel, Sokal 1969)
-        tree = shapely.STRtree(shapely.points(inner.real, inner.imag))
-        edges = shapely.buffer(shapely.points(middle.real, middle.imag), 1.05 * reach)
-        inner = np.delete(inner, np.unique(tree.query(edges, predicate="intersects")[1]))
+    away = polygon.buffer(-CLEARANCE * step)
+    shapely.prepare(away)
+    inner = lattice[shapely.contains_xy(away, lattice.real, lattice.imag)]
     both = np.concatenate([z, inner])
-    plane = np.stack([both.real, both.imag], axis=1)
-    triangles = Delaunay(plane - plane.mean(axis=0)).simplices.astype(np.int64)
-    a, b, c = (both[triangles[:, corner]] for corner in range(3))
-    area = (np.conj(b - a) * (c - a)).imag
-    triangles[area < 0] = triangles[area < 0][:, ::-1]
-    centre = (a + b + c) / 3
-    size = np.abs(high - low)
-    keep = (np.abs(area) > 1e-12 * size**2) & shapely.contains_xy(polygon, centre.real, centre.imag)
-    triangles = triangles[keep]
-    tail, head = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
-    sides = tail * len(both) + head
-    wanted = np.arange(k) * len(both) + (np.arange(k) + 1) % k
-    disk = len(both) - (3 * len(triangles) + k) // 2 + len(triangles) == 1
-    return (inner, triangles) if disk and np.isin(wanted, sides).all() else None
+    around = np.stack([np.arange(k), (np.arange(k) + 1) % k], axis=1)
+    triangles = triangulated(np.stack([both.real, both.imag], axis=1), around, polygon)
+    return None if triangles is None else (both, triangles)
 
 
 def _cotangents(points: Floats, faces: Ints) -> csr_array:
@@ -148,13 +129,15 @@ def _cotangents(points: Floats, faces: Ints) -> csr_array:
     return csr_array(degree - both)
 
 
-def _spanned(z: Complexes, triangles: Ints, outline: Floats) -> Floats:
-    """(p, 3) the inner points of a plane triangulation, spanned harmonically over the outline (k, 3)."""
-    k = len(outline)
-    if len(z) == k:
-        return np.zeros((0, 3))
+def _spanned(z: Complexes, triangles: Ints, name: Ints, vertices: Floats) -> Floats:
+    """(p, 3) the inner points of plane triangulations, spanned harmonically over their outlines. name: (k,)
+    of each point z; those of ``vertices`` lie on an outline."""
     laplacian = _cotangents(np.stack([z.real, z.imag, 0 * z.real], axis=1), triangles)
-    return np.asarray(splu(laplacian[k:, k:].tocsc()).solve(-laplacian[k:, :k] @ outline))
+    rim, inner = np.flatnonzero(name < len(vertices)), np.flatnonzero(name >= len(vertices))
+    if not len(inner):
+        return np.zeros((0, 3))
+    rows = laplacian[inner]
+    return np.asarray(splu(rows[:, inner].tocsc()).solve(-(rows[:, rim] @ vertices[name[rim]])))
 
 
 def _faired(vertices: Floats, faces: Ints, old: int, wall: int) -> Floats:

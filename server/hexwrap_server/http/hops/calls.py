@@ -15,12 +15,15 @@ from hexwrap_server.errors import HopsError
 from hexwrap_server.http.hops.components import COMPONENTS, LIFT, PANELS
 from hexwrap_server.http.hops.values import output, read_inputs
 from hexwrap_server.input.bodies import Body
+from hexwrap_server.input.choose import choose
 from hexwrap_server.input.json_text import loads
 from hexwrap_server.input.readers.drawing import Curve
-from hexwrap_server.input.readers.rhino import convert
+from hexwrap_server.input.readers.found import FileContent
+from hexwrap_server.input.readers.rhino import UNITS, found_alone
 from hexwrap_server.input.readers.rhino_curves import rhino_curve
 from hexwrap_server.input.requests import ParsedRequest, SentSurface, Wanted
 from hexwrap_server.input.schemas import Request, parse_request
+from hexwrap_server.input.surface_files import as_sent
 from hexwrap_server.jobs.lift_curves import lift_curves
 from hexwrap_server.jobs.reading import kept
 from hexwrap_server.jobs.work import solution_at
@@ -29,8 +32,7 @@ from hexwrap_server.output import wire
 from hexwrap_server.output.blocks import frames
 from hexwrap_server.settings import Settings
 from hexwrap_solver.pipeline import Solution
-from hexwrap_solver.surface.brep import Brep
-from hexwrap_solver.surface.types import MeshSettings, SentMesh, SurfaceSettings
+from hexwrap_solver.surface.types import SentMesh, SurfaceSettings
 
 
 @dataclass(frozen=True)
@@ -61,7 +63,7 @@ def read_call(report: Report, body: Body, settings: Settings, folder: str) -> Ca
         curves = tuple(rhino_curve(curve) for curve in values["Curves"])
         return Call(pointer, tuple(branch), job=values["Job"].strip().rpartition("/")[2], curves=curves)
     wanted = _wanted(values, settings.max_vertices, settings.max_panels)
-    surface = _surface(values["Mesh"], settings.max_vertices)
+    surface = _surface(values["Mesh"], sent, settings.max_vertices)
     return Call(pointer, tuple(branch), kept(Request("hops", surface, wanted), folder))
 
 
@@ -83,16 +85,18 @@ def _wanted(values: dict[str, Any], max_vertices: int, max_panels: int) -> Wante
     return parse_request(body, max_vertices, max_panels).wanted
 
 
-def _surface(geometry: Any, max_vertices: int) -> SentSurface:
-    read = convert(geometry)
-    if isinstance(read, SentMesh):
-        if len(read.vertices) > max_vertices:
-            raise HopsError(f"The mesh has {len(read.vertices)} vertices, this server takes {max_vertices}.")
-        return SentSurface(mesh=read)
-    settings = SurfaceSettings(MeshSettings(max_vertices=max_vertices))
-    if isinstance(read, Brep):
-        return SentSurface(brep=read, settings=settings)
-    return SentSurface(nurbs=read, settings=settings)
+def _surface(geometry: Any, sent: dict[str, Any], max_vertices: int) -> SentSurface:
+    """What is meant of a geometry; strays are left out as those of a file are. sent: Hops tells the unit and
+    the tolerance of the document. Raises SurfaceError."""
+    asked = sent.get("absolutetolerance")
+    tolerance = float(asked) if isinstance(asked, int | float) and 0 < asked < 1e9 else None
+    found = found_alone(geometry, tolerance or 0.0)
+    content = FileContent((found,), UNITS.get(str(sent.get("modelunits"))), tolerance)
+    chosen = choose(content)
+    if isinstance(chosen.geometry, SentMesh) and len(chosen.geometry.vertices) > max_vertices:
+        n = len(chosen.geometry.vertices)
+        raise HopsError(f"The mesh has {n} vertices, this server takes {max_vertices}.")
+    return as_sent(content, chosen, SurfaceSettings(), max_vertices)
 
 
 def panels_answer(report: Report, path: str, branch: tuple[int, ...], job: str) -> dict[str, Any]:
@@ -167,6 +171,6 @@ def _report(solution: Solution) -> str:
         f"{solution.panels.n_panels} panels, {len(solution.panels.class_length)} sizes",
         f"covered: {100 * quality['coverage']:.2f} %",
         f"overlaps: {quality['overlaps']}",
-        *(f"note: {note}" for note in quality["notes"]),
+        *(f"note: {note}" for note in (*solution.map.surface.repairs, *quality["notes"])),
     ]
     return "\n".join(lines)

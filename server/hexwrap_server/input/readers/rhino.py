@@ -68,7 +68,7 @@ def _found(placed: Placed, tolerance: float) -> Found:
         placed.id,
         placed.name,
         _kind(placed.geometry),
-        _size(placed),
+        _size(placed.geometry, placed.matrix),
         lambda: _moved(convert(placed.geometry, tolerance), placed.matrix),
         placed.layer,
         placed.visible,
@@ -81,6 +81,12 @@ def _found(placed: Placed, tolerance: float) -> Found:
             if name
         ),
     )
+
+
+def found_alone(geometry: Any, tolerance: float) -> Found:
+    """A geometry that is in no file."""
+    size = _size(geometry, None)
+    return Found("0", "", _kind(geometry), size, lambda: convert(geometry, tolerance))
 
 
 def _kind(geometry: Any) -> str:
@@ -106,13 +112,13 @@ def _other_kind(geometry: Any) -> str:
     return str(type(geometry).__name__)
 
 
-def _size(placed: Placed) -> tuple[float, float, float]:
-    box = placed.geometry.GetBoundingBox()
+def _size(geometry: Any, matrix: Floats | None) -> tuple[float, float, float]:
+    box = geometry.GetBoundingBox()
     if not box.IsValid:  # of nothing
         return 0.0, 0.0, 0.0
     corners = np.array(list(product(*zip(_xyz(box.Min), _xyz(box.Max), strict=True))))
-    if placed.matrix is not None:
-        corners = corners @ placed.matrix[:3, :3].T
+    if matrix is not None:
+        corners = corners @ matrix[:3, :3].T
     x, y, z = np.ptp(corners, axis=0).tolist()
     return x, y, z
 
