@@ -78,7 +78,14 @@ def longest_step(data: Path) -> float:
 
 def children(process: subprocess.Popen[bytes]) -> list[psutil.Process]:
     """All but the template of its workers, which only tests have."""
-    return [c for c in psutil.Process(process.pid).children(recursive=True) if c.name() != forked.NAME]
+    return [c for c in psutil.Process(process.pid).children(recursive=True) if not is_template(c)]
+
+
+def is_template(process: psutil.Process) -> bool:
+    try:
+        return process.name() == forked.NAME
+    except psutil.NoSuchProcess:  # it has just ended
+        return False
 
 
 def is_gone(process: psutil.Process) -> bool:
