@@ -1,4 +1,4 @@
-"""Quads split along the diagonal that Delaunay's criterion prefers; polygons with more corners cut by ears."""
+"""Quads split along the diagonal that Delaunay's criterion prefers; larger polygons cut by ears."""
 
 from __future__ import annotations
 
