@@ -24,16 +24,16 @@ def cut_polygons(vertices: Floats, faces: Ragged) -> tuple[Ragged, Ints]:
     wanted[faces.row[~fits]] = False
     if not wanted.any():
         return faces, np.arange(faces.n_rows, dtype=np.int64)
-    rows = [np.flatnonzero(~wanted)]
-    sizes = [lengths[~wanted]]
-    corners = [faces.values[np.repeat(~wanted, lengths)]]
+    rows: list[Ints] = [np.flatnonzero(~wanted)]
+    sizes: list[Ints] = [lengths[~wanted]]
+    corners: list[Ints] = [np.asarray(faces.values[np.repeat(~wanted, lengths)], dtype=np.int64)]
     for n in np.unique(lengths[wanted]):
         polygons = np.flatnonzero(wanted & (lengths == n))
         for bundle in np.array_split(polygons, -(-len(polygons) * n * n // BUNDLE)):
-            index = faces.values[faces.offsets[bundle][:, None] + np.arange(n)]
+            index = np.asarray(faces.values[faces.offsets[bundle][:, None] + np.arange(n)], dtype=np.int64)
             ears = _ears(_flattened(vertices[index]))
-            rows.append(np.repeat(bundle, n - 2))
-            sizes.append(np.full(len(bundle) * (n - 2), 3))
+            rows.append(np.repeat(bundle, int(n) - 2))
+            sizes.append(np.full(len(bundle) * (n - 2), 3, dtype=np.int64))
             corners.append(np.take_along_axis(index, ears.reshape(len(bundle), -1), axis=1).ravel())
     row, size = np.concatenate(rows), np.concatenate(sizes)
     order = np.argsort(row, kind="stable")

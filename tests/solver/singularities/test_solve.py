@@ -156,7 +156,7 @@ def test_none_where_none_pays():
 
 @pytest.mark.parametrize(("surface", "pay"), [(shapes.waist(), True), (shapes.straight(), False)])
 def test_never_worse_than_without(surface, pay):
-    """Two heptagons save sizes on the waist (of cells as large as these, below six), and only make them where none are needed."""
+    """Two heptagons save sizes on the waist (below six, of large cells); needed nowhere, they make them."""
     condition, pattern = BoundaryCondition("isometric", quantum="hex"), PatternSettings(around=16)
     n = len(surface.vertices)
     at = tuple(SingularityAt(-1, vertex=n // 2 + i) for i in (0, 20))
