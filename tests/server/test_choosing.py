@@ -13,6 +13,8 @@ import rhino3dm
 from hexwrap_server.cli.main import main
 from hexwrap_server.errors import FileTypeError, NoObjectError, SeveralObjectsError, UnreadableFileError
 from hexwrap_server.input.choose import Chosen, choose
+from hexwrap_server.input.object_words import listed
+from hexwrap_server.input.readers.found import Found
 from hexwrap_server.input.readers.rhino_brep import control_net
 from hexwrap_server.input.surface_files import read_file, sent_surface
 from hexwrap_server.jobs.work import take_in
@@ -191,6 +193,15 @@ def test_vertices_of_a_part_are_those_of_its_own_objects() -> None:
     assert isinstance(named, SentMesh)
     np.testing.assert_array_equal(found.vertices, named.vertices)
     np.testing.assert_array_equal(found.faces.values, named.faces.values)
+
+
+def test_objects_of_one_name_are_told_by_their_numbers() -> None:
+    tower, other, hall = (
+        Found(str(i), name, "mesh", (1.0, 1.0, 1.0), lambda: mesh(*tube()))
+        for i, name in enumerate(["Tower", "Tower", "Hall"])
+    )
+    told = listed([other, hall], "m", [tower, other, hall])
+    assert told == "'Tower' (object 1, mesh, 1 × 1 × 1 m), 'Hall' (mesh, 1 × 1 × 1 m)"
 
 
 def test_an_id_is_a_name() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
@@ -103,15 +104,19 @@ def others(content: FileContent, used: Sequence[Found]) -> tuple[str, ...]:
 
 def listed(objects: Sequence[Found], unit: str | None, among: Sequence[Found] | None = None) -> str:
     number = {id(found): i for i, found in enumerate(among or objects)}
-    shown = ", ".join(described(found, number[id(found)], unit) for found in objects[:SHOWN])
+    names = Counter(found.name for found in among or objects)
+    shown = ", ".join(
+        described(found, number[id(found)], unit, alone=names[found.name] == 1) for found in objects[:SHOWN]
+    )
     return shown + (f" and {len(objects) - SHOWN} more" if len(objects) > SHOWN else "")
 
 
-def described(found: Found, number: int, unit: str | None) -> str:
-    """Name, kind, layer and size in one phrase."""
+def described(found: Found, number: int, unit: str | None, alone: bool = True) -> str:
+    """Name, kind, layer and size in one phrase; with the number where others have the same name."""
     size = box(found.size)
     layer = f" on layer {found.layer}" if found.layer else ""
-    return f"{label(found, number)} ({found.kind}{layer}, {size}{' ' + unit if unit else ''})"
+    which = "" if alone or not found.name else f"object {number}, "
+    return f"{label(found, number)} ({which}{found.kind}{layer}, {size}{' ' + unit if unit else ''})"
 
 
 def label(found: Found, number: int) -> str:
