@@ -43,7 +43,7 @@ CASES = {
     "octagon": (shapes.waist, "isometric", None, (SingularityAt(-2, vertex=620),), {"around": 16}),
     "triangles": (shapes.waist, "isometric", None, ASIDE, {"kind": "triangle", "around": 32}),
     "quads": (shapes.waist, "isometric", None, ASIDE, {"kind": "quad", "around": 16}),
-    "closed": (shapes.ellipsoid, "straight", None, (), {"edge_length": 0.2}),
+    "closed": (lambda: shapes.ellipsoid(600), "straight", None, (), {"edge_length": 0.3}),
     "both ends aligned": (shapes.waist, "straight", None, PAIRS, {"around": 20, "align": "both"}),
 }
 
@@ -247,7 +247,7 @@ def test_triangles_meet_in_a_vertex_of_another_valence(index):
 
 
 def test_a_closed_surface_takes_triangles():
-    laid = solved(shapes.ellipsoid(), "straight", kind="triangle", edge_length=0.3).pattern
+    laid = solved(shapes.ellipsoid(600), "straight", kind="triangle", edge_length=0.45).pattern
     assert (laid.neighbours.values >= 0).all()
     assert len(laid.vertices) - len(laid.faces.values) // 2 + laid.n_cells == 2
     valence = np.bincount(laid.faces.values)
@@ -288,7 +288,7 @@ def test_where_they_cannot_be_moved_the_pattern_is_bent(monkeypatch):
         raise ConvergenceError("It did not close.")
 
     monkeypatch.setattr(module, "closed_at", fails)
-    found = solved(shapes.ellipsoid(), kind="triangle", edge_length=0.3)
+    found = solved(shapes.ellipsoid(600), kind="triangle", edge_length=0.45)
     assert len(found.map.cones) == 12
     assert found.map.fitted is None
     assert found.map.residual < 1e-9
