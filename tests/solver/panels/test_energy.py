@@ -165,7 +165,7 @@ def moved_by(pattern, cmap, offset):
 @pytest.mark.parametrize("mode", ["split", "watertight"])
 def test_a_tower_far_away_has_the_same_panels(mode):
     """Metres in a national grid. Corners lie on the surface but for rounding, which has no direction."""
-    pattern, cmap = hex_pattern(torus, 24, 3), grid_map(torus, 48, 30, -0.1, 1.2)
+    pattern, cmap = hex_pattern(torus, 24, 6), grid_map(torus, 96, 60, -0.1, 1.2)
     on_mesh = cmap.surface.tree.nearest(pattern.vertices)
     corners = cmap.surface.vertices[cmap.surface.faces[on_mesh.face]]
     pattern = replace(pattern, vertices=np.einsum("kc,kcd->kd", on_mesh.barycentric, corners))
