@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 
 from hexwrap_server.errors import UnreadableFileError
+from hexwrap_server.input.choose import choose
 from hexwrap_server.input.surface_files import read_file
 from hexwrap_solver.surface import SentMesh, surface_from_mesh
 from tests.server.test_reading import obj, off, ply, read_surface
@@ -53,6 +54,19 @@ TEXT_FORMS: dict[str, Callable[[bytes], bytes]] = {
 @pytest.mark.parametrize(("name", "text"), [("a.obj", OBJ), ("a.off", OFF)])
 def test_every_line_end_and_encoding(name: str, text: bytes, form: str) -> None:
     check(TEXT_FORMS[form](text), name)
+
+
+@pytest.mark.parametrize(("name", "write"), [("a.obj", obj), ("a.off", off), ("a.ply", ply)])
+def test_polygons_are_cut_and_told(name: str, write: Callable[..., bytes]) -> None:
+    vertices, quads = tube(around=8)
+    pairs = zip(quads[::2].tolist(), quads[1::2].tolist(), strict=True)
+    hexagons = [[a, b, f, g, e, d] for (a, b, e, d), (_, f, g, _) in pairs]
+    data = write(vertices, hexagons)
+    surface = surface_from_mesh(read_surface(data, name))
+    assert len(surface.loops) == 2
+    assert len(surface.faces) == 4 * len(hexagons)
+    notes = choose(read_file(data, name)).notes
+    assert notes == (f"{len(hexagons)} polygons with more than four corners were cut into triangles.",)
 
 
 @pytest.mark.parametrize("form", ["windows", "old mac", "mark", "utf-16", "trailing blanks"])

@@ -77,7 +77,7 @@ def choose(
 ) -> Chosen:
     """Raises NoObjectError, SeveralObjectsError, UnreadableFileError, SurfaceError."""
     meant = named(content, object, layer)
-    odd = odd_unit(content, unit)
+    odd = (*content.notes, *odd_unit(content, unit))
     unit = unit or content.unit
     if content.is_whole and content.mesh is not None:
         return Chosen(content.mesh, tuple(meant), odd)

@@ -19,7 +19,7 @@ export class DomainView {
   private panelOfPolygon: number[] = [];
   private polygonOfPanel = new Map<number, number>();
   private box = new THREE.Box2(new THREE.Vector2(-1, -1), new THREE.Vector2(1, 1));
-  private dirty = true;
+  private next = 0;
 
   constructor(readonly element: HTMLElement) {
     this.renderer = new THREE.WebGLRenderer({ antialias: true, alpha: true });
@@ -37,19 +37,16 @@ export class DomainView {
     this.controls.addEventListener("change", () => this.invalidate());
     this.scene.add(this.marks);
     new ResizeObserver(() => this.fit()).observe(element);
-    const frame = () => {
-      this.controls.update();
-      if (this.dirty) {
-        this.dirty = false;
-        this.renderer.render(this.scene, this.camera);
-      }
-      requestAnimationFrame(frame);
-    };
-    frame();
+    this.invalidate();
   }
 
+  /** Draws in the next frame; a still picture costs nothing. */
   invalidate(): void {
-    this.dirty = true;
+    this.next ||= requestAnimationFrame(() => {
+      this.next = 0;
+      this.controls.update();
+      this.renderer.render(this.scene, this.camera);
+    });
   }
 
   clear(): void {

@@ -43,7 +43,7 @@ export class View3D {
   private shown: Toggles = { edges: true, labels: false, normals: false, supports: false, mesh: false, features: true };
   private box = new THREE.Box3(new THREE.Vector3(-1, -1, -1), new THREE.Vector3(1, 1, 1));
   private origin = new THREE.Vector3();
-  private dirty = true;
+  private next = 0;
 
   constructor(readonly element: HTMLElement) {
     this.renderer = new THREE.WebGLRenderer({ antialias: true, alpha: true, preserveDrawingBuffer: false });
@@ -70,21 +70,20 @@ export class View3D {
     // In the capturing phase, before the controls begin to turn the camera.
     canvas.addEventListener("pointerdown", (event) => this.grab(event), { capture: true });
     this.resize();
-    const frame = () => {
-      this.controls.update();
-      if (this.dirty) this.render();
-      requestAnimationFrame(frame);
-    };
-    frame();
+    this.invalidate();
   }
 
+  /** Draws in the next frame, and in those after it until the controls have come to rest; a still picture costs nothing. */
   invalidate(): void {
-    this.dirty = true;
+    this.next ||= requestAnimationFrame(() => {
+      this.next = 0;
+      this.controls.update();
+      this.render();
+    });
   }
 
   /** Draws now; public so that a frame can be timed. */
   render(): void {
-    this.dirty = false;
     this.renderer.render(this.scene, this.camera);
     this.placeLabels();
   }

@@ -29,6 +29,7 @@ from hexwrap_solver.panels.polygons import (
 from hexwrap_solver.panels.types import Panels, Quality
 from hexwrap_solver.pattern.lattice import LATTICES
 from hexwrap_solver.pattern.types import Pattern
+from hexwrap_solver.surface.orient import inward_note
 from hexwrap_solver.surface.types import Surface
 from hexwrap_solver.tolerances import TINY
 
@@ -45,7 +46,10 @@ def measure(
         scale_ratio=float(np.exp(np.ptp(cmap.log_scale))),
         quasi_conformal_mean=float(np.average(stretch, weights=area)),
         quasi_conformal_max=float(stretch.max()),
-        notes=cmap.notes + (pattern.notes if pattern else ()) + (panels.notes if panels else ()),
+        notes=inward_note(cmap.surface)
+        + cmap.notes
+        + (pattern.notes if pattern else ())
+        + (panels.notes if panels else ()),
     )
     if pattern is None or panels is None:
         return quality

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Literal
 
@@ -24,6 +24,8 @@ WORTH, CLEARLY = 0.001, 0.25
 GROUPS = 5
 #: The search ends where this many numbers more have brought nothing.
 PATIENCE = 3
+#: Where no number of singularities finds room, they may stand this near to each other, in cells.
+NEAREST = 2.0
 #: The final places are found within this many cells, again and again nearer, among vertices at such a part of
 #: that apart, in this many steps.
 REACHES, SPACING, ROUNDS = (1.5, 0.8, 0.4), 0.4, 20
@@ -59,10 +61,13 @@ def place(
     patience = PATIENCE if count == "auto" else None
     proposals, symmetry = _symmetric(known, patience) if rules.symmetric else (_curve(known, patience), "")
     if not proposals:
+        if rules.apart > NEAREST:
+            near = NEAREST / rules.apart
+            return place(surface, replace(rules, apart=NEAREST, opposite=near * rules.opposite), count, tube)
         raise SingularitiesError(
             f"No {rules.most} singularities or fewer can make the angles of this surface add up, "
-            f"{_index_rule(rules)}, and stand as far apart, in cells, as they have to: smaller cells, "
-            "smaller distances or more singularities would help."
+            f"{_index_rule(rules)}, and stand {rules.apart:g} cells apart (a cell is {rules.cell:.3g} wide): "
+            "smaller cells, smaller distances from boundary and folds, or more singularities would help."
         )
     chosen = _choice(proposals, count)
     if proposals[chosen].count and not rules.symmetric:

@@ -95,7 +95,8 @@ def _build(sent: SentMesh, mesh: Triangles, polygon: Ints, label: Ints, settings
     vertices, n = mesh.vertices, len(mesh.vertices)
     draft = _Draft(relabelled(mesh, label), polygon, [])
     used = _mark(mesh.faces, n)
-    draft.note(int(n - used.sum()), "vertex", "vertices", "that no face uses {was} left out")
+    unused = ~used if sent.others is None else ~used & ~sent.others
+    draft.note(int(unused.sum()), "vertex", "vertices", "that no face uses {was} left out")
     welded = int((used & (label != np.arange(n))).sum())
     draft.note(
         welded, "vertex", "vertices", f"{{was}} welded to one within {TOLERANCE:g} of the model's size"

@@ -6,6 +6,15 @@ import numpy as np
 
 from hexwrap_solver.arrays import Bools, Floats, Ints
 from hexwrap_solver.surface.topology import half_edges, spanning_tree
+from hexwrap_solver.surface.types import Surface
+
+#: A tube has an inside where it and the cones over its loops enclose more than this part of (their
+#: area)^(3/2): a sphere encloses 0.094, a cylinder 100 times as long as it is wide 0.014, a flat ring 0.
+ENCLOSING = 0.01
+INWARD = (
+    "The surface's normals look into the tube, and the panels with them: the outside is the side that most "
+    "faces look to. Where the other one is meant, turn the surface over (Rhino: Flip)."
+)
 
 
 def flipped(faces: Ints, twin: Ints, weight: Floats) -> tuple[Bools, Ints]:
@@ -54,3 +63,21 @@ def is_inside_out(vertices: Floats, faces: Ints, twin: Ints) -> bool:
     middle = vertices[rim if len(rim) else np.unique(faces)].mean(axis=0)
     a, b, c = (vertices[corner] - middle for corner in faces.T)
     return float(np.einsum("kd,kd->", a, np.cross(b, c))) < 0
+
+
+def inward_note(surface: Surface) -> tuple[str, ...]:
+    """A sentence where an open tube looks inwards beyond doubt; it is left as it was sent."""
+    walls = surface.vertices[surface.faces]
+    ends = len(surface.loops) - surface.openings
+    if ends != 2:
+        return ()
+    cones = []
+    for loop in surface.loops:  # the surface is on their left, and so the cones are on their right
+        rim = surface.vertices[loop]
+        middle = np.broadcast_to(rim.mean(axis=0), rim.shape)
+        cones.append(np.stack([middle, np.roll(rim, -1, axis=0), rim], axis=1))
+    corner = np.concatenate([walls, *cones]) - walls.mean(axis=(0, 1))
+    twice = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    volume = float(np.einsum("kd,kd->", corner[:, 0], twice)) / 6
+    area = float(np.linalg.norm(twice, axis=1).sum()) / 2
+    return (INWARD,) if -volume > ENCLOSING * area**1.5 else ()

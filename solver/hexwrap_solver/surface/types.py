@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Annotated, Literal
 
@@ -31,7 +31,8 @@ class SentMesh:
 
     vertices: (n, 3). faces: rows of 3 or 4 vertex indices. normals: (n, 3), any length, or None.
     creases: (k, 2) vertex pairs, edges at which the exact surface folds, and fold: (k,) by how much, radians;
-    None where that is to be seen from the mesh.
+    None where that is to be seen from the mesh. others: (n,) vertices of faces that were left out, no fault
+    of the mesh; None if there are none.
     """
 
     vertices: Floats
@@ -39,6 +40,7 @@ class SentMesh:
     normals: Floats | None = None
     creases: Ints | None = None
     fold: Floats | None = None
+    others: Bools | None = None
 
     def transformed(self, matrix: Floats) -> SentMesh:
         """The mesh under an affine map (4, 4); mirrored faces keep their outside."""
@@ -48,7 +50,7 @@ class SentMesh:
             backwards = np.repeat(faces.offsets[:-1] + faces.offsets[1:] - 1, faces.lengths)
             faces = Ragged(faces.values[backwards - np.arange(len(faces.values))], faces.offsets)
         normals = None if self.normals is None else self.normals @ np.linalg.pinv(linear)
-        return SentMesh(self.vertices @ linear.T + shift, faces, normals, self.creases, self.fold)
+        return replace(self, vertices=self.vertices @ linear.T + shift, faces=faces, normals=normals)
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from hexwrap_solver.conformal.energy import Energy
 from hexwrap_solver.conformal.fixed import minimise
 from hexwrap_solver.errors import SettingError, SingularitiesError
 from hexwrap_solver.singularities.linear import Steepness, distance_to, linear_model, targets, vertex_areas
-from hexwrap_solver.singularities.place import given, place
+from hexwrap_solver.singularities.place import NEAREST, given, place
 from hexwrap_solver.singularities.search import Search, State
 from hexwrap_solver.singularities.sizes import uncovered, uncovered_of_many
 from hexwrap_solver.singularities.symmetry import symmetries
@@ -35,6 +35,15 @@ def waist():
 @pytest.fixture(scope="module")
 def on_waist(waist):
     return place(waist, rules_for(waist, ("free", "free")))
+
+
+def test_few_cells_bring_singularities_nearer_to_each_other():
+    surface = shapes.ellipsoid()
+    rules = rules_for(surface, (), cells=80, most=12)
+    at = surface.vertices[place(surface, rules).proposal.vertex]
+    assert len(at) == 12
+    least = np.linalg.norm(at[:, None] - at, axis=2)[np.triu_indices(12, 1)].min() / rules.cell
+    assert NEAREST - 0.1 <= least < rules.apart
 
 
 @pytest.mark.parametrize(

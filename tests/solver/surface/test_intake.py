@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hexwrap_solver.surface import Surface, surface_from_mesh
+from hexwrap_solver.surface.orient import INWARD, inward_note
 from hexwrap_solver.surface.topology import edge_lengths, face_normals
 from hexwrap_solver.surface.types import SentMesh, Triangles
 from tests.solver.surface.shapes import mesh, triangles, tube, twisted
@@ -263,6 +264,24 @@ def test_scale_and_rigid_motion_change_nothing(scale: float, seed: int) -> None:
     plain = surface_from_mesh(mesh(vertices, quads))
     np.testing.assert_array_equal(moved.faces, plain.faces)
     np.testing.assert_allclose(moved.normals, plain.normals @ turn.T, atol=1e-9)
+
+
+@pytest.mark.parametrize("height", [0.1, 1.0, 60.0])
+def test_a_tube_that_looks_inwards_is_left_so_and_told(height: float) -> None:
+    vertices, quads = tube(rings=9, around=24)
+    vertices = twisted(vertices) * [1.0, 1.0, height] + 1e3
+    outward, inward = (surface_from_mesh(mesh(vertices, faces)) for faces in (quads, quads[:, ::-1]))
+    assert inward_note(outward) == ()
+    assert inward_note(inward) == (INWARD,)
+    assert inward.repairs == ()
+
+
+def test_a_ring_or_a_shell_has_no_inside() -> None:
+    vertices, quads = tube(rings=5, around=24)
+    z = vertices[:, 2]
+    flat = vertices * [1.0, 1.0, 0.0] * (1 + z)[:, None] + np.outer(0.05 * z, [0.0, 0.0, 1.0])
+    for faces in (quads, quads[:, ::-1]):
+        assert inward_note(surface_from_mesh(mesh(flat, faces))) == ()
 
 
 def test_the_outside_of_the_tube_is_outside() -> None:

@@ -52,6 +52,16 @@ def test_pieces_are_found_by_their_edges_and_sorted_by_area() -> None:
     assert len(surface_from_mesh(left).loops) == 2
 
 
+def test_vertices_of_parts_left_out_are_no_repair() -> None:
+    vertices, quads = tube()
+    n = len(vertices)
+    points = np.concatenate([vertices, vertices + 100, [[5.0, 5.0, 5.0]], vertices + 200])
+    sent = mesh(points, np.concatenate([quads, quads + n, quads + 2 * n + 1]))
+    two = only(sent, np.arange(2 * len(quads)))
+    one = only(joined(two, 1e-3)[0], np.arange(len(quads)))
+    assert surface_from_mesh(one).repairs == ("1 vertex that no face uses was left out.",)
+
+
 @pytest.mark.parametrize("shift", [0.0, 1e-4, 9e-4])
 @pytest.mark.parametrize("finer", [False, True])
 def test_halves_become_a_tube_within_the_tolerance(shift: float, finer: bool) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from hexwrap_solver.surface import NurbsSurface, SentMesh
 from hexwrap_solver.surface.brep import Brep
 from hexwrap_solver.surface.checks import check_arrays
 from hexwrap_solver.surface.pieces import only, pieces
+from hexwrap_solver.surface.triangulate import cut_polygons
 
 #: A piece of an object with less than this part of its largest piece's area is a stray.
 STRAY = 0.01
@@ -48,7 +49,7 @@ class Found:
 class FileContent:
     """unit: ``m``, ``cm``, ``mm``, ``ft``, ``in`` or None. tolerance: of the file, in its unit; None where
     the format has none. others: what else is there, by kind. odd_unit: the file's own unit, if it is none of
-    these.
+    these. notes: what was changed in reading.
 
     mesh, owner: where the objects are faces (m,) of one table of vertices, the whole table; its vertices keep
     their numbers, independent of the choice. is_whole: the mesh is one object, and known to be one piece.
@@ -62,14 +63,20 @@ class FileContent:
     owner: Ints | None = None
     is_whole: bool = False
     odd_unit: str = ""
+    notes: tuple[str, ...] = ()
 
 
 def of_mesh(mesh: SentMesh, names: Sequence[tuple[str, str]] = (), owner: Ints | None = None) -> FileContent:
     """The content of a file that is one table of vertices and faces.
 
     names: (name, layer) of each object, owner: (m,) the object of each face; without, the pieces of the mesh
-    that do not hang together are its objects, but for strays.
+    that do not hang together are its objects, but for strays. Polygons are cut into triangles.
     """
+    if mesh.vertices.ndim == 2 and mesh.vertices.shape[1] == 3:
+        faces, row = cut_polygons(mesh.vertices, mesh.faces)
+        if faces is not mesh.faces:
+            content = of_mesh(replace(mesh, faces=faces), names, None if owner is None else owner[row])
+            return replace(content, notes=(_cut(int((np.bincount(row) > 1).sum())),))
     try:
         check_arrays(mesh)
     except SurfaceError:  # reported when the mesh is taken in
@@ -92,6 +99,13 @@ def of_mesh(mesh: SentMesh, names: Sequence[tuple[str, str]] = (), owner: Ints |
         owner[piece.faces] = i
     objects = [_object(str(i), f"part {i}", only(mesh, piece.faces)) for i, piece in enumerate(large)]
     return FileContent(tuple(objects), mesh=mesh, owner=owner)
+
+
+def _cut(count: int) -> str:
+    what = "polygon" if count == 1 else "polygons"
+    return (
+        f"{count:,} {what} with more than four corners {'was' if count == 1 else 'were'} cut into triangles."
+    )
 
 
 def _object(id: str, name: str, mesh: SentMesh, layer: str = "") -> Found:
