@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -104,12 +104,17 @@ def only(mesh: SentMesh, faces: Ints) -> SentMesh:
     keep[faces] = True
     values = mesh.faces.values[np.repeat(keep, mesh.faces.lengths)]
     offsets = np.append(0, np.cumsum(mesh.faces.lengths[keep])).astype(np.int64)
+    return _with_faces(mesh, Ragged(values, offsets))
+
+
+def _with_faces(mesh: SentMesh, faces: Ragged) -> SentMesh:
+    """The mesh with these faces instead; vertices that only its own ones use count as others'."""
     others = np.zeros(len(mesh.vertices), dtype=bool)
     others[mesh.faces.values] = True
-    others[values] = False
+    others[faces.values] = False
     if mesh.others is not None:
         others |= mesh.others
-    return SentMesh(mesh.vertices, Ragged(values, offsets), mesh.normals, others=others)
+    return SentMesh(mesh.vertices, faces, mesh.normals, others=others)
 
 
 def together(meshes: Sequence[SentMesh]) -> tuple[SentMesh, Ints]:
@@ -152,7 +157,7 @@ def joined(mesh: SentMesh, tolerance: float) -> tuple[SentMesh, Ints, Joint]:
     kept, split = only(mesh, np.flatnonzero(~more)).faces, more[source]
     values = np.concatenate([near[np.asarray(kept.values, dtype=np.int64)], faces[split].ravel()])
     lengths = np.append(kept.lengths, np.full(int(split.sum()), 3))
-    whole = replace(mesh, faces=Ragged(values, np.append(0, np.cumsum(lengths))))
+    whole = _with_faces(mesh, Ragged(values, np.append(0, np.cumsum(lengths))))
     return whole, np.append(np.flatnonzero(~more), source[split]), joint.worse(divided)
 
 
