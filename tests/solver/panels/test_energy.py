@@ -194,7 +194,7 @@ def test_weights_of_any_size_are_weights(which, mode):
 
 def test_of_large_weights_only_the_ratios_matter():
     """The energy is as many times as large."""
-    pattern, cmap = hex_pattern(torus, 24, 6), grid_map(torus, 96, 60, -0.1, 1.2)
+    pattern, cmap = hex_pattern(torus, 24, 2), grid_map(torus, 48, 30, -0.1, 1.2)
     cells = pattern.vertices[pattern.faces.values].reshape(-1, 6, 3)
     length = np.linalg.norm(np.roll(cells, -1, axis=1) - cells, axis=2).mean(axis=1)
     (one, low), (other, high) = (

@@ -97,7 +97,7 @@ def test_the_result_does_not_depend_on_how_many_pairs_are_looked_at_together(mon
     tree = closest.TriangleTree.build(vertices, faces)
     whole = tree.nearest(points)
     np.testing.assert_allclose(whole.distance, brute_force(points, vertices, faces), rtol=1e-12)
-    for pairs, some in ((1, slice(None, None, 20)), (1000, slice(None))):
+    for pairs, some in ((1, slice(None, None, 75)), (1000, slice(None))):
         monkeypatch.setattr(closest, "MOST_PAIRS", pairs)
         monkeypatch.setattr(closest, "COMPARED", pairs)
         parts = tree.nearest(points[some])

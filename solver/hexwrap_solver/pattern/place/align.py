@@ -30,8 +30,9 @@ The placements that cost least are then deformed for good (``deform``), and the 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -368,7 +369,7 @@ def _mean_depth(cmap: ConformalMap, sides: Sides, normal: Complexes, turn: Compl
     return np.asarray(np.bincount(sides.side, weights=value) / np.bincount(sides.side))
 
 
-def _origins(frame: _Frame, scale: complex) -> list[tuple[Isometry, complex]]:
+def _origins(frame: _Frame, scale: complex) -> Sequence[tuple[Isometry, complex]]:
     """Every way in which g can be a motion of the lattice, and where the apex, or the layout's origin, stands
     then: on a cone at the kinds of symmetry centres; for a translation as two sides may lie on lines."""
     lattice, normal, first = frame.lattice, frame.normal, frame.first
@@ -407,7 +408,8 @@ def _translation(frame: _Frame, wanted: complex) -> Ints:
     return lattice.translation_near(wanted)
 
 
-def symmetry_centres(lattice: Lattice, cone_index: int) -> list[tuple[Isometry, complex]]:
+@lru_cache(maxsize=64)  # asked for at every size that is tried
+def symmetry_centres(lattice: Lattice, cone_index: int) -> Sequence[tuple[Isometry, complex]]:
     """Motions p ↦ ζ^cone_index·p + τ that differ by more than a translation of the lattice, with their fixed
     points: centres of 6-, 4-, 3- or 2-fold symmetry, the highest first."""
     zeta = np.exp(1j * lattice.step_angle * cone_index)
@@ -421,7 +423,7 @@ def symmetry_centres(lattice: Lattice, cone_index: int) -> list[tuple[Isometry, 
         apart = [lattice.coordinates(np.array((centre - other) / e1)) for _, other in found]
         if all(abs(a - np.rint(a)).max() > RELATIVE for a in apart):
             found.append((Isometry(lattice, cone_index, (int(shift[0]), int(shift[1]))), centre))
-    return found
+    return tuple(found)
 
 
 def misplaced_corners(frame: _Frame, motion: Isometry, line: Floats) -> float:
