@@ -41,6 +41,8 @@ def fill_openings(surface: Surface) -> Surface:
     for loop in surface.loops[kept:]:
         outline = loop[::-1]  # a loop runs with the surface on its left, and so clockwise around its hole
         z, fill = _fill(surface.vertices[outline])
+        if _meets(surface, outline, fill):
+            z, fill = _fan(surface.vertices[outline])
         places.append(z)
         triangles.append(start + fill)
         names.append(np.concatenate([outline, n + np.arange(len(z) - len(loop))]))
@@ -71,6 +73,27 @@ def _fill(outline: Floats) -> tuple[Complexes, Ints]:
         found = _triangulated(_rounded(outline))
         assert found is not None, "a circle does not touch itself"
     return found
+
+
+def _meets(surface: Surface, outline: Ints, fill: Ints) -> bool:
+    """Whether an edge across the hole has both ends in common with an edge of the surface, which would then
+    have four sides. outline: (k,) vertices; fill: (t, 3) triangles, of which corners below k are these."""
+    k, n = len(outline), len(surface.vertices)
+    sides = np.stack([fill, np.roll(fill, -1, axis=1)], axis=2).reshape(-1, 2)
+    sides = sides[(sides < k).all(axis=1)]
+    apart = (sides[:, 1] - sides[:, 0]) % k
+    across = np.sort(outline[sides[(apart != 1) & (apart != k - 1)]], axis=1)
+    edges = np.sort(
+        np.concatenate([surface.faces[:, [0, 1]], surface.faces[:, [1, 2]], surface.faces[:, [2, 0]]])
+    )
+    return bool(np.isin(across @ [n, 1], edges @ [n, 1]).any())
+
+
+def _fan(outline: Floats) -> tuple[Complexes, Ints]:
+    """(k + 1,) the outline (k, 3) on a circle, and its centre, and (k, 3) triangles around that."""
+    k = len(outline)
+    around = np.arange(k)
+    return np.append(_rounded(outline), 0), np.stack([around, (around + 1) % k, np.full(k, k)], axis=1)
 
 
 def _flattened(outline: Floats) -> Complexes:

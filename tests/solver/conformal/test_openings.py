@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hexwrap_solver.arrays import Bools
+from hexwrap_solver.arrays import Bools, Ragged
 from hexwrap_solver.conformal import boundary, conformal_map
 from hexwrap_solver.conformal.types import BoundaryCondition
-from hexwrap_solver.surface import with_openings
+from hexwrap_solver.surface import surface_from_mesh, with_openings
 from hexwrap_solver.surface.holes import fill_openings
-from hexwrap_solver.surface.types import Surface
+from hexwrap_solver.surface.types import SentMesh, Surface
 from tests.solver.conformal.annuli import bump
 from tests.solver.conformal.nets import CENTRES, SPHERE, check, holed, sent
 
@@ -85,3 +87,22 @@ def test_a_dome_keeps_its_longest_two_loops() -> None:
     check(found)
     assert found.kind in ("cylinder", "cone")
     assert len(found.surface.loops) == 4
+
+
+def test_no_edge_of_a_fill_is_one_of_the_surface_already():
+    """The loop a, b, c, d is that of a quad of two triangles, whose diagonal must not be a second time in
+    the fill; the inner loop is that of a hole in one of them."""
+    outer = [[0.5, 0, 0], [1, -1.5, 0.2], [1.5, 0, 0], [1, 1.5, 0.2]]
+    vertices = [*outer, [0.85, -0.3, 0], [1.15, -0.3, 0], [1, -0.6, 0]]
+    a, b, c, d, x, y, z = range(7)
+    faces = [[a, c, d], [a, x, y], [a, y, c], [c, y, z], [c, z, b], [b, z, x], [b, x, a]]
+    faces = [face[::-1] for face in faces]
+    surface = surface_from_mesh(SentMesh(np.array(vertices, float), Ragged.from_table(np.array(faces))))
+    inner, outer = sorted(surface.loops, key=len)
+    filled = fill_openings(replace(surface, loops=(inner, outer), openings=1))
+    sides = np.sort(
+        np.stack([filled.faces, np.roll(filled.faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1
+    )
+    counts = np.unique(sides, axis=0, return_counts=True)[1]
+    assert sorted(counts)[:3] == [1, 1, 1]
+    assert (np.sort(counts)[3:] == 2).all()
