@@ -17,7 +17,7 @@ from scipy.sparse.linalg import splu
 from hexwrap_solver.arrays import Complexes, Floats, Ints
 from hexwrap_solver.geometry import dot, face_areas
 from hexwrap_solver.surface.brep.plane import triangulated
-from hexwrap_solver.surface.topology import vertex_normals
+from hexwrap_solver.surface.topology import half_edges, vertex_normals
 from hexwrap_solver.surface.types import Openings, Surface
 from hexwrap_solver.tolerances import TINY
 
@@ -38,10 +38,14 @@ def fill_openings(surface: Surface) -> Surface:
     kept = len(surface.loops) - surface.openings
     n = old = len(surface.vertices)
     places, triangles, names, start = [], [], [], 0
+    around = np.zeros(n, dtype=bool)
+    around[np.concatenate(surface.loops[kept:])] = True
+    edges = np.stack(half_edges(surface.faces), axis=1)
+    taken = np.sort(edges[around[edges].all(axis=1)], axis=1) @ [n, 1]
     for loop in surface.loops[kept:]:
         outline = loop[::-1]  # a loop runs with the surface on its left, and so clockwise around its hole
         z, fill = _fill(surface.vertices[outline])
-        if _meets(surface, outline, fill):
+        if np.isin(_across(outline, fill) @ [old, 1], taken).any():  # an edge would have four sides
             z, fill = _fan(surface.vertices[outline])
         places.append(z)
         triangles.append(start + fill)
@@ -75,18 +79,14 @@ def _fill(outline: Floats) -> tuple[Complexes, Ints]:
     return found
 
 
-def _meets(surface: Surface, outline: Ints, fill: Ints) -> bool:
-    """Whether an edge across the hole has both ends in common with an edge of the surface, which would then
-    have four sides. outline: (k,) vertices; fill: (t, 3) triangles, of which corners below k are these."""
-    k, n = len(outline), len(surface.vertices)
-    sides = np.stack([fill, np.roll(fill, -1, axis=1)], axis=2).reshape(-1, 2)
-    sides = sides[(sides < k).all(axis=1)]
+def _across(outline: Ints, fill: Ints) -> Ints:
+    """(m, 2) ends, the lower first, of edges across the hole. outline: (k,) vertices; fill: (t, 3) triangles,
+    of which corners below k are these."""
+    k = len(outline)
+    sides = np.stack(half_edges(fill), axis=1)
     apart = (sides[:, 1] - sides[:, 0]) % k
-    across = np.sort(outline[sides[(apart != 1) & (apart != k - 1)]], axis=1)
-    edges = np.sort(
-        np.concatenate([surface.faces[:, [0, 1]], surface.faces[:, [1, 2]], surface.faces[:, [2, 0]]])
-    )
-    return bool(np.isin(across @ [n, 1], edges @ [n, 1]).any())
+    across = (sides < k).all(axis=1) & (apart != 1) & (apart != k - 1)
+    return np.sort(outline[sides[across]], axis=1)
 
 
 def _fan(outline: Floats) -> tuple[Complexes, Ints]:
