@@ -1,5 +1,6 @@
 """The whole way with singularities: cells close around them, panels are regular, nothing overlaps."""
 
+import re
 from dataclasses import dataclass, replace
 
 import numpy as np
