@@ -11,7 +11,7 @@ from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.pattern.lattice import Isometry, Lattice
 from hexwrap_solver.pattern.place.placement import is_disk, main_loops
 from hexwrap_solver.pattern.place.sense import too_many
-from hexwrap_solver.pattern.types import PatternSettings
+from hexwrap_solver.pattern.types import Kind, PatternSettings
 from hexwrap_solver.tolerances import RELATIVE, TINY
 
 #: Where neither a number nor a length is asked for: this many cells around, but fewer where that would make
@@ -22,6 +22,12 @@ DEFAULT_AROUND, DEFAULT_CELLS, DEFAULT_ROWS, DEFAULT_NARROWEST = 48, 3000, 3.0, 
 DEFAULT_ON_NETS = 1000
 #: Whole cells may stay away from so much of the surface at its narrow end.
 DEFAULT_OPEN = 0.01
+#: Cells are smaller where whole ones would leave more of the surface bare along its loops, openings included,
+#: but no more than ``DEFAULT_CELLS`` for that.
+DEFAULT_BARE = 0.1
+
+#: Half a row of cells, in edges, where every other cell of a row stands half a cell higher.
+HALF_ROW: dict[Kind, float] = {"hex": 3**0.5 / 4}
 
 #: No cell is more than this many edges wide.
 EDGES_PER_CELL = 4.0
@@ -63,12 +69,13 @@ def default_edge(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings
     width = width_per_cell(lattice, angle)
     edge = girth(cmap) / (DEFAULT_AROUND * width)
     of_cells = float(np.sqrt(area / (DEFAULT_CELLS * _unit_area(lattice))))
+    bare = np.inf if settings.boundary == "trim" else max(_edge_of_bare(cmap, lattice, settings), of_cells)
     if cmap.kind == "net" or is_disk(cmap):
         few = float(np.sqrt(area / (DEFAULT_ON_NETS * _unit_area(lattice))))
-        return min(few, _edge_of_rows(cmap, lattice, angle))
+        return min(few, bare, _edge_of_rows(cmap, lattice, angle))
     narrow = min(_lengths_of_loops(cmap)) if settings.boundary == "trim" else _narrow_ring(cmap)
     fitting = min(_edge_of_rows(cmap, lattice, angle), narrow / (DEFAULT_NARROWEST * width))
-    return min(max(edge, of_cells), fitting)
+    return min(max(edge, of_cells), bare, fitting)
 
 
 def girth(cmap: ConformalMap) -> float:
@@ -95,6 +102,18 @@ def _edge_of_rows(cmap: ConformalMap, lattice: Lattice, angle: float) -> float:
     """Edge length in the domain at which ``DEFAULT_ROWS`` fit between the loops, on the average."""
     height = float(face_areas(cmap)[1].sum()) / girth(cmap)
     return height * width_per_cell(lattice, angle) / (DEFAULT_ROWS * _unit_area(lattice))
+
+
+def _edge_of_bare(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings) -> float:
+    """Edge length in the domain at which whole cells leave ``DEFAULT_BARE`` of the surface bare: middles stay
+    as far from the loops as cells reach, and half a row from ends that are lines of the pattern."""
+    surface, strip = cmap.surface, 0.0
+    for i, loop in enumerate(surface.loops):
+        on_line = cmap.kind == "cylinder" and i < 2 and settings.align != "none"
+        reach = HALF_ROW.get(lattice.kind, 0.0) if on_line else lattice.sides / (2 * np.pi)
+        along = np.linalg.norm(surface.vertices[np.roll(loop, -1)] - surface.vertices[loop], axis=1)
+        strip += reach * float(along @ np.exp(-cmap.log_scale[loop]))
+    return DEFAULT_BARE * float(surface.areas.sum()) / strip if strip else np.inf
 
 
 def cells_around(cmap: ConformalMap, motion: Isometry | None, scale: float, width: float) -> int:
