@@ -25,11 +25,10 @@ from hexwrap_solver.pattern.lay.nodes import lattice_points_in_triangles
 from hexwrap_solver.pattern.lay_pattern import CLOSE, off_by
 from hexwrap_solver.pattern.place.choose import PlacementFamily
 from hexwrap_solver.pattern.place.rotation import with_rotation
-from hexwrap_solver.pattern.types import Kind, PatternSettings
+from hexwrap_solver.pattern.place.size import HALF_ROW
+from hexwrap_solver.pattern.types import PatternSettings
 from hexwrap_solver.tolerances import RELATIVE, TINY
 
-#: Half a row of cells, in edges, where every other cell of a row stands half a cell higher.
-ROW: dict[Kind, float] = {"hex": 3**0.5 / 4}
 #: Cells stand on either side of a line of other patterns; those nearer to it are cut by it in two.
 HALVED = 0.25
 #: Cells that a boundary cuts, per cell of area that is left of them: those whose middle is nearer to it than
@@ -169,7 +168,7 @@ def _outlook(cmap: ConformalMap, placing: PlacementFamily, settings: PatternSett
         regular = cKDTree(surface.vertices[cmap.cones.vertex]).query(middle)[0] > reach
     whole = regular.copy()
     for i, loop in enumerate(surface.loops):
-        least: Floats = ROW.get(lattice.kind, HALVED) * size if i in placing.loops else reach
+        least: Floats = HALF_ROW.get(lattice.kind, HALVED) * size if i in placing.loops else reach
         whole &= _distance(middle, surface.vertices[np.append(loop, loop[0])]) > least
     bent = np.zeros(len(face), dtype=bool)
     for i in placing.features:
