@@ -8,11 +8,11 @@ import numpy as np
 
 from hexwrap_solver.arrays import Floats
 from hexwrap_solver.conformal.types import ConformalMap
-from hexwrap_solver.pattern.lattice import Lattice
+from hexwrap_solver.pattern.lattice import Isometry, Lattice
 from hexwrap_solver.pattern.place.placement import is_disk, main_loops
 from hexwrap_solver.pattern.place.sense import too_many
 from hexwrap_solver.pattern.types import Kind, PatternSettings
-from hexwrap_solver.tolerances import TINY
+from hexwrap_solver.tolerances import RELATIVE, TINY
 
 #: Where neither a number nor a length is asked for: this many cells around, but fewer where that would make
 #: more cells altogether, and more where fewer rows would fit between the loops, or where fewer cells
@@ -116,6 +116,22 @@ def _edge_of_bare(cmap: ConformalMap, lattice: Lattice, settings: PatternSetting
     return DEFAULT_BARE * float(surface.areas.sum()) / strip if strip else np.inf
 
 
+def cells_around(cmap: ConformalMap, motion: Isometry | None, scale: float, width: float) -> int:
+    """Along the translation that g becomes on a cylinder, else as many of a width as fit around. scale: from
+    the domain to the lattice; width: in lattice units."""
+    if motion is not None and motion.cone_index == 0 and any(motion.shift):
+        return int(motion.lattice.cells_around(np.array(motion.shift)))
+    return max(round(girth(cmap) * scale / width), 1)
+
+
+def counts_near(count: float, spread: float, most: int) -> Floats:
+    """Whole numbers within the relative spread of a count, and the nearest one, the nearest first; at most so
+    many, none below 1."""
+    near = np.arange(np.ceil(count * (1 - spread)), count * (1 + spread) + RELATIVE)
+    near = np.unique(np.append(near, max(1.0, round(count))))
+    return np.asarray(near[np.argsort(abs(near - count), kind="stable")][:most])
+
+
 def fitting_number(cmap: ConformalMap, lattice: Lattice, angle: float) -> tuple[int, float]:
     """Cells around, and their edge length on the surface, that leave room for ``DEFAULT_ROWS`` and for
     ``DEFAULT_NARROWEST`` cells around the shorter loop."""
@@ -139,12 +155,12 @@ def _lengths_of_loops(cmap: ConformalMap) -> list[float]:
     return [float(length[np.isin(key, loop * n + np.roll(loop, -1))].sum()) for loop in main_loops(cmap)]
 
 
-def edges_around(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings, angle: float) -> float:
-    """How many edges of the wanted length the circumference is long, where g becomes a translation.
+def edges_around(cmap: ConformalMap, settings: PatternSettings, edge: float) -> float:
+    """How many edges of a length in the domain the circumference is long, where g becomes a translation.
 
     Raises PatternError where a single ring would already have too many cells, before anything counts them.
     """
-    edges = cmap.circumference / wanted_edge(cmap, lattice, settings, angle)
+    edges = cmap.circumference / edge
     if not edges <= EDGES_PER_CELL * settings.max_cells:
         raise too_many(cmap, settings, min(edges / EDGES_PER_CELL, sys.float_info.max))
     return edges
