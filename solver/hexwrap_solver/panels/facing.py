@@ -8,7 +8,7 @@ import numpy as np
 
 from hexwrap_solver.arrays import Complexes, Floats, Ints, Ragged
 from hexwrap_solver.geometry import dot, normalize, plane_axes
-from hexwrap_solver.panels.halfedges import HalfEdges
+from hexwrap_solver.pattern.halfedges import HalfEdges
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from hexwrap_solver.surface import closest
 from hexwrap_solver.surface.closest import TriangleTree, nearest_in_triangles
+from hexwrap_solver.surface.types import Triangles
 
 
 def brute_force(points, vertices, faces):
@@ -43,7 +44,7 @@ def test_farthest_of_a_row_is_exact_whatever_triangles_are_guessed(seed, good):
     tree = TriangleTree.build(vertices, soup)
     if good:
         near = tree.nearest(points).face
-    found = tree.farthest(points, row, 13, near)
+    found = tree.farthest(points, row, 13, near, Triangles(vertices, soup).twin)
     distance = brute_force(points, vertices, soup)
     wanted = [distance[row == r].max(initial=0.0) for r in range(13)]
     assert np.allclose(found, wanted, rtol=1e-9, atol=1e-12)
