@@ -8,12 +8,12 @@ import numpy as np
 
 from hexwrap_solver.arrays import Floats, Progress, no_progress
 from hexwrap_solver.conformal.types import ConformalMap
+from hexwrap_solver.geometry import cross
 from hexwrap_solver.panels.congruence import congruence_classes
 from hexwrap_solver.panels.facing import Facing, edge_ends, facing_edges
 from hexwrap_solver.panels.fewest import SLACK
 from hexwrap_solver.panels.folds import parts_by_cell
 from hexwrap_solver.panels.gaps import gaps
-from hexwrap_solver.pattern.halfedges import HalfEdges
 from hexwrap_solver.panels.overlap import overlapping_pairs
 from hexwrap_solver.panels.polygons import (
     best_plane_distances,
@@ -26,6 +26,7 @@ from hexwrap_solver.panels.polygons import (
     row_sums,
 )
 from hexwrap_solver.panels.types import Panels, Quality
+from hexwrap_solver.pattern.halfedges import HalfEdges
 from hexwrap_solver.pattern.lattice import LATTICES
 from hexwrap_solver.pattern.types import Pattern
 from hexwrap_solver.surface.orient import inward_note
@@ -36,9 +37,16 @@ BARE = 0.03
 
 
 def measure(
-    cmap: ConformalMap, pattern: Pattern | None, panels: Panels | None, progress: Progress = no_progress
+    cmap: ConformalMap,
+    pattern: Pattern | None,
+    panels: Panels | None,
+    progress: Progress = no_progress,
+    facing: Facing | None = None,
 ) -> Quality:
-    """Everything is measured on the finished geometry, nothing is taken over from how it was made."""
+    """Everything is measured on the finished geometry, nothing is taken over from how it was made.
+
+    facing: edges of these panels, where it is known which face each other.
+    """
     stretch, area = cmap.stretch, cmap.surface.areas
     quality = Quality(
         scale_ratio=float(np.exp(np.ptp(cmap.log_scale))),
@@ -55,11 +63,12 @@ def measure(
     polygons, cell_area = panels.polygons, float(fan_areas(pattern.cells).sum())
     edges = pattern.half_edges
     parts, owner = parts_by_cell(panels)
-    facing = _facing(pattern, edges, parts)
-    between = gaps(facing, parts, len(edges.cell))
     angle = interior_angles(polygons, panels.normal)
     flat = parts is panels  # none is bent
+    if facing is None or not flat:
+        facing = _facing(pattern, edges, parts)
     part_angle = angle if flat else interior_angles(parts.polygons, parts.normal)
+    between = gaps(facing, parts, len(edges.cell))
     row, count, edge = polygons.row, polygons.lengths, edge_lengths(polygons)
     mean = row_sums(edge, polygons.offsets) / count
     ideal = _ideal_angles(pattern, panels, angle, (np.pi * (count - 2) / count)[row])
@@ -143,7 +152,7 @@ def _count_overlaps(facing: Facing, panels: Panels, mean_edge: Floats) -> int:
     polygons, normal = panels.polygons, panels.normal
     pairs = np.stack([facing.left, facing.right], axis=1)
     start, end = edge_ends(polygons, facing.left, facing.start_left)
-    outwards = np.cross(end - start, normal[facing.left] + normal[facing.right])
+    outwards = cross(end - start, facing.mean)
     found = np.sort(pairs[overlapping_pairs(polygons, normal, mean_edge, pairs, outwards)], axis=1)
     return len(np.unique(found, axis=0))
 

@@ -74,7 +74,7 @@ class _Beside:
         count = self.count.take(face)
         one = np.repeat(np.arange(len(face)), count)
         at = np.arange(len(one)) + np.repeat(self.first.take(face) - np.cumsum(count) + count, count)
-        return one, self.leaf.take(at)
+        return one, self.leaf.take(at).astype(np.int64)
 
     def knowing(self, face: Ints, one: Ints, leaf: Ints) -> _Beside:
         """With the pairs of further triangles (k,); without all others where there are too many."""
@@ -191,7 +191,7 @@ class TriangleTree:
         return least
 
     def _around(self, points: Floats, near: Ints, reach: Floats) -> tuple[Ints, Ints] | None:
-        """The pairs of ``_within``, and others, of points that are within reach of the triangles near (k,)."""
+        """The pairs of ``_within``, and others, of points within reach of the triangles near (k,)."""
         beside, others = np.flatnonzero(reach <= self._margin), np.flatnonzero(reach > self._margin)
         known: _Beside = self.__dict__.get("_beside", _Beside.none(len(self.corners)))
         new = np.unique(near[beside][known.first.take(near[beside]) < 0])
