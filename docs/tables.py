@@ -6,8 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from hexwrap_server import samples
-from hexwrap_server.cli import explore
-from hexwrap_server.cli.options import table
+from hexwrap_server.cli.options import explore_table, table
 from hexwrap_server.settings import readme_table
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -16,7 +15,7 @@ OPTIONS = "| option of `hexwrap solve` | field of a request | what it does | wor
 #: File → marker → what stands after it.
 TABLES: dict[str, dict[str, Callable[[], str]]] = {
     "README.md": {"samples": lambda: ", ".join(f"`{name}`" for name in samples.names())},
-    "docs/concepts/explore.md": {"explore": lambda: f"\n{EXPLORE}{explore.table()}\n"},
+    "docs/concepts/explore.md": {"explore": lambda: f"\n{EXPLORE}{explore_table()}\n"},
     "docs/settings.md": {"options": lambda: f"\n{OPTIONS}{table()}\n"},
     "docs/service.md": {"settings": lambda: f"\n{readme_table()}\n"},
 }

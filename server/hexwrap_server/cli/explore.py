@@ -12,13 +12,12 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from hexwrap_server.cli.local import MAX_PANELS, MAX_VERTICES, read_body
-from hexwrap_server.cli.options import asked_body, with_default, word
+from hexwrap_server.cli.local import MAX_PANELS, MAX_VERTICES, Task, checked_task
+from hexwrap_server.cli.options import asked_body
 from hexwrap_server.errors import UsageError
-from hexwrap_server.input.form import ExploreBody, Leaf, leaves
+from hexwrap_server.input.form import ExploreBody
 from hexwrap_server.input.requests import CacheSettings, Exploration, Order, SentSurface
-from hexwrap_server.input.schemas import parse_exploration
-from hexwrap_server.input.surface_files import sent_surface
+from hexwrap_server.input.schemas import Request, parse_exploration
 from hexwrap_server.jobs import codec
 from hexwrap_server.jobs.engine import ProcessEngine, nobody
 from hexwrap_server.jobs.exploring import explore
@@ -27,46 +26,10 @@ from hexwrap_server.jobs.worker import Report
 from hexwrap_server.output import explored, front_png
 from hexwrap_server.output.text import length
 from hexwrap_server.settings import MIB, Settings
-from hexwrap_solver.surface.types import SurfaceSettings
 
 #: Limits of a process: only the user waits here.
 SECONDS, MEMORY_MIB = 86400.0, 65536.0
 WRITERS = {".csv": explored.explore_csv, ".json": explored.result_json, ".png": front_png.front_png}
-#: Sections of the body that are options here.
-SECTIONS = {"vary": "--{}", "limits": "--max-{}", "cost": "--{}", "variants": "--{}", "seed": "--{}"}
-
-
-def _options() -> list[tuple[str, Leaf]]:
-    found = []
-    for leaf in leaves(ExploreBody):
-        if leaf.path[0] in SECTIONS:
-            name = leaf.path[-1].removeprefix("max_").replace("_", "-")
-            found.append((SECTIONS[leaf.path[0]].format(name), leaf))
-    return found
-
-
-def add_explore_options(parser: argparse.ArgumentParser) -> None:
-    """Derived from the annotated settings, as for ``solve``."""
-    group = parser.add_argument_group("exploration")
-    for flag, leaf in _options():
-        several = leaf.path[0] == "vary"
-        group.add_argument(
-            flag,
-            dest="explore_" + "_".join(leaf.path),
-            nargs="+" if several else None,
-            type=word,
-            default=argparse.SUPPRESS,
-            metavar="X",
-            help=with_default(leaf.setting.help, leaf.default).replace("%", "%%"),
-        )
-
-
-def table() -> str:
-    """These options as rows of the documentation's table."""
-    return "\n".join(
-        f"| `{flag}` | `{'.'.join(leaf.path)}` | {with_default(leaf.setting.help, leaf.default)} |"
-        for flag, leaf in _options()
-    )
 
 
 def check_outputs(outputs: list[str]) -> None:
@@ -76,33 +39,17 @@ def check_outputs(outputs: list[str]) -> None:
             raise UsageError(f"-o {out}: the ending must be one of {', '.join(WRITERS)}.")
 
 
-def asked(arguments: argparse.Namespace) -> tuple[str, SentSurface, Exploration]:
-    """Name, surface and what to explore. Raises UsageError, HexwrapError."""
-    given = arguments.input
-    whole, data = read_body(given)
-    if data is not None:
-        whole["surface"] = {"id": ""}  # stands for the file's surface while the rest is checked
-    whole = asked_body(arguments, whole)
-    known = {f.name for f in fields(ExploreBody)}
-    body: dict[str, Any] = {name: value for name, value in whole.items() if name in known}
-    if isinstance(body.get("pattern"), dict):  # a request for one result: its size is what varies
+def asked(arguments: argparse.Namespace) -> Task[Exploration]:
+    """What is to be explored. Raises UsageError, HexwrapError."""
+    return checked_task(arguments.input, lambda body: _parsed(asked_body(arguments, body)))
+
+
+def _parsed(whole: dict[str, Any]) -> Request[Exploration]:
+    """The exploration in a body, which may be a request for one result: then its size is what varies."""
+    body = {f.name: whole[f.name] for f in fields(ExploreBody) if f.name in whole}
+    if isinstance(body.get("pattern"), dict):
         body["pattern"] = {k: v for k, v in body["pattern"].items() if k not in ("around", "edge_length")}
-    for _, leaf in _options():
-        name = "explore_" + "_".join(leaf.path)
-        if hasattr(arguments, name):
-            value = getattr(arguments, name)
-            if len(leaf.path) == 1:
-                body[leaf.path[0]] = value
-            else:
-                body[leaf.path[0]] = {**(body.get(leaf.path[0]) or {}), leaf.path[1]: value}
-    request = parse_exploration(body, MAX_VERTICES, MAX_PANELS)
-    wanted, sent = request.wanted, request.surface
-    assert isinstance(wanted, Exploration)
-    if data is not None:
-        sent = sent_surface(data, Path(given).name, wanted.surface or SurfaceSettings(), MAX_VERTICES).sent
-    if not isinstance(sent, SentSurface):
-        raise UsageError(f"{given} holds a surface id, which needs a server; give the surface itself.")
-    return request.name, sent, wanted
+    return parse_exploration(body, MAX_VERTICES, MAX_PANELS)
 
 
 class _Here:
@@ -163,8 +110,10 @@ async def _explore(name: str, sent: SentSurface, wanted: Exploration, report: Re
 
 def print_front(console: Console, name: str, result: dict[str, Any]) -> None:
     """The front as a table, the proposed one marked."""
-    table = Table(title=name or "front", title_justify="left", title_style="bold", box=None, pad_edge=False)
-    heads = ("no.", "boundary", "singular", "edge", "sizes", "uncovered", "panels", "types", "joint", "cost")
+    table = Table(title=name or "front", title_justify="left", title_style="bold", box=None)
+    table.padding = (0, 1, 0, 0)
+    choices = ("no.", "boundary", "sing.", "edge", "sizes")
+    heads = (*choices, "uncovered", "bare", "panels", "types", "joint", "cost")
     for head in heads:
         table.add_column(head, justify="right", no_wrap=True)
     order = sorted(result["front"], key=lambda i: result["variants"][i]["measured"]["uncovered"])
@@ -178,7 +127,8 @@ def print_front(console: Console, name: str, result: dict[str, Any]) -> None:
         gap = "" if found["gap_max"] is None else length(found["gap_max"])
         is_best = i == result["best"]
         row = [f"* {i}" if is_best else str(i), boundary, str(count), size, str(sizes)]
-        row += [f"{found['uncovered']:.2%}", str(found["panels"]), str(found["types"]), gap]
+        row += [f"{found['uncovered']:.2%}", f"{found['bare']:.0%}"]
+        row += [str(found["panels"]), str(found["types"]), gap]
         table.add_row(*row, f"{found['cost']:,.0f}", style="bold" if is_best else "")
     console.print(table)
     if result["best"] is not None:

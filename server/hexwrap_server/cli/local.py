@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic
 
 from hexwrap_server import samples
 from hexwrap_server.cli.options import asked_body
@@ -13,7 +14,7 @@ from hexwrap_server.errors import UsageError
 from hexwrap_server.input.json_text import loads
 from hexwrap_server.input.readers.text import as_utf8
 from hexwrap_server.input.requests import SentSurface, Wanted
-from hexwrap_server.input.schemas import parse_request
+from hexwrap_server.input.schemas import Asked, Request, parse_request
 from hexwrap_server.input.surface_files import sent_surface
 from hexwrap_server.jobs.cache import CachingRunner, StageCache
 from hexwrap_server.jobs.work import run_stages
@@ -27,12 +28,12 @@ SAMPLE = "sample:"
 
 
 @dataclass(frozen=True)
-class Task:
+class Task(Generic[Asked]):
     """A request whose form has been checked."""
 
     name: str
     surface: SentSurface
-    wanted: Wanted
+    wanted: Asked
 
 
 def read_body(given: str) -> tuple[dict[str, Any], bytes | None]:
@@ -63,12 +64,19 @@ def sample_body(name: str) -> dict[str, Any]:
     return samples.load(name)
 
 
-def task(given: str, arguments: argparse.Namespace) -> Task:
+def task(given: str, arguments: argparse.Namespace) -> Task[Wanted]:
     """What an input and the options ask for. Raises UsageError, HexwrapError."""
+    return checked_task(
+        given, lambda body: parse_request(asked_body(arguments, body), MAX_VERTICES, MAX_PANELS)
+    )
+
+
+def checked_task(given: str, parse: Callable[[dict[str, Any]], Request[Asked]]) -> Task[Asked]:
+    """What parse makes of an input's body. Raises UsageError, HexwrapError."""
     body, data = read_body(given)
     if data is not None:
         body["surface"] = {"id": ""}  # stands for the file's surface while the rest is checked
-    request = parse_request(asked_body(arguments, body), MAX_VERTICES, MAX_PANELS)
+    request = parse(body)
     sent = request.surface
     if data is not None:
         settings = request.wanted.surface or SurfaceSettings()
@@ -84,12 +92,12 @@ def surface_settings(arguments: argparse.Namespace) -> SurfaceSettings:
     return parse_request(body, MAX_VERTICES, MAX_PANELS).wanted.surface or SurfaceSettings()
 
 
-def solve_here(asked: Task, report: Report) -> tuple[Solution, dict[str, float]]:
+def solve_here(asked: Task[Wanted], report: Report) -> tuple[Solution, dict[str, float]]:
     """The solution and seconds per stage. Raises HexwrapError."""
     runner = CachingRunner(StageCache(None, 0), report)
     return run_stages(asked.surface, asked.wanted, runner), runner.timings
 
 
-def only_map(asked: Task) -> Task:
+def only_map(asked: Task[Wanted]) -> Task[Wanted]:
     """The same surface and boundary, without a pattern."""
     return replace(asked, wanted=replace(asked.wanted, pattern=None, panels=None))

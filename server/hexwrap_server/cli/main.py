@@ -22,16 +22,22 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from hexwrap_server import __version__, samples
 from hexwrap_server.cli.demo import ALL, DemoError, run_demo
 from hexwrap_server.cli.explore import WRITERS as FRONT_WRITERS
-from hexwrap_server.cli.explore import add_explore_options, check_outputs, explore_here, print_front
 from hexwrap_server.cli.explore import asked as asked_exploration
+from hexwrap_server.cli.explore import check_outputs, explore_here, print_front
 from hexwrap_server.cli.inspect import print_content
 from hexwrap_server.cli.local import Task, only_map, solve_here, surface_settings, task
-from hexwrap_server.cli.options import add_request_options, as_options, is_option_at_fault
+from hexwrap_server.cli.options import (
+    add_explore_options,
+    add_request_options,
+    as_options,
+    is_option_at_fault,
+)
 from hexwrap_server.cli.summary import print_summary
 from hexwrap_server.errors import FormError, StartError, UsageError
 from hexwrap_server.input.curves import READERS, read_drawing, write_curves
 from hexwrap_server.input.curves import WRITERS as CURVE_WRITERS
 from hexwrap_server.input.finished_map import map_in_result
+from hexwrap_server.input.requests import Wanted
 from hexwrap_server.jobs.lift_curves import flatten_curves, lift_curves
 from hexwrap_server.jobs.worker import Report
 from hexwrap_server.output import wire
@@ -223,11 +229,11 @@ def _solve(asked: argparse.Namespace) -> int:
 def _explore(asked: argparse.Namespace) -> int:
     check_outputs(asked.outputs)
     _check_folders(asked.outputs)
-    name, sent, wanted = asked_exploration(asked)
+    todo = asked_exploration(asked)
     with _progress(asked.quiet) as report:
-        found = explore_here(name, sent, wanted, report)
+        found = explore_here(todo.name, todo.surface, todo.wanted, report)
     console = Console(quiet=asked.quiet, soft_wrap=True)
-    print_front(console, name, found)
+    print_front(console, todo.name, found)
     for out in asked.outputs:
         save(out, FRONT_WRITERS[Path(out).suffix.lower()](found))
         console.print(f"wrote {out}", highlight=False)
@@ -287,7 +293,7 @@ def _demo(asked: argparse.Namespace) -> int:
     return 0
 
 
-def solve_with_progress(todo: Task, quiet: bool) -> tuple[Solution, dict[str, float]]:
+def solve_with_progress(todo: Task[Wanted], quiet: bool) -> tuple[Solution, dict[str, float]]:
     """Solve with a progress bar on stderr where that is a terminal."""
     with _progress(quiet) as report:
         return solve_here(todo, report)

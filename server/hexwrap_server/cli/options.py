@@ -11,7 +11,7 @@ from typing import Any
 from hexwrap_server.errors import FormError
 from hexwrap_server.input.curves import READERS, drawn, read_drawing
 from hexwrap_server.input.faults import Path, pointer
-from hexwrap_server.input.form import Body, Leaf, is_nullable, leaves
+from hexwrap_server.input.form import Body, ExploreBody, Leaf, is_nullable, leaves
 
 #: Flags that are neither the setting's name nor, for the first setting of a section, the section's.
 FLAGS: dict[Path, str] = {
@@ -27,6 +27,8 @@ FLAGS: dict[Path, str] = {
     ("surface", "features", "lines"): "--feature-lines",
     ("surface", "features", "without"): "--without-features",
 }
+#: Sections of the body of an exploration that are options of ``hexwrap explore``.
+EXPLORE = {"vary": "--{}", "limits": "--max-{}", "cost": "--{}", "variants": "--{}", "seed": "--{}"}
 #: Settings of which a request gives one.
 SIZES: tuple[Path, Path] = (("pattern", "around"), ("pattern", "edge_length"))
 
@@ -65,15 +67,10 @@ class Option:
             return f"{text}: a {', '.join(READERS)} file, or X,Y,Z;X,Y,Z;… (any number of times)"
         if self.is_first:
             text += "; 'none' leaves it out"
-        return with_default(text, default)
-
-
-def with_default(text: str, default: Any) -> str:
-    """The default after what a setting does, where there is one."""
-    if default is None or default is False or default == "":
-        return text
-    shown = default if isinstance(default, tuple) else (default,)
-    return f"{text} (default: {' '.join(f'{x:g}' if isinstance(x, float) else str(x) for x in shown)})"
+        if default is None or default is False or default == "":
+            return text
+        shown = default if isinstance(default, tuple) else (default,)
+        return f"{text} (default: {' '.join(f'{x:g}' if isinstance(x, float) else str(x) for x in shown)})"
 
 
 def _options() -> Iterator[Option]:
@@ -86,7 +83,30 @@ def _options() -> Iterator[Option]:
         yield Option(flag, leaf, is_first and is_nullable(Body, section))
 
 
+def _explore_options() -> Iterator[Option]:
+    for leaf in leaves(ExploreBody):
+        if leaf.path[0] in EXPLORE:
+            name = leaf.path[-1].removeprefix("max_").replace("_", "-")
+            yield Option(EXPLORE[leaf.path[0]].format(name), leaf, False)
+
+
 OPTIONS = tuple(_options())
+EXPLORE_OPTIONS = tuple(_explore_options())
+
+
+def add_explore_options(parser: argparse.ArgumentParser) -> None:
+    """Those that only ``hexwrap explore`` has."""
+    group = parser.add_argument_group("exploration")
+    for option in EXPLORE_OPTIONS:
+        group.add_argument(
+            option.flag,
+            dest=option.name,
+            nargs="+" if option.path[0] == "vary" else None,
+            type=_word,
+            default=argparse.SUPPRESS,
+            metavar="X",
+            help=option.help.replace("%", "%%"),
+        )
 
 
 def add_request_options(parser: argparse.ArgumentParser, section: str = "") -> None:
@@ -175,8 +195,13 @@ def table() -> str:
     return "\n".join(rows)
 
 
+def explore_table() -> str:
+    """Those that only ``hexwrap explore`` has as rows of the documentation's table."""
+    return "\n".join(f"| `{one.flag}` | `{'.'.join(one.path)}` | {one.help} |" for one in EXPLORE_OPTIONS)
+
+
 def _given(arguments: argparse.Namespace) -> list[Option]:
-    return [option for option in OPTIONS if hasattr(arguments, option.name)]
+    return [option for option in (*OPTIONS, *EXPLORE_OPTIONS) if hasattr(arguments, option.name)]
 
 
 def _within(at: str, section: str) -> bool:
@@ -193,10 +218,10 @@ def _value(text: str) -> object:
     """A number where it reads as one, null for 'none', else the word."""
     if text.lower() in ("none", "null"):
         return None
-    return word(text)
+    return _word(text)
 
 
-def word(text: str) -> object:
+def _word(text: str) -> object:
     """A number where it reads as one, else the word."""
     for kind in (int, float):
         try:

@@ -20,7 +20,7 @@ from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 from starlette.responses import Response
 from starlette.routing import BaseRoute, Match, Mount
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.types import Scope
 
 from hexwrap_server import __version__
 from hexwrap_server.errors import HttpError, PortTakenError, StorageError, bad_parameters
@@ -28,7 +28,7 @@ from hexwrap_server.http.answers import problem_response
 from hexwrap_server.http.compressed import Compressed
 from hexwrap_server.http.docs import DocumentedApp, add_docs
 from hexwrap_server.http.head import Head
-from hexwrap_server.http.hops.routes import hops_router
+from hexwrap_server.http.hops.routes import router as hops
 from hexwrap_server.http.observe import METHODS, Observer
 from hexwrap_server.http.routes import router
 from hexwrap_server.http.security import Doorkeeper
@@ -63,11 +63,6 @@ def create_app(settings: Settings | None = None, engine: Engine | None = None) -
         asyncio.get_running_loop().set_exception_handler(_on_loop_fault)
         try:
             await service.start()
-        except Exception as error:
-            app.state.failed = error
-            await service.stop()
-            raise
-        try:
             yield
         finally:
             await service.stop()
@@ -83,9 +78,8 @@ def create_app(settings: Settings | None = None, engine: Engine | None = None) -
         redoc_url=None,
     )
     app.state.service = service
-    app.state.failed = None
     app.include_router(router)
-    app.include_router(hops_router())
+    app.include_router(hops)
     add_viewer(app)
     add_docs(app)
     app.add_exception_handler(HexwrapError, _on_error)
@@ -105,13 +99,12 @@ def serve(settings: Settings) -> None:
     Raises PortTakenError, FolderInUseError, DamagedError, OSError, and what keeps the engine from starting.
     """
     set_up_logging(settings.log_level)
-    # uvicorn raises the signal again once it has shut down; that shall end the program quietly
-    signal.signal(signal.SIGTERM, lambda number, frame: None)
     listener = open_listener(settings)
     try:
         app = create_app(settings)
         config = uvicorn.Config(
-            _without_traceback(app),
+            app,
+            lifespan="off",
             log_config=None,
             access_log=False,
             server_header=False,
@@ -120,36 +113,19 @@ def serve(settings: Settings) -> None:
             backlog=BACKLOG,
             h11_max_incomplete_event_size=64 * 1024,
         )
+        server = _Server(config, app.state.service)
+        for number in (signal.SIGINT, signal.SIGTERM):  # uvicorn raises them again when it has shut down
+            signal.signal(number, server.handle_exit)
         gc.freeze()  # half a million objects of modules need not be searched for garbage
-        _run(_Server(config, app.state.service), app, listener)
-    except KeyboardInterrupt:
-        return
+        asyncio.run(_run(server, app, listener))
     finally:
         listener.close()
 
 
-def _run(server: uvicorn.Server, app: FastAPI, listener: socket.socket) -> None:
-    """Raises what kept the application from starting; uvicorn would only give an exit status of its own."""
-    try:
-        server.run(sockets=[listener])
-    except SystemExit:
-        if app.state.failed is None:
-            raise
-    if app.state.failed is not None:
-        raise app.state.failed
-
-
-def _without_traceback(app: FastAPI) -> ASGIApp:
-    """Whoever called ``serve`` tells why it did not start, in one sentence."""
-
-    async def answered(scope: Scope, receive: Receive, send: Send) -> None:
-        async def short(message: Message) -> None:
-            failed = message["type"] == "lifespan.startup.failed"
-            await send({**message, "message": ""} if failed else message)
-
-        await app(scope, receive, short if scope["type"] == "lifespan" else send)
-
-    return answered
+async def _run(server: uvicorn.Server, app: FastAPI, listener: socket.socket) -> None:
+    """Raises what keeps the application from starting; uvicorn would only write its traceback."""
+    async with app.router.lifespan_context(app):
+        await server.serve(sockets=[listener])
 
 
 class _Server(uvicorn.Server):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
@@ -27,7 +26,6 @@ async def sent_body(request: Request) -> AsyncIterator[Body]:
     declared = request.headers.get("content-length", "0")
     if declared.isdecimal() and int(declared) > limit:
         raise body_too_large(max_mib)
-    sha = hashlib.sha256(encoding.encode() + b"\n")
     chunks: list[bytes] = []
     size = 0
     try:
@@ -39,8 +37,7 @@ async def sent_body(request: Request) -> AsyncIterator[Body]:
             if service.body_bytes > BODIES_AT_ONCE * limit:
                 raise _too_many()
             chunks.append(chunk)
-            sha.update(chunk)
-        yield Body(b"".join(chunks), encoding, sha.hexdigest())
+        yield Body(b"".join(chunks), encoding)
     except ClientDisconnect:
         raise HttpError(
             400,

@@ -254,17 +254,12 @@ async def get_file(
 
 
 async def _read(request: Request, kind: str = "request") -> ParsedRequest:
-    """The request of a body; the same bytes again are not read again."""
     service = service_of(request)
     async with sent_body(request) as body:
-        mark = f"{kind} {body.mark}"
-        known = service.known_body(mark)
-        if known is not None:
-            return known
-        parsed = await service.read(
+        parsed: ParsedRequest = await service.read(
             f"hexwrap_server.jobs.reading:read_{kind}", body, str(service.store.surfaces)
         )
-        return service.remember_body(mark, parsed)
+    return parsed
 
 
 async def _carry(request: Request, id: str, what: str) -> Response:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections import OrderedDict
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,6 @@ from hexwrap_server import __version__
 from hexwrap_server.errors import HttpError, MemoryLimitError, TimeLimitError
 from hexwrap_server.http.metrics import Metrics
 from hexwrap_server.input.bodies import Body
-from hexwrap_server.input.requests import ParsedRequest
 from hexwrap_server.jobs.disk import make_private
 from hexwrap_server.jobs.engine import Engine, ProcessEngine, nobody
 from hexwrap_server.jobs.manager import JobManager
@@ -28,8 +26,6 @@ ERRANDS_PRELOAD = "hexwrap_server.jobs.reading"
 ERRAND_SECONDS = 120.0
 #: Bodies of up to this many MiB, unpacked, do not wait for larger ones and for files.
 SMALL_BODY = 4.0
-#: Bodies whose contents are remembered by their hash.
-KNOWN_BODIES = 256
 
 
 class Service:
@@ -48,7 +44,6 @@ class Service:
         #: Bytes of request bodies in memory.
         self.body_bytes = 0
         self.manager = JobManager(self.store, self.engine, settings, self.metrics, self.errand)
-        self._known_bodies: OrderedDict[str, ParsedRequest] = OrderedDict()
         self._since = time.time()
 
     async def start(self) -> None:
@@ -132,21 +127,6 @@ class Service:
                 f"Reading was stopped at {mib:g} MiB of memory, the limit of this server; send a smaller or "
                 "simpler body, or start the server with a larger --read-mib."
             ) from None
-
-    def known_body(self, mark: str) -> ParsedRequest | None:
-        """What was read from the same bytes before, if its surface is still kept."""
-        known = self._known_bodies.get(mark)
-        if known is None or not self.store.has_surface(known.surface_id):
-            return None
-        self._known_bodies.move_to_end(mark)
-        return known
-
-    def remember_body(self, mark: str, parsed: ParsedRequest) -> ParsedRequest:
-        """The surface itself is on disk."""
-        self._known_bodies[mark] = parsed
-        while len(self._known_bodies) > KNOWN_BODIES:
-            self._known_bodies.popitem(last=False)
-        return parsed
 
 
 def make_engine(settings: Settings) -> Engine:

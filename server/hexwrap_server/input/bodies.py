@@ -12,11 +12,10 @@ from hexwrap_server.errors import HttpError
 
 @dataclass(frozen=True)
 class Body:
-    """encoding: empty, or ``gzip``. mark: SHA-256 of how it is packed and of its bytes."""
+    """encoding: empty, or ``gzip``."""
 
     data: bytes
     encoding: str = ""
-    mark: str = ""
 
     def plain(self, max_mib: float) -> bytes:
         """The body, unpacked no further than the limit. Raises HttpError."""

@@ -43,64 +43,56 @@ class ExploreBody(Exploration):
 
 @dataclass(frozen=True)
 class Leaf:
-    """A setting that is not a section. choices: words that are accepted; numbers: how many values it takes
-    (None: any number of sections); path: from the top."""
+    """A setting that is not a section. path: from the top. parts: the types of its values, null aside."""
 
     path: Path
     setting: Setting
-    annotation: Any
+    parts: tuple[Any, ...]
     default: Any
 
     @property
     def choices(self) -> tuple[str, ...]:
-        return tuple(word for part in _parts(self.annotation) for word in _words(part))
+        """Words that are accepted."""
+        return tuple(word for part in self.parts if get_origin(part) is Literal for word in get_args(part))
 
     @property
     def is_free(self) -> bool:
         """Whether there are other values than the choices."""
-        return any(
-            get_origin(part) is not Literal and part is not type(None) for part in _parts(self.annotation)
-        )
+        return any(get_origin(part) is not Literal for part in self.parts)
 
     @property
     def is_text(self) -> bool:
         """Whether any text is a value."""
-        return str in _parts(self.annotation)
+        return str in self.parts
 
     @property
     def is_list(self) -> bool:
         """Whether it is a list of sections."""
-        return any(
-            get_args(part)[-1:] == (...,) and is_dataclass(get_args(part)[0])
-            for part in _parts(self.annotation)
-        )
+        return is_dataclass(self._row)
 
     @property
     def is_lines(self) -> bool:
         """Whether it is a list of polylines."""
-        return any(
-            get_args(part)[-1:] == (...,) and get_args(get_args(part)[0])[-1:] == (...,)
-            for part in _parts(self.annotation)
-        )
+        return get_args(self._row)[-1:] == (...,)
+
+    @property
+    def _row(self) -> Any:
+        """The type of its entries, where it takes any number of them."""
+        return next((get_args(part)[0] for part in self.parts if get_args(part)[-1:] == (...,)), None)
 
     @property
     def entry(self) -> tuple[str | None, str, str]:
         """Of the entries of such a list: the field that numbers their place, if any; the one that gives it by
         a point or a line of points; and the one that says what is wanted there."""
-        (section,) = (get_args(part)[0] for part in _parts(self.annotation))
-        hints = get_type_hints(section, include_extras=True)
-        number = next(
-            (f.name for f in fields(section) if f.default is None and int in _parts(hints[f.name])), None
-        )
-        points = "line" if "line" in hints else "point"
-        return number, points, next(f.name for f in fields(section) if f.name not in (number, points))
+        hints = get_type_hints(self._row, include_extras=True)
+        names = [f.name for f in fields(self._row) if f.default is None and int in _parts(hints[f.name])]
+        number, points = next(iter(names), None), "line" if "line" in hints else "point"
+        return number, points, next(name for name in hints if name not in (number, points))
 
     @property
     def numbers(self) -> int:
         """How many values it takes."""
-        return max(
-            len(get_args(part)) if get_origin(part) is tuple else 1 for part in _parts(self.annotation)
-        )
+        return max(len(get_args(part)) if get_origin(part) is tuple else 1 for part in self.parts)
 
 
 def read(kind: type[T], given: object, root: str = "") -> T:
@@ -157,7 +149,8 @@ def leaves(kind: type, root: Path = ()) -> Iterator[Leaf]:
             yield from leaves(section, path)  # type: ignore[arg-type]
         else:
             default = f.default if f.default is not MISSING else None
-            yield Leaf(path, setting_of(hints[f.name]), hints[f.name], default)
+            parts = tuple(part for part in _parts(hints[f.name]) if part is not type(None))
+            yield Leaf(path, setting_of(hints[f.name]), parts, default)
 
 
 def values(settings: Any, root: tuple[str | int, ...] = ()) -> Iterator[tuple[str, Setting, Any]]:
@@ -196,10 +189,6 @@ def _parts(annotation: Any) -> tuple[Any, ...]:
     if get_origin(annotation) is Annotated:
         return _parts(get_args(annotation)[0])
     return get_args(annotation) if get_origin(annotation) in (Union, types.UnionType) else (annotation,)
-
-
-def _words(part: Any) -> tuple[str, ...]:
-    return get_args(part) if get_origin(part) is Literal else ()
 
 
 def _default(f: Field[Any]) -> dict[str, Any]:

@@ -25,11 +25,10 @@ from hexwrap_solver.pattern.lay.nodes import lattice_points_in_triangles
 from hexwrap_solver.pattern.lay_pattern import CLOSE, off_by
 from hexwrap_solver.pattern.place.choose import PlacementFamily
 from hexwrap_solver.pattern.place.rotation import with_rotation
-from hexwrap_solver.pattern.types import Kind, PatternSettings
+from hexwrap_solver.pattern.place.size import HALF_ROW
+from hexwrap_solver.pattern.types import PatternSettings
 from hexwrap_solver.tolerances import RELATIVE, TINY
 
-#: Half a row of cells, in edges, where every other cell of a row stands half a cell higher.
-ROW: dict[Kind, float] = {"hex": 3**0.5 / 4}
 #: Cells stand on either side of a line of other patterns; those nearer to it are cut by it in two.
 HALVED = 0.25
 #: Cells that a boundary cuts, per cell of area that is left of them: those whose middle is nearer to it than
@@ -48,6 +47,7 @@ ALIKE = 1e-3
 class Foreseen:
     """Cells of one pattern. uncovered: share of their area that is left open. panels: their number. types:
     different lengths, and panels with another number of sides. area, perimeter: of all panels, model units.
+    bare: share of the surface without cells.
     """
 
     uncovered: float
@@ -55,6 +55,7 @@ class Foreseen:
     types: int
     area: float
     perimeter: float
+    bare: float
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,8 @@ class Outlook:
     the boundary as they reach, on the average over all directions (perimeter/2π); along a loop that is a line
     of the pattern, half a row. special: cells with another number of sides; trimmed: those cut at the
     boundary; folded: pieces of those that features cut, of that many kinds; rest: area of all these, which
-    their panels are taken to cover. distortion: of the placement.
+    their panels are taken to cover. surface: its area, 0 where cells are trimmed to
+    reach its edges. distortion: of the placement.
     """
 
     lattice: Lattice
@@ -78,6 +80,7 @@ class Outlook:
     folded: int = 0
     kinds: int = 0
     rest: float = 0.0
+    surface: float = 0.0
     distortion: float = 0.0
 
     @property
@@ -107,7 +110,7 @@ class Outlook:
             area += unit * float(count @ length**2)
             perimeter += sides * float(count @ length)
         if not panels:
-            return Foreseen(1.0, 0, 0, 0.0, 0.0)
+            return Foreseen(1.0, 0, 0, 0.0, 0.0, 1.0)
         # a piece of a cell is as compact as the cell, more or less
         largest = self.lattice.sides
         around = float(np.sqrt(others * self.rest / _area(self.lattice.centred[largest]))) * largest
@@ -117,6 +120,7 @@ class Outlook:
             types + self.special + self.trimmed + self.kinds,
             area + self.rest,
             perimeter + around,
+            max(self.surface - cells - self.rest, 0.0) / max(self.surface, TINY),
         )
 
 
@@ -169,7 +173,7 @@ def _outlook(cmap: ConformalMap, placing: PlacementFamily, settings: PatternSett
         regular = cKDTree(surface.vertices[cmap.cones.vertex]).query(middle)[0] > reach
     whole = regular.copy()
     for i, loop in enumerate(surface.loops):
-        least: Floats = ROW.get(lattice.kind, HALVED) * size if i in placing.loops else reach
+        least: Floats = HALF_ROW.get(lattice.kind, HALVED) * size if i in placing.loops else reach
         whole &= _distance(middle, surface.vertices[np.append(loop, loop[0])]) > least
     bent = np.zeros(len(face), dtype=bool)
     for i in placing.features:
@@ -185,7 +189,8 @@ def _outlook(cmap: ConformalMap, placing: PlacementFamily, settings: PatternSett
     folded, kinds = 2 * int(bent.sum()), 2 * len(_levels(size[bent])[0]) if bent.any() else 0
     size, shorter, sides = size[whole], shorter[whole], sides[whole]
     limit = size * (1 - shorter)
-    return Outlook(lattice, sides, size, limit, alone, cut, folded, kinds, rest, placement.distortion)
+    wall = 0.0 if settings.boundary == "trim" else float(area.sum())
+    return Outlook(lattice, sides, size, limit, alone, cut, folded, kinds, rest, wall, placement.distortion)
 
 
 def shortened(outline: Complexes, gradient: Complexes, skew: Complexes) -> Floats:

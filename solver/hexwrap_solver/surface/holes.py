@@ -14,7 +14,7 @@ import shapely
 from scipy.sparse import coo_array, csr_array, diags_array
 from scipy.sparse.linalg import splu
 
-from hexwrap_solver.arrays import Complexes, Floats, Ints
+from hexwrap_solver.arrays import Complexes, Floats, Ints, Ragged
 from hexwrap_solver.geometry import dot, face_areas
 from hexwrap_solver.surface.brep.plane import triangulated
 from hexwrap_solver.surface.topology import half_edges, vertex_normals
@@ -36,23 +36,16 @@ def fill_openings(surface: Surface) -> Surface:
     if not surface.openings:
         return surface
     kept = len(surface.loops) - surface.openings
-    n = old = len(surface.vertices)
-    places, triangles, names, start = [], [], [], 0
-    around = np.zeros(n, dtype=bool)
-    around[np.concatenate(surface.loops[kept:])] = True
-    edges = np.stack(half_edges(surface.faces), axis=1)
-    taken = np.sort(edges[around[edges].all(axis=1)], axis=1) @ [n, 1]
-    for loop in surface.loops[kept:]:
-        outline = loop[::-1]  # a loop runs with the surface on its left, and so clockwise around its hole
-        z, fill = _fill(surface.vertices[outline])
-        if np.isin(_across(outline, fill) @ [old, 1], taken).any():  # an edge would have four sides
-            z, fill = _fan(surface.vertices[outline])
-        places.append(z)
-        triangles.append(start + fill)
-        names.append(np.concatenate([outline, n + np.arange(len(z) - len(loop))]))
-        n, start = n + len(z) - len(loop), start + len(z)
-    fills, name = np.concatenate(triangles), np.concatenate(names)
-    inner = _spanned(np.concatenate(places), fills, name, surface.vertices)
+    old = len(surface.vertices)
+    # a loop runs with the surface on its left, and so clockwise around its hole
+    outlines = Ragged(
+        np.concatenate([loop[::-1] for loop in surface.loops[kept:]]),
+        np.cumsum([0, *map(len, surface.loops[kept:])]),
+    )
+    z, fills = _filled(surface, outlines)
+    n = old + len(z) - len(outlines.values)
+    name = np.concatenate([outlines.values, np.arange(old, n)])
+    inner = _spanned(z, fills, name, surface.vertices)
     filled = np.concatenate([surface.faces, name[fills]])
     vertices = _faired(np.concatenate([surface.vertices, inner]), filled, old, len(surface.faces))
     return replace(
@@ -69,69 +62,112 @@ def fill_openings(surface: Surface) -> Surface:
     )
 
 
-def _fill(outline: Floats) -> tuple[Complexes, Ints]:
-    """(k + p,) the outline (k, 3) and points inside it in a plane, and (t, 3) triangles."""
-    z = _flattened(outline)
-    found = _triangulated(z) if shapely.Polygon(np.stack([z.real, z.imag], axis=1)).is_valid else None
-    if found is None:  # it does not lie flat: any disk will do, since the fill is bent anyway
-        found = _triangulated(_rounded(outline))
+def _filled(surface: Surface, outlines: Ragged) -> tuple[Complexes, Ints]:
+    """(k + p,) the vertices of the outlines and points inside them, and (t, 3) triangles. Every outline lies
+    in a plane of its own."""
+    points, k = surface.vertices[outlines.values], len(outlines.values)
+    flat, round_ = _flattened(points, outlines), _rounded(points, outlines)
+    unfit = ~shapely.is_valid(_polygons(flat, outlines))  # any disk will do, since the fill is bent anyway
+    found = _triangulated(np.where(unfit[outlines.row], round_, flat), outlines)
+    if found is None:
+        unfit |= [
+            _triangulated(flat[outlines.row == i], _only(outlines, i)) is None for i in range(len(unfit))
+        ]
+        found = _triangulated(np.where(unfit[outlines.row], round_, flat), outlines)
         assert found is not None, "a circle does not touch itself"
-    return found
+    z, fills, owner = found
+    spoilt = np.zeros(outlines.n_rows, dtype=bool)
+    spoilt[owner[fills[_repeats(surface, outlines, fills)]]] = True
+    if not spoilt.any():
+        return z, fills
+    keep = ~spoilt[owner] | (np.arange(len(z)) < k)  # no point inside but the centre
+    rim = np.flatnonzero(spoilt[outlines.row])
+    centre = int(keep.sum()) + np.cumsum(spoilt)[outlines.row[rim]] - 1
+    around = np.stack([rim, outlines.next()[rim], centre], axis=1)
+    z[rim] = round_[rim]
+    fills = (np.cumsum(keep) - 1)[fills[~spoilt[owner[fills[:, 0]]]]]
+    return np.append(z[keep], np.zeros(int(spoilt.sum()))), np.concatenate([fills, around])
 
 
-def _across(outline: Ints, fill: Ints) -> Ints:
-    """(m, 2) ends, the lower first, of edges across the hole. outline: (k,) vertices; fill: (t, 3) triangles,
-    of which corners below k are these."""
-    k = len(outline)
-    sides = np.stack(half_edges(fill), axis=1)
-    apart = (sides[:, 1] - sides[:, 0]) % k
-    across = (sides < k).all(axis=1) & (apart != 1) & (apart != k - 1)
-    return np.sort(outline[sides[across]], axis=1)
+def _repeats(surface: Surface, outlines: Ragged, fills: Ints) -> Ints:
+    """(r,) the triangles with an edge across the hole that is one of the surface already: a second such edge
+    would have four sides."""
+    n, k = len(surface.vertices), len(outlines.values)
+    around = np.zeros(n, dtype=bool)
+    around[outlines.values] = True
+    edges = np.stack(half_edges(surface.faces), axis=1)
+    taken = np.sort(edges[around[edges].all(axis=1)], axis=1) @ [n, 1]
+    rim = np.sort(np.stack([outlines.values, outlines.values[outlines.next()]], axis=1), axis=1) @ [n, 1]
+    sides = np.stack(half_edges(fills), axis=1)
+    across = np.flatnonzero((sides < k).all(axis=1))
+    edge = np.sort(outlines.values[sides[across]], axis=1) @ [n, 1]
+    return np.asarray(across[np.isin(edge, np.setdiff1d(taken, rim))] // 3)
 
 
-def _fan(outline: Floats) -> tuple[Complexes, Ints]:
-    """(k + 1,) the outline (k, 3) on a circle, and its centre, and (k, 3) triangles around that."""
-    k = len(outline)
-    around = np.arange(k)
-    return np.append(_rounded(outline), 0), np.stack([around, (around + 1) % k, np.full(k, k)], axis=1)
+def _only(outlines: Ragged, i: int) -> Ragged:
+    return Ragged(outlines[i], np.array([0, len(outlines[i])]))
 
 
-def _flattened(outline: Floats) -> Complexes:
-    """(k,) the outline in its best plane, counter-clockwise."""
-    centred = outline - outline.mean(axis=0)
-    area = np.cross(centred, np.roll(centred, -1, axis=0)).sum(axis=0)  # twice the vector area
-    normal = area / max(float(np.linalg.norm(area)), TINY)
-    x = np.linalg.svd(centred - np.outer(centred @ normal, normal), full_matrices=False)[2][0]
-    return np.asarray(centred @ x + 1j * (centred @ np.cross(normal, x)))
+def _polygons(z: Complexes, outlines: Ragged) -> np.ndarray:
+    return np.asarray(
+        shapely.polygons(shapely.linearrings(np.stack([z.real, z.imag], axis=1), indices=outlines.row))
+    )
 
 
-def _rounded(outline: Floats) -> Complexes:
-    """(k,) the outline on a circle, by length."""
-    length = np.linalg.norm(np.roll(outline, -1, axis=0) - outline, axis=1)
-    total = float(length.sum())
-    along = (np.cumsum(length) - length) / total
-    return np.asarray(total / (2 * np.pi) * np.exp(2j * np.pi * along))
+def _sums(values: Floats, outlines: Ragged) -> Floats:
+    """(b, …) sums over every outline."""
+    return np.asarray(np.add.reduceat(values, outlines.offsets[:-1], axis=0))
 
 
-def _triangulated(z: Complexes) -> tuple[Complexes, Ints] | None:
-    """A counter-clockwise polygon (k,) with points inside, about as far from each other as its vertices, and
-    (t, 3) triangles. None where the polygon all but touches itself."""
-    k = len(z)
-    polygon = shapely.Polygon(np.stack([z.real, z.imag], axis=1))
-    step = float(np.abs(np.roll(z, -1) - z).mean())
-    step = max(step, float(np.sqrt(polygon.area / (0.87 * MOST_PER_VERTEX * k))))
-    low, high = z.real.min() + 1j * z.imag.min(), z.real.max() + 1j * z.imag.max()
-    rows = np.arange(int((high - low).imag / (step * np.sqrt(0.75))) + 2)
-    columns = np.arange(-1, int((high - low).real / step) + 2)
-    j, i = (a.ravel() for a in np.meshgrid(rows, columns, indexing="ij"))
-    lattice = low + step * (i + 0.5 * (j % 2) + 0.25 + 1j * np.sqrt(0.75) * (j + 0.25))
-    away = polygon.buffer(-CLEARANCE * step)
+def _flattened(points: Floats, outlines: Ragged) -> Complexes:
+    """(k,) the points (k, 3) of outlines, each in its best plane, counter-clockwise."""
+    row = outlines.row
+    centred = points - (_sums(points, outlines) / outlines.lengths[:, None])[row]
+    area = _sums(np.cross(centred, centred[outlines.next()]), outlines)  # twice the vector area
+    normal = area / np.maximum(np.linalg.norm(area, axis=1), TINY)[:, None]
+    planar = centred - dot(centred, normal[row])[:, None] * normal[row]
+    x = np.linalg.eigh(_sums(planar[:, :, None] * planar[:, None, :], outlines))[1][:, :, 2]
+    return np.asarray(dot(centred, x[row]) + 1j * dot(centred, np.cross(normal, x)[row]))
+
+
+def _rounded(points: Floats, outlines: Ragged) -> Complexes:
+    """(k,) the points (k, 3) of outlines, each on a circle, by length."""
+    length = np.linalg.norm(points[outlines.next()] - points, axis=1)
+    total = _sums(length, outlines)
+    before = np.cumsum(length) - length
+    along = (before - before[outlines.offsets[:-1]][outlines.row]) / total[outlines.row]
+    return np.asarray(total[outlines.row] / (2 * np.pi) * np.exp(2j * np.pi * along))
+
+
+def _triangulated(z: Complexes, outlines: Ragged) -> tuple[Complexes, Ints, Ints] | None:
+    """Counter-clockwise outlines (k,) with points inside, about as far from each other as its vertices;
+    (t, 3) triangles; and the outline of each point. All in one triangulation, outlines far apart, the unit
+    of each its points' distance. None where one all but touches itself."""
+    row, following = outlines.row, outlines.next()
+    step = _sums(np.abs(z[following] - z), outlines) / outlines.lengths
+    area = np.abs(_sums((z.conj() * z[following]).imag, outlines)) / 2
+    z = z / np.maximum(step, np.sqrt(area / (0.87 * MOST_PER_VERTEX * outlines.lengths)))[row]
+    polygons = _polygons(z, outlines)
+    bounds = shapely.bounds(polygons)
+    across = int(np.ceil(np.sqrt(len(polygons))))
+    each = np.arange(len(polygons))
+    corner = 2 * float((bounds[:, 2:] - bounds[:, :2]).max()) * (each % across + 1j * (each // across))
+    z = z + (corner - bounds[:, 0] - 1j * bounds[:, 1])[row]
+    polygons = _polygons(z, outlines)
+
+    columns, rows = ((bounds[:, 2:] - bounds[:, :2]) / [1, np.sqrt(0.75)] + [3, 2]).astype(int).T
+    owner = np.repeat(each, rows * columns)
+    j, i = np.divmod(
+        np.arange(len(owner)) - (np.cumsum(rows * columns) - rows * columns)[owner], columns[owner]
+    )
+    lattice = corner[owner] + i - 0.75 + 0.5 * (j % 2) + 1j * np.sqrt(0.75) * (j + 0.25)
+    away = shapely.buffer(polygons, -CLEARANCE)
     shapely.prepare(away)
-    inner = lattice[shapely.contains_xy(away, lattice.real, lattice.imag)]
-    both = np.concatenate([z, inner])
-    around = np.stack([np.arange(k), (np.arange(k) + 1) % k], axis=1)
-    triangles = triangulated(np.stack([both.real, both.imag], axis=1), around, polygon)
-    return None if triangles is None else (both, triangles)
+    inside = shapely.contains_xy(away[owner], lattice.real, lattice.imag)
+    both = np.append(z, lattice[inside])
+    edges = np.stack([np.arange(len(z)), following], axis=1)
+    fills = triangulated(np.stack([both.real, both.imag], axis=1), edges, shapely.multipolygons(polygons))
+    return None if fills is None else (both, fills, np.append(row, owner[inside]))
 
 
 def _cotangents(points: Floats, faces: Ints) -> csr_array:

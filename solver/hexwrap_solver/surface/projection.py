@@ -18,6 +18,8 @@ CHORD_STEPS = 1
 CONVERGED = 1e-13
 #: … and steps below this part end it where the start was good.
 SETTLED = 1e-9
+#: Rounding of distances, in parts of the coordinates.
+NOISE = 1e-15
 #: A step that does not bring the point nearer is halved at most this many times.
 HALVINGS = 12
 
@@ -111,7 +113,8 @@ def _take(jet: Jet, rows: Ints) -> Jet:
 def newton_step(nurbs: NurbsSurface, jet: Jet, points: Floats, uv: Floats) -> Floats:
     """(k, 2): Newton's step for half the squared distance; Gauss–Newton's where the Hessian is not positive.
 
-    A parameter at an open end that would leave the domain is kept there.
+    At open ends it goes to the least of the quadratic model within the domain. Clipped by itself, the step
+    would leave a point that stands a rounding error before an end where it is, short of the nearest one.
     """
     r = jet.point - points
     gu, gv = dot(r, jet.du), dot(r, jet.dv)
@@ -120,21 +123,28 @@ def newton_step(nurbs: NurbsSurface, jet: Jet, points: Floats, uv: Floats) -> Fl
     convex = (a > 0) & (a * c - b * b > RELATIVE * e * g)
     a, b, c = np.where(convex, a, e), np.where(convex, b, f), np.where(convex, c, g)
     a, c = a + 1e-12 * e.max(initial=0), c + 1e-12 * g.max(initial=0)  # singular points stay where they are
-    stuck_u, stuck_v = _stuck(nurbs, uv, gu, 0), _stuck(nurbs, uv, gv, 1)
     determinant = a * c - b * b
-    with np.errstate(divide="ignore", invalid="ignore"):
-        du = np.where(stuck_v, -gu / a, (b * gv - c * gu) / determinant)
-        dv = np.where(stuck_u, -gv / c, (b * gu - a * gv) / determinant)
-    step = np.stack([np.where(stuck_u, 0.0, du), np.where(stuck_v, 0.0, dv)], axis=1)
-    return np.where(np.isfinite(step), step, 0.0)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        u, v = (b * gv - c * gu) / determinant, (b * gu - a * gv) / determinant
+        # The least lies on an end that the step crosses: once along each direction, in case it crosses two.
+        v_first, u_first = _inside(nurbs, uv, v, 1), _inside(nurbs, uv, u, 0)
+        u_then = np.where(v_first == v, u_first, _inside(nurbs, uv, -(gu + b * v_first) / a, 0))
+        v_then = np.where(u_first == u, v_first, _inside(nurbs, uv, -(gv + b * u_first) / c, 1))
+
+        def model(u: Floats, v: Floats) -> Floats:
+            return np.asarray(gu * u + gv * v + a * u * u / 2 + b * u * v + c * v * v / 2)
+
+        better = model(u_then, v_first) <= model(u_first, v_then)
+    step = np.stack([np.where(better, u_then, u_first), np.where(better, v_first, v_then)], axis=1)
+    return np.where(np.isfinite(step) & np.isfinite(u + v)[:, None], step, 0.0)
 
 
-def _stuck(nurbs: NurbsSurface, uv: Floats, gradient: Floats, direction: int) -> Bools:
+def _inside(nurbs: NurbsSurface, uv: Floats, step: Floats, direction: int) -> Floats:
+    """(k,) steps of one parameter, cut at the ends of the domain where that is open."""
     if nurbs.closed[direction]:
-        return np.zeros(len(uv), dtype=bool)
+        return step
     low, high = domain(nurbs, direction)
-    x = uv[:, direction]
-    return np.asarray(((x <= low) & (gradient > 0)) | ((x >= high) & (gradient < 0)))
+    return np.clip(step, low - uv[:, direction], high - uv[:, direction])
 
 
 def _search(
@@ -143,7 +153,8 @@ def _search(
     """Parameters after the step, halved until the distance does not grow, and which ones really moved."""
     width = np.array([high - low for low, high in (domain(nurbs, d) for d in (0, 1))])
     step = step / np.maximum(1.0, np.abs(step / width).max(axis=1, keepdims=True) * 4)
-    before = np.linalg.norm(at - points, axis=1)
+    # Distances near the least differ by less than they are rounded: there every step is taken.
+    before = np.linalg.norm(at - points, axis=1) + NOISE * np.abs(points).max(initial=0.0)
     out, waiting = uv.copy(), np.arange(len(uv))
     for _ in range(HALVINGS):
         trial = wrap(nurbs, uv[waiting] + step[waiting])

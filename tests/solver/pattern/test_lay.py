@@ -12,6 +12,7 @@ from scipy.spatial import KDTree
 
 from hexwrap_solver.arrays import Ragged
 from hexwrap_solver.errors import NotAdaptedError, PatternError
+from hexwrap_solver.panels.polygons import fan_areas
 from hexwrap_solver.pattern import lay_pattern
 from hexwrap_solver.pattern.lattice import LATTICES
 from hexwrap_solver.pattern.lay_pattern import mean_edge
@@ -201,6 +202,18 @@ def test_the_default_size_of_a_cone_counts_its_cells_whatever_its_narrow_end():
     assert 1000 < pattern.n_cells < 3300
     assert "narrow end" in " ".join(pattern.notes)
     check_closed(pattern)
+
+
+@pytest.mark.parametrize("kind", ["hex", "triangle", "quad"])
+@pytest.mark.parametrize("inner", [1.0, 5.0, 7.0])
+def test_whole_cells_of_the_default_size_leave_a_tenth_bare_at_most(kind, inner):
+    cmap = annuli.flat_cone(2 * np.pi, inner, 10.0, 90, 20)
+    pattern = lay_pattern(cmap, PatternSettings(kind=kind, align="none"))
+    bare = 1 - fan_areas(pattern.cells).sum() / cmap.surface.areas.sum()
+    assert bare < 0.125  # the tenth is a forecast
+    assert pattern.n_cells < 3300
+    trimmed = lay_pattern(cmap, PatternSettings(kind=kind, align="none", boundary="trim"))
+    assert trimmed.edge_length > 0.95 * pattern.edge_length
 
 
 @pytest.mark.parametrize("kind", ["hex", "triangle", "quad"])

@@ -114,6 +114,24 @@ def test_projection_stops_at_the_open_ends() -> None:
     np.testing.assert_allclose(parameters[:, 1], [5, 0])
 
 
+@pytest.mark.parametrize("before", [0.0, 1e-16, 1e-9, 1e-3])
+def test_beyond_an_open_end_the_nearest_point_is_that_of_the_end_curve(before: float) -> None:
+    """From a start a rounding error before the end, too, where it used to stay, 4e-5 of the size off."""
+    surface = sample("tower")
+    low, high = domain(surface, 1)
+    rng = np.random.default_rng(5)
+    at = np.stack([rng.uniform(*domain(surface, 0), 200), np.full(200, high)], axis=1)
+    jet = evaluate(surface, at)
+    size = np.ptp(jet.point, axis=0).max()
+    beyond = jet.point + 1e-3 * size * (jet.normal + jet.dv / np.linalg.norm(jet.dv, axis=1, keepdims=True))
+    start = at + rng.uniform(-0.02, 0.02, (200, 1)) * [1, 0] - [0, before * (high - low)]
+    points, parameters, _ = project(surface, beyond, start)
+    np.testing.assert_array_equal(parameters[:, 1], high)
+    foot = evaluate(surface, parameters)
+    along = np.einsum("ij,ij->i", beyond - points, foot.du / np.linalg.norm(foot.du, axis=1, keepdims=True))
+    assert np.abs(along).max() < 1e-13 * size
+
+
 def test_points_in_triangles_find_their_parameters_across_the_seam() -> None:
     surface = surface_from_nurbs(sample("tower"))
     count = len(surface.faces)

@@ -39,14 +39,22 @@ import numpy as np
 from hexwrap_solver.arrays import Complexes, Floats, Ints
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.pattern.lattice import Isometry, Lattice
-from hexwrap_solver.pattern.place.deform import System, deform, distortion_of
+from hexwrap_solver.pattern.place.deform import System, deform
 from hexwrap_solver.pattern.place.features import Chain, FeatureLines, lines_from
 from hexwrap_solver.pattern.place.glued import Glued
 from hexwrap_solver.pattern.place.meeting import meeting
 from hexwrap_solver.pattern.place.placement import Placement, edge_angle
 from hexwrap_solver.pattern.place.rows import rows_along
+from hexwrap_solver.pattern.place.sheet import translations
 from hexwrap_solver.pattern.place.sides import Lines, Sides, lines_of, sides_of
-from hexwrap_solver.pattern.place.size import edges_around, size_spread, wanted_edge, width_per_cell
+from hexwrap_solver.pattern.place.size import (
+    cells_around,
+    counts_near,
+    edges_around,
+    size_spread,
+    wanted_edge,
+    width_per_cell,
+)
 from hexwrap_solver.pattern.place.strain import Strain
 from hexwrap_solver.pattern.types import PatternSettings
 from hexwrap_solver.tolerances import RELATIVE
@@ -177,8 +185,8 @@ def place_by_sides(
     for trial in _best_of(trials, strain)[:most]:
         rest = trial.scale * (cmap.uv - (cmap.deck.apex or 0)) + trial.origin
         glued = Glued.by_sheets(cmap, trial.motion)
-        place = deform(system, glued, trial.scale, rest, lines.depths(trial.depth, trial.motion))
-        tried.append((distortion_of(cmap, glued, place), trial, place))
+        place, distortion = deform(system, glued, trial.scale, rest, lines.depths(trial.depth, trial.motion))
+        tried.append((distortion, trial, place))
         if tried[-1][0] < ENOUGH:
             break
     distortion, best, place = min(tried, key=lambda found: found[0] + found[1].extra)
@@ -201,10 +209,8 @@ def predicted(
 
 
 def _cells_around(frame: _Frame, trial: _Trial, angle: float) -> int:
-    if frame.cone_index == 0 and any(trial.motion.shift):
-        return int(frame.lattice.cells_around(np.array(trial.motion.shift)))
     width = width_per_cell(frame.lattice, angle) * frame.lattice.edge
-    return round(frame.cmap.circumference * abs(trial.scale) / width)
+    return cells_around(frame.cmap, trial.motion, abs(trial.scale), width)
 
 
 def _trials(
@@ -213,9 +219,10 @@ def _trials(
     frame, strain = replace(straightening.frame, around=settings.around), straightening.strain
     cmap, lattice = frame.cmap, frame.lattice
     angle = edge_angle(lattice, settings)
+    edge = wanted_edge(cmap, lattice, settings, angle)
     if cmap.deck.apex is None:
-        edges_around(cmap, lattice, settings, angle)
-    size = lattice.edge / wanted_edge(cmap, lattice, settings, angle)
+        edges_around(cmap, settings, edge)
+    size = lattice.edge / edge
     spread = size_spread(settings) if spread is None else spread
     if spread > size_spread(settings):
         frame = replace(frame, around=None)
@@ -235,9 +242,7 @@ def _sizes(frame: _Frame, size: float, spread: float) -> Floats:
         return np.linspace(-1, 1, SCALES_OF_FEATURES)
     row = frame.lattice.shortest_towards(frame.unit * frame.cmap.deck.translation)
     cells = size * abs(frame.cmap.deck.translation) / abs(complex(frame.lattice.position(row)))
-    near = np.arange(np.ceil(cells * (1 - spread)), cells * (1 + spread) + RELATIVE)
-    near = np.unique(np.append(near, max(1.0, round(cells))))
-    near = near[np.argsort(abs(near - cells), kind="stable")][:SCALES_OF_FEATURES]
+    near = counts_near(cells, spread, SCALES_OF_FEATURES)
     return np.asarray((near / cells - 1) / max(spread, RELATIVE))
 
 
@@ -397,15 +402,10 @@ def _translation(frame: _Frame, wanted: complex) -> Ints:
 
     A loop that is one closed line runs along it exactly. On a cylinder it has the number of cells asked for.
     """
-    lattice = frame.lattice
     if wanted == 0:  # a disk
         return np.zeros(2, dtype=np.int64)
-    if frame.sides.closed.any():
-        row = lattice.shortest_towards(wanted)
-        return np.asarray(max(1, round(abs(wanted) / abs(complex(lattice.position(row))))) * row)
-    if frame.cone_index == 0 and frame.around is not None:
-        return lattice.ring_near(frame.around, wanted)
-    return lattice.translation_near(wanted)
+    rows, around = bool(frame.sides.closed.any()), frame.around if frame.cone_index == 0 else None
+    return np.asarray(translations(frame.lattice, wanted, rows=rows, around=around)[0])
 
 
 @lru_cache(maxsize=64)  # asked for at every size that is tried

@@ -17,7 +17,6 @@ from hexwrap_solver.pattern.place.align import (
     predicted,
     turn_between_loops,
 )
-from hexwrap_solver.pattern.place.cone import place_on_cone, place_on_flat_ring
 from hexwrap_solver.pattern.place.cylinder import place_on_cylinder
 from hexwrap_solver.pattern.place.features import (
     LEAST_CELLS,
@@ -29,7 +28,7 @@ from hexwrap_solver.pattern.place.features import (
     narrow,
     worth_following,
 )
-from hexwrap_solver.pattern.place.net import as_sheet, place_on_net
+from hexwrap_solver.pattern.place.net import place_on_net
 from hexwrap_solver.pattern.place.placement import (
     BEARABLE,
     Placement,
@@ -41,6 +40,7 @@ from hexwrap_solver.pattern.place.placement import (
     is_straight,
     quantized,
 )
+from hexwrap_solver.pattern.place.sheet import as_sheet, place_on_sheet
 from hexwrap_solver.pattern.place.sides import has_corners, is_polygon
 from hexwrap_solver.pattern.place.size import FREE, mean_stretch, size_spread, wanted_edge
 from hexwrap_solver.pattern.types import PatternSettings
@@ -340,11 +340,7 @@ class PlacementFamily:
         """Aligned nowhere."""
         if self.is_cylinder:
             return place_on_cylinder(self.cmap, self.lattice, settings, [])
-        if is_disk(self.cmap):
-            return place_on_net(self.cmap, self.lattice, settings)
-        if self.cmap.deck.is_translation:
-            return place_on_flat_ring(self.cmap, self.lattice, settings, self.cone_index)
-        return place_on_cone(self.cmap, self.lattice, settings, self.cone_index)
+        return place_on_sheet(self.cmap, self.lattice, settings, self.cone_index)
 
     def _by_sides(self, settings: PatternSettings) -> Placement:
         """Aligned on as many of the loops as bearable deformations allow."""

@@ -35,8 +35,10 @@ EVEN = 1.1
 REST = 1e-9
 
 
-def deform(system: System, glued: Glued, scale: complex, rest: Complexes, depth: Floats) -> Complexes:
-    """(n,) vertices in lattice units, on the lines of the system.
+def deform(
+    system: System, glued: Glued, scale: complex, rest: Complexes, depth: Floats
+) -> tuple[Complexes, float]:
+    """(n,) vertices in lattice units, on the lines of the system, and what ``distortion_of`` says of them.
 
     glued: with the rotations of the system's. rest: (n,) where the vertices would stand undeformed, with
     scale = ∂W/∂z. depth: (n, 2) of the lines.
@@ -61,7 +63,7 @@ def deform(system: System, glued: Glued, scale: complex, rest: Complexes, depth:
         # Half-way in the logarithm: full steps of reweighting oscillate for powers above three.
         weight = np.sqrt(weight * even * (bent**2 / max((bent**2).mean(), TINY) + FLOOR))
         weight /= weight.mean()
-    return best
+    return best, least
 
 
 def distortion_of(cmap: ConformalMap, glued: Glued, place: Complexes) -> float:

@@ -21,10 +21,9 @@ import numpy as np
 
 from hexwrap_solver.arrays import Complexes, Ints
 from hexwrap_solver.conformal.net import Net
-from hexwrap_solver.conformal.types import ConformalMap, Deck, Unrolled
+from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.errors import PatternError
 from hexwrap_solver.pattern.lattice import Lattice
-from hexwrap_solver.pattern.place.cone import boundary_direction
 from hexwrap_solver.pattern.place.deform import System, deform, distortion_of
 from hexwrap_solver.pattern.place.glued import Glued, around_vertices
 from hexwrap_solver.pattern.place.joint import Joint
@@ -38,7 +37,8 @@ from hexwrap_solver.pattern.place.placement import (
     edge_angle,
 )
 from hexwrap_solver.pattern.place.polygons import Alignment, Polygons
-from hexwrap_solver.pattern.place.size import girth, size_spread, wanted_edge, width_per_cell
+from hexwrap_solver.pattern.place.size import cells_around, size_spread
+from hexwrap_solver.pattern.place.target import Target
 from hexwrap_solver.pattern.types import PatternSettings
 
 #: Sizes and directions tried, from one end of what is admissible to the other.
@@ -88,19 +88,10 @@ def _placed(
     net, faces = cmap.net, cmap.surface.faces
     fitted = _on_fitted(cmap, lattice)
     motions = holonomy_of(cmap, lattice, net)
-    angle = edge_angle(lattice, settings)
-    scale = lattice.edge / wanted_edge(cmap, lattice, settings, angle)
-    along = boundary_direction(cmap, lattice, anchor_vertex(cmap))
-    factor = complex(scale * np.exp(-1j * angle) * lattice.forward / along)
-    factor *= scale / abs(factor)
+    target = Target.of(cmap, lattice, settings)
+    factor, phase = target.factor, target.phase(settings, lattice.edge)
     if alignment is not None:
-        factor = scale * alignment.unit / abs(alignment.unit)
-    phase = _phase(lattice, settings, angle)
-    rows = np.zeros((len(net.angle), 4), dtype=np.int64)
-    if alignment is None and not len(motions.words) and not np.any(net.crossing):
-        own = _home(cmap)
-        place = factor * (own - own[anchor_vertex(cmap)]) + phase
-        return _placement(cmap, lattice, rows, place, factor, angle, 0.0)
+        factor = abs(factor) * alignment.unit / abs(alignment.unit)
     tried, system = [], None
     if fitted is None:
         choices = _choices(cmap, lattice, settings, motions, factor, phase, alignment)
@@ -117,8 +108,7 @@ def _placed(
         pin_cones(cmap, lattice, rows, corner, normal, depth)
         if misfit > EXACT:
             system = system or System(cmap, glued, normal)  # rotations and lines are the same for all
-            place = deform(system, glued, A, place, depth)
-            distortion = distortion_of(cmap, glued, place)
+            place, distortion = deform(system, glued, A, place, depth)
         else:
             pinned = normal.any(axis=1)
             place[pinned] = depth[pinned, 0] + 1j * depth[pinned, 1]
@@ -127,50 +117,8 @@ def _placed(
         if distortion < FINE:
             break
     distortion, glued, rows, place, A = min(tried, key=lambda one: one[0])
-    found = _placement(cmap, lattice, rows, place, A, angle, distortion)
-    return replace(found, glued=glued)
-
-
-def as_sheet(cmap: ConformalMap) -> ConformalMap:
-    """A net that is glued nowhere (a disk) as the sheet that it is: g is the identity. Others as they are."""
-    if np.any(cmap.net.crossing):
-        return cmap
-    sheet = np.zeros(cmap.surface.faces.shape, dtype=np.int64)
-    return replace(cmap, domain=Unrolled(_home(cmap), sheet, Deck(0.0, 0j), girth(cmap)))
-
-
-def _home(cmap: ConformalMap) -> Complexes:
-    """(n,) places of the vertices, where nothing is glued by more than the identity."""
-    place = np.zeros(len(cmap.surface.vertices), dtype=complex)
-    place[cmap.surface.faces.ravel()] = cmap.corners().ravel()
-    return place
-
-
-def _placement(
-    cmap: ConformalMap,
-    lattice: Lattice,
-    rows: Ints,
-    place: Complexes,
-    scale: complex,
-    angle: float,
-    distortion: float,
-) -> Placement:
-    around = round(girth(cmap) * abs(scale) / (width_per_cell(lattice, angle) * lattice.edge))
-    none = np.zeros((*cmap.surface.faces.shape, 4), dtype=np.int64)
-    return Placement(
-        place=place,
-        glued=Glued(lattice, none),
-        isometries=rows,
-        rotation=angle,
-        around=max(around, 1),
-        distortion=distortion,
-        notes=(),
-    )
-
-
-def _phase(lattice: Lattice, settings: PatternSettings, angle: float) -> complex:
-    width = width_per_cell(lattice, angle) * lattice.edge
-    return lattice.without_translations(complex(width * settings.phase[0], lattice.edge * settings.phase[1]))
+    around = cells_around(cmap, None, abs(A), target.width)
+    return Placement(place, glued, rows, target.angle, around, distortion, notes=())
 
 
 def _on_fitted(

@@ -72,7 +72,7 @@ class Placement:
     @property
     def narrows(self) -> bool:
         """Whether fewer cells go around some places than others."""
-        return self.motion is None or self.motion.cone_index != 0
+        return self.motion is None or self.motion.cone_index != 0 or not any(self.motion.shift)
 
 
 def cost_of(distortion: float, limit: float | None = None) -> str:

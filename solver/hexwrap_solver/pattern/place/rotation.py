@@ -10,9 +10,9 @@ from hexwrap_solver.arrays import Complexes
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.errors import PatternError
 from hexwrap_solver.pattern.lattice import Lattice
-from hexwrap_solver.pattern.place.cone import boundary_direction
-from hexwrap_solver.pattern.place.placement import anchor_vertex
+from hexwrap_solver.pattern.place.sheet import as_sheet
 from hexwrap_solver.pattern.place.size import face_areas
+from hexwrap_solver.pattern.place.target import boundary_direction
 from hexwrap_solver.pattern.types import PatternSettings
 from hexwrap_solver.surface.projection import parameter_corners
 
@@ -43,7 +43,7 @@ def with_rotation(
             field=("rotation",),
         )
     followed = np.exp(1j * np.angle(mean) / lattice.fold)
-    boundary = boundary_direction(cmap, lattice, anchor_vertex(cmap))
+    boundary = boundary_direction(as_sheet(cmap), lattice)
     angle = float(np.angle(followed / boundary))
     angle -= lattice.quantum * round(angle / lattice.quantum)
     half = lattice.quantum / 2

@@ -8,11 +8,11 @@ import numpy as np
 
 from hexwrap_solver.arrays import Floats
 from hexwrap_solver.conformal.types import ConformalMap
-from hexwrap_solver.pattern.lattice import Lattice
+from hexwrap_solver.pattern.lattice import Isometry, Lattice
 from hexwrap_solver.pattern.place.placement import is_disk, main_loops
 from hexwrap_solver.pattern.place.sense import too_many
-from hexwrap_solver.pattern.types import PatternSettings
-from hexwrap_solver.tolerances import TINY
+from hexwrap_solver.pattern.types import Kind, PatternSettings
+from hexwrap_solver.tolerances import RELATIVE, TINY
 
 #: Where neither a number nor a length is asked for: this many cells around, but fewer where that would make
 #: more cells altogether, and more where fewer rows would fit between the loops, or where fewer cells
@@ -22,6 +22,12 @@ DEFAULT_AROUND, DEFAULT_CELLS, DEFAULT_ROWS, DEFAULT_NARROWEST = 48, 3000, 3.0, 
 DEFAULT_ON_NETS = 1000
 #: Whole cells may stay away from so much of the surface at its narrow end.
 DEFAULT_OPEN = 0.01
+#: Cells are smaller where whole ones would leave more of the surface bare along its loops, openings included,
+#: but no more than ``DEFAULT_CELLS`` for that.
+DEFAULT_BARE = 0.1
+
+#: Half a row of cells, in edges, where every other cell of a row stands half a cell higher.
+HALF_ROW: dict[Kind, float] = {"hex": 3**0.5 / 4}
 
 #: No cell is more than this many edges wide.
 EDGES_PER_CELL = 4.0
@@ -63,12 +69,13 @@ def default_edge(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings
     width = width_per_cell(lattice, angle)
     edge = girth(cmap) / (DEFAULT_AROUND * width)
     of_cells = float(np.sqrt(area / (DEFAULT_CELLS * _unit_area(lattice))))
+    bare = np.inf if settings.boundary == "trim" else max(_edge_of_bare(cmap, lattice, settings), of_cells)
     if cmap.kind == "net" or is_disk(cmap):
         few = float(np.sqrt(area / (DEFAULT_ON_NETS * _unit_area(lattice))))
-        return min(few, _edge_of_rows(cmap, lattice, angle))
+        return min(few, bare, _edge_of_rows(cmap, lattice, angle))
     narrow = min(_lengths_of_loops(cmap)) if settings.boundary == "trim" else _narrow_ring(cmap)
     fitting = min(_edge_of_rows(cmap, lattice, angle), narrow / (DEFAULT_NARROWEST * width))
-    return min(max(edge, of_cells), fitting)
+    return min(max(edge, of_cells), bare, fitting)
 
 
 def girth(cmap: ConformalMap) -> float:
@@ -97,6 +104,34 @@ def _edge_of_rows(cmap: ConformalMap, lattice: Lattice, angle: float) -> float:
     return height * width_per_cell(lattice, angle) / (DEFAULT_ROWS * _unit_area(lattice))
 
 
+def _edge_of_bare(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings) -> float:
+    """Edge length in the domain at which whole cells leave ``DEFAULT_BARE`` of the surface bare: middles stay
+    as far from the loops as cells reach, and half a row from ends that are lines of the pattern."""
+    surface, strip = cmap.surface, 0.0
+    for i, loop in enumerate(surface.loops):
+        on_line = cmap.kind == "cylinder" and i < 2 and settings.align != "none"
+        reach = HALF_ROW.get(lattice.kind, 0.0) if on_line else lattice.sides / (2 * np.pi)
+        along = np.linalg.norm(surface.vertices[np.roll(loop, -1)] - surface.vertices[loop], axis=1)
+        strip += reach * float(along @ np.exp(-cmap.log_scale[loop]))
+    return DEFAULT_BARE * float(surface.areas.sum()) / strip if strip else np.inf
+
+
+def cells_around(cmap: ConformalMap, motion: Isometry | None, scale: float, width: float) -> int:
+    """Along the translation that g becomes on a cylinder, else as many of a width as fit around. scale: from
+    the domain to the lattice; width: in lattice units."""
+    if motion is not None and motion.cone_index == 0 and any(motion.shift):
+        return int(motion.lattice.cells_around(np.array(motion.shift)))
+    return max(round(girth(cmap) * scale / width), 1)
+
+
+def counts_near(count: float, spread: float, most: int) -> Floats:
+    """Whole numbers within the relative spread of a count, and the nearest one, the nearest first; at most so
+    many, none below 1."""
+    near = np.arange(np.ceil(count * (1 - spread)), count * (1 + spread) + RELATIVE)
+    near = np.unique(np.append(near, max(1.0, round(count))))
+    return np.asarray(near[np.argsort(abs(near - count), kind="stable")][:most])
+
+
 def fitting_number(cmap: ConformalMap, lattice: Lattice, angle: float) -> tuple[int, float]:
     """Cells around, and their edge length on the surface, that leave room for ``DEFAULT_ROWS`` and for
     ``DEFAULT_NARROWEST`` cells around the shorter loop."""
@@ -120,12 +155,12 @@ def _lengths_of_loops(cmap: ConformalMap) -> list[float]:
     return [float(length[np.isin(key, loop * n + np.roll(loop, -1))].sum()) for loop in main_loops(cmap)]
 
 
-def edges_around(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings, angle: float) -> float:
-    """How many edges of the wanted length the circumference is long, where g becomes a translation.
+def edges_around(cmap: ConformalMap, settings: PatternSettings, edge: float) -> float:
+    """How many edges of a length in the domain the circumference is long, where g becomes a translation.
 
     Raises PatternError where a single ring would already have too many cells, before anything counts them.
     """
-    edges = cmap.circumference / wanted_edge(cmap, lattice, settings, angle)
+    edges = cmap.circumference / edge
     if not edges <= EDGES_PER_CELL * settings.max_cells:
         raise too_many(cmap, settings, min(edges / EDGES_PER_CELL, sys.float_info.max))
     return edges
