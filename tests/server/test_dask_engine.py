@@ -344,15 +344,18 @@ def test_scheduler_that_is_down_at_start_is_told_in_a_sentence(tmp_path: Path) -
 
 
 @pytest.mark.filterwarnings("ignore")
-def test_explorations_run_there_too(tmp_path: Path, one_machine: str) -> None:
+def test_explorations_there_come_to_the_same(tmp_path: Path, one_machine: str) -> None:
     from hexwrap_server.jobs.dask_engine import DaskEngine
 
     vary = {"around": [10, 12], "sizes": [1, 5], "singularities": [0]}
-    with running(tmp_path, DaskEngine(one_machine)) as client:
-        body = {"surface": tube(), "vary": vary, "variants": 3}
-        job = finished(client, client.post("/v1/explore", json=body).json()["id"])
-        assert job["status"] == "done", job
-        result = client.get(f"/v1/jobs/{job['id']}/result").json()
-        best = result["variants"][result["best"]]
-        assert best["measured"]
-        assert client.post("/v1/jobs", json=best["request"]).json()["status"] == "done"
+    body = {"surface": tube(), "vary": vary, "variants": 3, "seed": 3}
+    found = []
+    for name, own in (("dask", DaskEngine(one_machine)), ("pool", None)):
+        with running(tmp_path / name, own) as client:
+            job = finished(client, client.post("/v1/explore", json=body).json()["id"])
+            assert job["status"] == "done", job
+            found.append(client.get(f"/v1/jobs/{job['id']}/result").json())
+            best = found[-1]["variants"][found[-1]["best"]]
+            assert best["measured"]
+            assert client.post("/v1/jobs", json=best["request"]).json()["status"] == "done"
+    assert found[0] == found[1]

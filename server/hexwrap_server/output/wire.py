@@ -197,6 +197,7 @@ def quality(solution: Solution) -> dict[str, Any]:
         "kink": summary(measured.kink, "mean", "max"),
         "overlaps": None if made is None else measured.overlaps,
         "coverage": None if made is None else measured.coverage,
+        "bare": None if made is None else measured.bare,
         "distinct_panels": 0 if measured.congruence is None else len(np.unique(measured.congruence)),
         "convex": summary(measured.convex, "mean")["mean"],
         "not_convex": 0 if measured.convex is None else int(np.sum(~measured.convex)),

@@ -34,6 +34,8 @@ export interface Figures {
   types: number;
   cost: number;
   gap_max: number | null;
+  /** Share of the surface without cells. */
+  bare: number;
 }
 
 /** What an exploration found. */

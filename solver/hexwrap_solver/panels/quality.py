@@ -55,6 +55,7 @@ def measure(
         return quality
     progress(0.1, "measuring panels")
     polygons, cell_area = panels.polygons, float(fan_areas(pattern.cells).sum())
+    bare = max(1 - cell_area / float(area.sum()), 0.0)
     edges = half_edges(pattern)
     parts, owner = parts_by_cell(panels)
     facing = _facing(pattern, edges, parts)
@@ -89,8 +90,9 @@ def measure(
         congruence=congruence_classes(polygons, angle),
         overlaps=_count_overlaps(facing, parts, mean_edges(parts.polygons)),
         coverage=float(fan_areas(parts.polygons).sum()) / cell_area,
+        bare=bare,
         movement=_movement(pattern, panels),
-        notes=quality.notes + _bare_note(pattern, cell_area / float(area.sum())),
+        notes=quality.notes + _bare_note(pattern, bare),
     )
 
 
@@ -151,11 +153,11 @@ def _count_overlaps(facing: Facing, panels: Panels, mean_edge: Floats) -> int:
 
 
 def _bare_note(pattern: Pattern, share: float) -> tuple[str, ...]:
-    """share: area of the cells / area of the surface."""
-    if share >= 1 - BARE:
+    """share: of the surface, without cells."""
+    if share <= BARE:
         return ()
     trim = "; with boundary 'trim' cells reach its edges" if pattern.whole.all() else ""
-    return (f"Cells cover {share:.0%} of the surface; coverage is relative to them{trim}.",)
+    return (f"Cells cover {1 - share:.0%} of the surface; coverage is relative to them{trim}.",)
 
 
 def _movement(pattern: Pattern, panels: Panels) -> float:

@@ -238,6 +238,7 @@ class Quality:
     surface_distance: (q,) greatest distance of a panel's corners and its centre to the input surface.
     convex: (q,). congruence: (q,) class of congruent shapes (mirror images distinguished).
     gaps_over: panels with a joint wider than was wanted, None where nothing was said of that.
+    coverage: area of the panels over that of the cells. bare: share of the surface without cells.
     movement: greatest distance a shared vertex was moved (watertight), 0 otherwise.
     singularities: what other numbers of them would leave open; None where none was looked at.
     """
@@ -257,6 +258,7 @@ class Quality:
     congruence: Ints | None = None
     overlaps: int = 0
     coverage: float = 0.0
+    bare: float = 0.0
     movement: float = 0.0
     singularities: Choices | None = None
     notes: tuple[str, ...] = ()

@@ -92,10 +92,20 @@ class _Items(list):
     Add = list.append
 
 
+_compiled = {}
+
+
+def code_of(name):
+    """A component's code, compiled once, since Jython takes long for it."""
+    if name not in _compiled:
+        with io.open(os.path.join(BUILT, name + ".py"), encoding="ascii") as file:
+            _compiled[name] = compile(file.read(), name, "exec")
+    return _compiled[name]
+
+
 class Component(object):
     def __init__(self, name):
-        with io.open(os.path.join(BUILT, name + ".py"), encoding="ascii") as file:
-            self.code = compile(file.read(), name, "exec")
+        self.code = code_of(name)
         with io.open(os.path.join(BUILT, name + ".json"), encoding="utf-8") as file:
             described = json.load(file)
         self.inputs, self.outputs = described["inputs"], described["outputs"]

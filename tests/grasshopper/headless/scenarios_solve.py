@@ -364,7 +364,7 @@ def domain_of_a_cylinder():
 
 def domain_of_a_net():
     """A pointed cup has one loop: its domain is a disk."""
-    pattern = json.dumps({"pattern": {"edge_length": 0.5}})
+    pattern = json.dumps({"pattern": {"edge_length": 1.0}})
     send = done(Mesh=world.with_lid(world.tube(), 2.0), Mode="isometric", Pattern=pattern)
     domain = collected("Domain", Job=send.Job)
     assert domain.Summary == "net with 1 loop" and domain.Cut == []
