@@ -85,9 +85,9 @@ def server(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Li
 
 
 def status_on_disk(client: Live, id: str) -> str:
-    job = client.service.store.job(id)
-    assert job is not None
-    return job.status
+    with contextlib.closing(sqlite3.connect(client.service.store.folder / "hexwrap.sqlite3")) as db:
+        status: str = db.execute("SELECT status FROM jobs WHERE id = ?", (id,)).fetchone()[0]
+        return status
 
 
 def test_job_that_ends_on_a_full_disk_fails_and_is_written_later(

@@ -110,8 +110,10 @@ async def _explore(name: str, sent: SentSurface, wanted: Exploration, report: Re
 
 def print_front(console: Console, name: str, result: dict[str, Any]) -> None:
     """The front as a table, the proposed one marked."""
-    table = Table(title=name or "front", title_justify="left", title_style="bold", box=None, pad_edge=False)
-    heads = ("no.", "boundary", "singular", "edge", "sizes", "uncovered", "panels", "types", "joint", "cost")
+    table = Table(title=name or "front", title_justify="left", title_style="bold", box=None)
+    table.padding = (0, 1, 0, 0)
+    choices = ("no.", "boundary", "sing.", "edge", "sizes")
+    heads = (*choices, "uncovered", "bare", "panels", "types", "joint", "cost")
     for head in heads:
         table.add_column(head, justify="right", no_wrap=True)
     order = sorted(result["front"], key=lambda i: result["variants"][i]["measured"]["uncovered"])
@@ -125,7 +127,8 @@ def print_front(console: Console, name: str, result: dict[str, Any]) -> None:
         gap = "" if found["gap_max"] is None else length(found["gap_max"])
         is_best = i == result["best"]
         row = [f"* {i}" if is_best else str(i), boundary, str(count), size, str(sizes)]
-        row += [f"{found['uncovered']:.2%}", str(found["panels"]), str(found["types"]), gap]
+        row += [f"{found['uncovered']:.2%}", f"{found['bare']:.0%}"]
+        row += [str(found["panels"]), str(found["types"]), gap]
         table.add_row(*row, f"{found['cost']:,.0f}", style="bold" if is_best else "")
     console.print(table)
     if result["best"] is not None:

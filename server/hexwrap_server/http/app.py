@@ -28,7 +28,7 @@ from hexwrap_server.http.answers import problem_response
 from hexwrap_server.http.compressed import Compressed
 from hexwrap_server.http.docs import DocumentedApp, add_docs
 from hexwrap_server.http.head import Head
-from hexwrap_server.http.hops.routes import hops_router
+from hexwrap_server.http.hops.routes import router as hops
 from hexwrap_server.http.observe import METHODS, Observer
 from hexwrap_server.http.routes import router
 from hexwrap_server.http.security import Doorkeeper
@@ -79,7 +79,7 @@ def create_app(settings: Settings | None = None, engine: Engine | None = None) -
     )
     app.state.service = service
     app.include_router(router)
-    app.include_router(hops_router())
+    app.include_router(hops)
     add_viewer(app)
     add_docs(app)
     app.add_exception_handler(HexwrapError, _on_error)

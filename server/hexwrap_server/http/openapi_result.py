@@ -127,6 +127,7 @@ _QUALITY = _all(
     movement=NUMBER,
     overlaps=nullable(_COUNT),
     coverage=_MEASURE,
+    bare=_MEASURE,
     distinct_panels=_COUNT,
     singularity_curve=nullable(_CURVE),
     notes=listed(_TEXT),

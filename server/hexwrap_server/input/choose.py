@@ -324,23 +324,22 @@ def several(
 ) -> SeveralObjectsError:
     """fins: how many of the parts touch larger ones without being joined to them along an edge."""
     distinct = list({id(found): found for found in objects}.values())
-    if len(distinct) < 2 and fins:
-        return SeveralObjectsError(
+    if len(distinct) > 1:
+        sentence = (
+            f"The file holds {len(distinct)} objects that could be meant: "
+            f"{listed(distinct, unit, content.objects)}. Name one with --object or --layer ('object' or "
+            "'layer' of the surface in a request), or hide the others; edges that meet within the file's "
+            f"tolerance are joined. {' '.join(gaps[:SHOWN])}"
+        ).rstrip()
+    elif fins:
+        sentence = (
             f"The mesh falls into {count} pieces of about the same size, which meet only at vertices and at "
             "edges that more than two faces share: remove inner walls and double faces (Rhino's "
-            "ExtractNonManifoldMeshEdges finds them, ExtractDuplicateMeshFaces those that are double).",
-            data={"objects": rows(content.objects)},
+            "ExtractNonManifoldMeshEdges finds them, ExtractDuplicateMeshFaces those that are double)."
         )
-    if len(distinct) < 2:
-        return SeveralObjectsError(
+    else:
+        sentence = (
             f"The mesh is in {count} pieces of about the same size that do not meet: delete those that are "
-            "not meant, or join them along their edges (in Rhino: SplitDisjointMesh shows them).",
-            data={"objects": rows(content.objects)},
+            "not meant, or join them along their edges (in Rhino: SplitDisjointMesh shows them)."
         )
-    return SeveralObjectsError(
-        f"The file holds {len(distinct)} objects that could be meant: "
-        f"{listed(distinct, unit, content.objects)}. Name one with --object or --layer ('object' or 'layer' "
-        "of the surface in a request), or hide the others; edges that meet within the file's tolerance are "
-        f"joined. {' '.join(gaps[:SHOWN])}".rstrip(),
-        data={"objects": rows(content.objects)},
-    )
+    return SeveralObjectsError(sentence, data={"objects": rows(content.objects)})

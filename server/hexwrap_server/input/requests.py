@@ -91,8 +91,8 @@ class Outcome:
     result: bytes | None
     solution: bytes | None
     size: int
-    timings: dict[str, float]
-    found: dict[str, str]
+    timings: dict[str, float] = field(default_factory=dict)
+    found: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 from typing import Any, cast
 
 from isal import igzip
@@ -13,8 +12,7 @@ from hexwrap_server.input import form
 from hexwrap_server.input.requests import CacheSettings, Exploration, Order, Outcome, Wanted
 from hexwrap_server.input.schemas import parse_request
 from hexwrap_server.jobs.cache import CachingRunner
-from hexwrap_server.jobs.disk import write_whole
-from hexwrap_server.jobs.work import sent_surface_of, solution_at, stages, take_in
+from hexwrap_server.jobs.work import outcome_of, sent_surface_of, solution_at, stages, take_in
 from hexwrap_server.jobs.worker import Report
 from hexwrap_server.output import explored
 from hexwrap_solver.errors import RequestError
@@ -102,12 +100,7 @@ def finish(report: Report, order: Order, documents: list[Json], refused: list[st
     """The result, its front and what is proposed. documents: of all variants, those that were solved with
     what was measured, or the problem. refused: why others cannot be made."""
     document = explored.summary(documents, _asked(order).limits, refused)
-    result, kept = igzip.compress(explored.result_json(document)), explored.packed(document)
-    if order.files is None:
-        return Outcome(result, kept, len(result) + len(kept), {}, {})
-    write_whole(Path(order.files[0]), [result])
-    write_whole(Path(order.files[1]), [kept])
-    return Outcome(None, None, len(result) + len(kept), {}, {})
+    return outcome_of(order, igzip.compress(explored.result_json(document)), [explored.packed(document)])
 
 
 def write_table(report: Report, path: str) -> bytes:

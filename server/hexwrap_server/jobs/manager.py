@@ -28,7 +28,6 @@ from hexwrap_server.errors import (
 from hexwrap_server.http.metrics import Metrics
 from hexwrap_server.input.requests import CacheSettings, Exploration, Order, Outcome, ParsedRequest, Wanted
 from hexwrap_server.jobs.codec import digest
-from hexwrap_server.jobs.endings import Ledger
 from hexwrap_server.jobs.engine import Engine, nobody
 from hexwrap_server.jobs.exploring import explore
 from hexwrap_server.jobs.store import Job, Kind, Store, Work
@@ -99,7 +98,6 @@ class JobManager:
         """errand: has short work done beside the jobs, on this machine."""
         self.store = store
         self.errand = errand
-        self._ledger = Ledger(store)
         self._engine = engine
         self._settings = settings
         self._metrics = metrics
@@ -155,7 +153,7 @@ class JobManager:
         # before the tasks come to know: the engine need not replace the workers that they kill
         await self._engine.stop()
         await asyncio.gather(*tasks, return_exceptions=True)
-        self._ledger.catch_up()
+        self.store.catch_up()
 
     # what clients do
 
@@ -197,7 +195,7 @@ class JobManager:
     def get(self, id: str) -> Job:
         """Raises HttpError 404."""
         item = self._live.get(id)
-        job = item.jobs[id] if item else self._ledger.get(id) or self.store.job(id)
+        job = item.jobs[id] if item else self.store.job(id)
         if job is None:
             raise not_found("job", f"No job '{id[:64]}' is kept here; it may have expired.")
         return job
@@ -205,7 +203,7 @@ class JobManager:
     async def latest(self, limit: int, before: str | None = None) -> list[dict[str, Any]]:
         """Documents of jobs, newest first. before: only those older than this one."""
         listed = await asyncio.to_thread(self.store.jobs, limit, before)
-        present = [self.get(j.id) if j.id in self._live or j.id in self._ledger else j for j in listed]
+        present = [self.get(job.id) if job.id in self._live else job for job in listed]
         return [self.document(job) for job in present]
 
     def position(self, job: Job) -> int | None:
@@ -251,7 +249,7 @@ class JobManager:
         """Stop a job that waits or runs, forget one that is over."""
         job = self.get(id)
         if job.is_over:
-            self._ledger.forget(id)
+            self.store.forget(id)
             return
         item = self._live[id]
         self._end([replace(job, status="cancelled", finished=time.time())])
@@ -505,7 +503,7 @@ class JobManager:
 
     def _end(self, jobs: list[Job]) -> None:
         """Write the end of jobs, then tell."""
-        self._ledger.end(jobs)
+        self.store.end(jobs)
         for job in jobs:
             item = self._live.pop(job.id, None)
             if item is not None:
@@ -541,7 +539,7 @@ class JobManager:
     async def _catch_up(self) -> None:
         while True:
             await asyncio.sleep(CATCH_UP_INTERVAL)
-            self._ledger.catch_up()
+            self.store.catch_up()
             try:
                 await asyncio.to_thread(self.store.check_point)
             except (StorageError, OSError) as error:

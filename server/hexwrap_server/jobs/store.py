@@ -108,14 +108,6 @@ class Work:
 
 
 @dataclass(frozen=True)
-class FileState:
-    """used: when a file was last written or asked for, Unix time. size: its bytes."""
-
-    used: float
-    size: int
-
-
-@dataclass(frozen=True)
 class Kept:
     """What pruning leaves: works and surfaces, and the Unix time before which nothing is kept."""
 
@@ -143,6 +135,7 @@ class Store:
         self._path = path = folder / "hexwrap.sqlite3"
         self._log = folder / "hexwrap.sqlite3-wal"
         self._checked = 0.0
+        self._ended: dict[str, Job] = {}  # jobs that are over but not yet written as such
         try:
             self._db = sqlite3.connect(path, check_same_thread=False, isolation_level=None)
             self._db.execute("PRAGMA journal_mode = WAL")
@@ -297,14 +290,32 @@ class Store:
             rows = [(*_row(job, _CHANGING), job.id) for job in jobs]
             self._db.executemany(f"UPDATE jobs SET {changes} WHERE id = ?", rows)
 
+    def end(self, jobs: Iterable[Job]) -> None:
+        """Write the end of jobs, or keep it here until it can be written: a full disk must not keep a job
+        from ending. If the server dies before, the job is taken up again as if it had still been running."""
+        self._ended |= {job.id: job for job in jobs}
+        self.catch_up()
+
+    def catch_up(self) -> None:
+        """Write the ends that are kept, if they can be written by now."""
+        if not self._ended:
+            return
+        try:
+            self.update(self._ended.values())
+        except StorageError as error:
+            log.error("%d ended jobs cannot be written yet: %s", len(self._ended), error)
+        else:
+            self._ended.clear()
+
     def job(self, id: str) -> Job | None:
-        return next(iter(self._jobs("WHERE id = ?", id)), None)
+        return self._ended.get(id) or next(iter(self._jobs("WHERE id = ?", id)), None)
 
     def jobs(self, limit: int, before: str | None = None) -> list[Job]:
         """Newest first. before: only those older than this one."""
         older = "" if before is None else "WHERE number < (SELECT number FROM jobs WHERE id = ?)"
         values = [limit] if before is None else [before, limit]
-        return self._jobs(f"{older} ORDER BY number DESC LIMIT ?", *values)
+        listed = self._jobs(f"{older} ORDER BY number DESC LIMIT ?", *values)
+        return [self._ended.get(job.id, job) for job in listed]
 
     def unfinished(self) -> list[Job]:
         """Oldest first."""
@@ -313,8 +324,9 @@ class Store:
 
     def forget(self, id: str) -> None:
         self._write("DELETE FROM jobs WHERE id = ?", id)
+        self._ended.pop(id, None)
 
-    def prune_rows(self, days: float, result_bytes: float, surfaces: Mapping[str, FileState]) -> Kept:
+    def prune_rows(self, days: float, result_bytes: float, surfaces: Mapping[str, os.stat_result]) -> Kept:
         """Forget jobs, works and surfaces that are too old or too much, the longest unused first.
 
         surfaces: what ``surface_files`` found. Each counts once, with the last work that used it.
@@ -327,27 +339,19 @@ class Store:
             works = self._rows(
                 f"SELECT used, identity, surface, size FROM works WHERE identity NOT IN ({busy})"
             )
-            loose = [(state.used, "", id, 0) for id, state in surfaces.items()]
+            loose = [(state.st_mtime, "", id, 0) for id, state in surfaces.items()]
             gone, kept = _divided(sorted([*works, *loose], reverse=True), oldest, result_bytes, surfaces)
             self._db.executemany(f"DELETE FROM jobs WHERE identity = ? AND {over}", gone)
             self._db.executemany("DELETE FROM works WHERE identity = ?", gone)
         left = self._rows("SELECT identity, surface FROM works")
         return Kept({identity for identity, _ in left}, kept | {surface for _, surface in left}, oldest)
 
-    def surface_files(self) -> dict[str, FileState]:
+    def surface_files(self) -> dict[str, os.stat_result]:
         """The kept surfaces by id. Looks at many files. Raises StorageError."""
-        found = {}
         try:
-            with os.scandir(self.surfaces) as entries:
-                for entry in entries:
-                    id, _, ending = entry.name.partition(".")
-                    if ending == "surface":
-                        with contextlib.suppress(FileNotFoundError):
-                            state = entry.stat()
-                            found[id] = FileState(state.st_mtime, state.st_size)
+            return {path.stem: path.stat() for path in self.surfaces.glob("*.surface")}
         except OSError as error:
             raise StorageError.of(error) from error
-        return found
 
     def prune_files(self, kept: Kept, stage_bytes: float) -> None:
         """Delete files that are no longer needed. Touches many files."""
@@ -391,7 +395,7 @@ def _divided(
     listed: list[tuple[float, str, str, int]],
     oldest: float,
     limit_bytes: float,
-    surfaces: Mapping[str, FileState],
+    surfaces: Mapping[str, os.stat_result],
 ) -> tuple[list[tuple[str]], set[str]]:
     """Works to forget, and surfaces to keep.
 
@@ -405,7 +409,7 @@ def _divided(
         total += size
         if surface in surfaces and surface not in counted:
             counted.add(surface)
-            total += surfaces[surface].size
+            total += surfaces[surface].st_size
         if total <= limit_bytes and used >= oldest:
             kept.add(surface)
         elif identity:

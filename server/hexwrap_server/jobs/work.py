@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
@@ -45,12 +45,18 @@ def solve(report: Report, order: Order, caching: CacheSettings) -> Outcome:
     kept = codec.pieces(solution)
     result = packed_result(solution, runner)
     cache.weigh()
+    return replace(outcome_of(order, result, kept), timings=runner.timings, found=runner.found)
+
+
+def outcome_of(order: Order, result: bytes, kept: Sequence[bytes | memoryview]) -> Outcome:
+    """What is sent back, or put into the files of the order. kept: pieces of the solution. Raises
+    StorageError."""
     size = len(result) + sum(map(len, kept))
     if order.files is None:
-        return Outcome(result, b"".join(kept), size, runner.timings, runner.found)
+        return Outcome(result, b"".join(kept), size)
     write_whole(Path(order.files[0]), [result])
     write_whole(Path(order.files[1]), kept)
-    return Outcome(None, None, size, runner.timings, runner.found)
+    return Outcome(None, None, size)
 
 
 def packed_result(solution: pipeline.Solution, runner: CachingRunner) -> bytes:

@@ -15,7 +15,7 @@ from hexwrap_solver.explore.types import Figures, Limits
 Json = dict[str, Any]
 #: Columns of ``explore.csv`` after the number of the variant.
 CHOICES = ("boundary", "singularities", "kind", "rotation", "around", "edge_length", "sizes", "joint")
-FORESEEN = ("uncovered", "panels", "types", "cost")
+FORESEEN = ("uncovered", "panels", "types", "cost", "bare")
 MEASURED = (*FORESEEN, "gap_max")
 
 

@@ -197,11 +197,12 @@ def quality(solution: Solution) -> dict[str, Any]:
         "kink": summary(measured.kink, "mean", "max"),
         "overlaps": None if made is None else measured.overlaps,
         "coverage": None if made is None else measured.coverage,
+        "bare": None if made is None else measured.bare,
         "distinct_panels": 0 if measured.congruence is None else len(np.unique(measured.congruence)),
         "convex": summary(measured.convex, "mean")["mean"],
         "not_convex": 0 if measured.convex is None else int(np.sum(~measured.convex)),
         "movement": measured.movement,
-        "trade_off": curve and fields(curve, "sizes uncovered worst_gap joint_mean joint_max"),
+        "trade_off": curve and fields(curve, "sizes uncovered worst_gap joint_mean joint_max taken"),
         "singularity_curve": measured.singularities and choices(measured.singularities),
         "notes": notes(solution),
     }

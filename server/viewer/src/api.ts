@@ -34,6 +34,8 @@ export interface Figures {
   types: number;
   cost: number;
   gap_max: number | null;
+  /** Share of the surface without cells. */
+  bare: number;
 }
 
 /** What an exploration found. */
@@ -60,6 +62,8 @@ export interface TradeOff {
   sizes: number[];
   uncovered: number[];
   worst_gap: number[];
+  /** how many the panels have */
+  taken: number;
 }
 
 /** What numbers of singularities leave uncovered; at: where they would stand. */

@@ -103,7 +103,7 @@ export class Explorer {
     spots.forEach(({ index, figures }, i) => {
       const one = this.found!.variants[index];
       const hue = 250 - (200 * figures.types) / most;
-      const words = `${number(100 * figures.uncovered, 3)} % uncovered, ${figures.types} types, ${figures.panels} panels, cost ${Math.round(figures.cost).toLocaleString("en")}`;
+      const words = `${number(100 * figures.uncovered, 3)} % uncovered, ${number(100 * figures.bare, 2)} % of the surface bare, ${figures.types} types, ${figures.panels} panels, cost ${Math.round(figures.cost).toLocaleString("en")}`;
       const state = [index === this.chosen && "current", index === this.found!.best && "best", !this.fits(figures) && "out"].filter(Boolean).join(" ");
       const spot = svg("circle", {
         cx: x(figures.cost), cy: y(open[i]), r: one.front ? 6 : 3.2, fill: `hsl(${hue} 65% 52%)`, class: `variant ${state}`,

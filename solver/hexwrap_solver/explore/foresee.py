@@ -132,7 +132,7 @@ def _candidate(
     cost = settings.cost.of(
         found.types, found.panels, found.area, found.perimeter, METRES.get(unit or "m", 1.0)
     )
-    return Candidate(asked, Figures(found.uncovered, found.panels, found.types, cost))
+    return Candidate(asked, Figures(found.uncovered, found.panels, found.types, cost, bare=found.bare))
 
 
 def measured(solution: Solution, settings: ExploreSettings) -> Figures:
@@ -150,4 +150,4 @@ def measured(solution: Solution, settings: ExploreSettings) -> Figures:
         METRES.get(solution.map.surface.unit or "m", 1.0),
     )
     widest = float(finite.max()) if len(finite) else None
-    return Figures(1 - quality.coverage, panels.n_panels, types, cost, widest)
+    return Figures(1 - quality.coverage, panels.n_panels, types, cost, widest, quality.bare)

@@ -12,8 +12,9 @@ from hexwrap_solver.tolerances import TINY
 
 #: Variants that are solved, at most.
 MOST_SOLVED = 30
-#: Differences that are none: of the uncovered share, and of the cost, relatively. Types are counted.
-SAME_UNCOVERED, SAME_COST = 1e-3, 5e-3
+#: Differences that are none: of the uncovered share, of the types, of the cost (relatively), and of the
+#: share of the surface without cells: less cost that comes of more bare surface beats nothing.
+SAME = (1e-3, 0.0, 5e-3, 0.03)
 #: Whatever closes the rest, and how it looks, is dear: an open square metre counts as this many of panels.
 OPEN = 10.0
 #: Figures are foreseen only so well: a variant this much beyond a limit of the panels may yet keep it.
@@ -21,10 +22,10 @@ NEARLY = 1.05
 
 
 def objectives(figures: Sequence[Figures]) -> Floats:
-    """(v, 3) less is better: uncovered, types, log cost."""
+    """(v, 4) less is better: uncovered, types, log cost, bare."""
     return np.array(
-        [[f.uncovered, f.types, np.log(max(f.cost, TINY))] for f in figures], dtype=np.float64
-    ).reshape(-1, 3)
+        [[f.uncovered, f.types, np.log(max(f.cost, TINY)), f.bare] for f in figures], dtype=np.float64
+    ).reshape(-1, 4)
 
 
 def non_dominated(values: Floats, same: tuple[float, ...]) -> Bools:
@@ -49,7 +50,7 @@ def within(figures: Figures, limits: Limits, sizes: int | None, slack: float = 1
 def to_solve(figures: Sequence[Figures], most: int = MOST_SOLVED) -> Ints:
     """Indices of the non-dominated, at most this many: ends of the front, and what fills its widest holes."""
     values = objectives(figures)
-    candidates = np.flatnonzero(non_dominated(values, (SAME_UNCOVERED, 0.0, SAME_COST)))
+    candidates = np.flatnonzero(non_dominated(values, SAME))
     if len(candidates) <= most:
         return candidates
     spread = _scaled(values[candidates])
@@ -63,17 +64,17 @@ def to_solve(figures: Sequence[Figures], most: int = MOST_SOLVED) -> Ints:
 
 def front_of(figures: Sequence[Figures]) -> Bools:
     """(v,) the non-dominated of measured variants."""
-    return non_dominated(objectives(figures), (SAME_UNCOVERED, 0.0, SAME_COST))
+    return non_dominated(objectives(figures), SAME)
 
 
 def best_of(figures: Sequence[Figures]) -> int:
-    """The least cost, where what is left uncovered costs ``OPEN`` times what panels cost there."""
+    """The least cost, where surface without panels costs ``OPEN`` times what panels cost."""
     return min(range(len(figures)), key=lambda i: figures[i].cost * (1 + OPEN * _open(figures[i])))
 
 
 def _open(found: Figures) -> float:
-    """Area left open per area of the panels."""
-    return found.uncovered / max(1 - found.uncovered, 1e-12)
+    """Area of the surface left open, between cells and beside them, per area of the panels."""
+    return 1 / max((1 - found.uncovered) * (1 - found.bare), 1e-12) - 1
 
 
 def _scaled(values: Floats) -> Floats:

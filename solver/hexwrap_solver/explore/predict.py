@@ -47,6 +47,7 @@ ALIKE = 1e-3
 class Foreseen:
     """Cells of one pattern. uncovered: share of their area that is left open. panels: their number. types:
     different lengths, and panels with another number of sides. area, perimeter: of all panels, model units.
+    bare: share of the surface without cells.
     """
 
     uncovered: float
@@ -54,6 +55,7 @@ class Foreseen:
     types: int
     area: float
     perimeter: float
+    bare: float
 
 
 @dataclass(frozen=True)
@@ -65,7 +67,8 @@ class Outlook:
     the boundary as they reach, on the average over all directions (perimeter/2π); along a loop that is a line
     of the pattern, half a row. special: cells with another number of sides; trimmed: those cut at the
     boundary; folded: pieces of those that features cut, of that many kinds; rest: area of all these, which
-    their panels are taken to cover. distortion: of the placement.
+    their panels are taken to cover. surface: its area, 0 where cells are trimmed to
+    reach its edges. distortion: of the placement.
     """
 
     lattice: Lattice
@@ -77,6 +80,7 @@ class Outlook:
     folded: int = 0
     kinds: int = 0
     rest: float = 0.0
+    surface: float = 0.0
     distortion: float = 0.0
 
     @property
@@ -106,7 +110,7 @@ class Outlook:
             area += unit * float(count @ length**2)
             perimeter += sides * float(count @ length)
         if not panels:
-            return Foreseen(1.0, 0, 0, 0.0, 0.0)
+            return Foreseen(1.0, 0, 0, 0.0, 0.0, 1.0)
         # a piece of a cell is as compact as the cell, more or less
         largest = self.lattice.sides
         around = float(np.sqrt(others * self.rest / _area(self.lattice.centred[largest]))) * largest
@@ -116,6 +120,7 @@ class Outlook:
             types + self.special + self.trimmed + self.kinds,
             area + self.rest,
             perimeter + around,
+            max(self.surface - cells - self.rest, 0.0) / max(self.surface, TINY),
         )
 
 
@@ -184,7 +189,8 @@ def _outlook(cmap: ConformalMap, placing: PlacementFamily, settings: PatternSett
     folded, kinds = 2 * int(bent.sum()), 2 * len(_levels(size[bent])[0]) if bent.any() else 0
     size, shorter, sides = size[whole], shorter[whole], sides[whole]
     limit = size * (1 - shorter)
-    return Outlook(lattice, sides, size, limit, alone, cut, folded, kinds, rest, placement.distortion)
+    wall = 0.0 if settings.boundary == "trim" else float(area.sum())
+    return Outlook(lattice, sides, size, limit, alone, cut, folded, kinds, rest, wall, placement.distortion)
 
 
 def shortened(outline: Complexes, gradient: Complexes, skew: Complexes) -> Floats:

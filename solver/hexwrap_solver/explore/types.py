@@ -116,10 +116,12 @@ class ExploreSettings:
 
 @dataclass(frozen=True)
 class Figures:
-    """Of one variant, foreseen or measured. gap_max: None where it is not known."""
+    """Of one variant, foreseen or measured. uncovered: share of the cells' area. gap_max: None where it is
+    not known. bare: share of the surface without cells."""
 
     uncovered: float
     panels: int
     types: int
     cost: float
     gap_max: float | None = None
+    bare: float = 0.0

@@ -103,7 +103,8 @@ class TradeOff:
     sizes: (k,) numbers of classes 1…; uncovered: (k,) fraction of the cells' area left open;
     worst_gap: (k,) greatest mean gap of a panel to its cell, model units.
     joint_mean, joint_max: (k,) mean and greatest width of the joints between neighbours, model units, as they
-    would be were all facing edges parallel.
+    would be were all facing edges parallel. taken: how many the panels have, singularities and pieces of
+    cells apart; of patterns with several kinds of cells, of the kind that has most.
     """
 
     sizes: Ints
@@ -111,6 +112,7 @@ class TradeOff:
     worst_gap: Floats
     joint_mean: Floats
     joint_max: Floats
+    taken: int = 0
 
 
 @dataclass(frozen=True)
@@ -238,6 +240,7 @@ class Quality:
     surface_distance: (q,) greatest distance of a panel's corners and its centre to the input surface.
     convex: (q,). congruence: (q,) class of congruent shapes (mirror images distinguished).
     gaps_over: panels with a joint wider than was wanted, None where nothing was said of that.
+    coverage: area of the panels over that of the cells. bare: share of the surface without cells.
     movement: greatest distance a shared vertex was moved (watertight), 0 otherwise.
     singularities: what other numbers of them would leave open; None where none was looked at.
     """
@@ -257,6 +260,7 @@ class Quality:
     congruence: Ints | None = None
     overlaps: int = 0
     coverage: float = 0.0
+    bare: float = 0.0
     movement: float = 0.0
     singularities: Choices | None = None
     notes: tuple[str, ...] = ()

@@ -160,6 +160,7 @@ def _lay(
     boundary = boundary_of(cmap.surface, layout)
     if len(features):
         edges = ending_at_tips(layout, nodes, edges, boundary)
+    edges = edges.both_ways()
     whole = whole_cells(lattice, edges)
     met = met_by_pattern(layout, nodes, edges, boundary)
     # Where folds meet the boundary, cells are cut anyway.

@@ -108,8 +108,8 @@ def outlook_note(laid: Pattern, found: Choices) -> tuple[str, ...]:
         return ()
     return (
         f"{in_words(laid.kind, found.index[best]).capitalize()} would leave about {then:.1%} uncovered "
-        f"instead of {left:.1%}, the ends being free: ask for singularities auto with boundary.mode "
-        "isometric.",
+        f"instead of {left:.1%}, the ends being free: ask for singularities {found.number[best]}, or auto, "
+        "which may find more, with boundary.mode isometric.",
     )
 
 

@@ -67,6 +67,7 @@ def test_foreseen_is_near_measured(surface, mode: str, kind: str, boundary: str)
         # of so few rows two have sides with no joint
         near = 0.035 if kind in NEW else 0.02 if joint else 0.008
         assert found.uncovered == pytest.approx(1 - measure(cmap, laid, made).coverage, abs=near)
+        assert found.bare == pytest.approx(measure(cmap, laid, made).bare, abs=0.01)
         assert found.panels == pytest.approx(made.n_panels, rel=0.06)
         if sizes and boundary == "whole":
             assert found.types <= sizes * len(LATTICES[kind].outlines)
@@ -121,6 +122,14 @@ def test_what_is_proposed_is_cheap_and_closed() -> None:
         Figures(0.02, 9, 9, 300.0),
     )
     assert best_of([open_and_cheap, closed, dear]) == 1
+
+
+def test_large_cells_that_leave_the_ends_bare_do_not_look_cheap() -> None:
+    large, small = Figures(0.05, 50, 5, 70.0, bare=0.3), Figures(0.05, 200, 5, 100.0, bare=0.05)
+    assert best_of([large, small]) == 1
+    assert front_of([large, small]).tolist() == [True, True]
+    assert to_solve([large, small]).tolist() == [0, 1]
+    assert front_of([large, replace(small, bare=0.29)]).tolist() == [True, False]
 
 
 def test_limits() -> None:

@@ -1,5 +1,6 @@
 """The whole way with singularities: cells close around them, panels are regular, nothing overlaps."""
 
+import re
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -197,11 +198,18 @@ def plain():
 def test_says_what_singularities_would_bring(plain, found):
     said = [note for note in plain.quality.notes if "would leave about" in note]
     assert len(said) == 1
-    assert "heptagons" in said[0]
+    told, asked = re.search(r"(\d+) heptagons would .* ask for singularities (\d+),", said[0]).groups()
+    assert told == asked
+    assert len(solved(lobed(), count=int(asked), around=24).map.cones) == int(told)
     assert found.quality.coverage > plain.quality.coverage
     assert not any("would leave about" in note for note in found.quality.notes)
     even = solved(shapes.straight(), mode="straight", around=16)
     assert not any("would leave about" in note for note in even.quality.notes)
+
+
+def test_the_curve_of_sizes_counts_no_singularities(found):
+    assert found.panels.n_special == len(found.map.cones) > 0
+    assert found.panels.trade_off.taken == len(found.panels.class_length) - found.panels.n_special
 
 
 class TestCurve:

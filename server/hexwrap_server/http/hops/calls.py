@@ -99,7 +99,7 @@ def _surface(geometry: Any, sent: dict[str, Any], max_vertices: int) -> SentSurf
     return as_sent(content, chosen, SurfaceSettings(), max_vertices)
 
 
-def panels_answer(report: Report, path: str, branch: tuple[int, ...], job: str) -> dict[str, Any]:
+def panels_answer(report: Report, path: str, call: Call, job: str) -> dict[str, Any]:
     """The outputs of PANELS for the solution at path."""
     solution = solution_at(path)
     made, laid = solution.panels, solution.pattern
@@ -122,28 +122,26 @@ def panels_answer(report: Report, path: str, branch: tuple[int, ...], job: str) 
     for parameter in COMPONENTS[PANELS].outputs:
         branches: dict[tuple[int, ...], list[Any]] = {}
         if parameter.name in whole:
-            branches[branch] = whole[parameter.name]
+            branches[call.branch] = whole[parameter.name]
         else:
             for ring, value in zip(rings, per_panel[parameter.name], strict=True):
-                branches.setdefault((*branch, ring), []).append(value)
+                branches.setdefault((*call.branch, ring), []).append(value)
         outputs.append(output(parameter, branches))
     return _answer(outputs)
 
 
-def lift_answer(
-    report: Report, path: str, branch: tuple[int, ...], curves: tuple[Curve, ...]
-) -> dict[str, Any]:
+def lift_answer(report: Report, path: str, call: Call, job: str) -> dict[str, Any]:
     """The outputs of LIFT for the solution at path."""
     cmap = solution_at(path).map
     branches: dict[tuple[int, ...], list[Any]] = {}
     outside = 0
-    for number, curve in enumerate(curves):
+    for number, curve in enumerate(call.curves):
         carried = lift_curves(cmap, [curve], None)
         outside += carried.outside
         pieces = [_closed(c.points.tolist()) if c.closed else c.points.tolist() for c in carried.curves]
-        branches[*branch, number] = [piece for piece in pieces if len(piece) > 1]
+        branches[*call.branch, number] = [piece for piece in pieces if len(piece) > 1]
     lifted, count = COMPONENTS[LIFT].outputs
-    return _answer([output(lifted, branches), output(count, {branch: [outside]})])
+    return _answer([output(lifted, branches), output(count, {call.branch: [outside]})])
 
 
 def _answer(values: list[dict[str, Any]]) -> dict[str, Any]:

@@ -26,26 +26,25 @@ if TYPE_CHECKING:  # reading geometry is left to a worker; this process need not
 PATIENCE = 90.0
 
 
-def hops_router() -> APIRouter:
-    """The routes, for an application whose state holds the service."""
-    router = APIRouter(tags=["hops"], include_in_schema=False)
+router = APIRouter(tags=["hops"], include_in_schema=False)
 
-    @router.get(PANELS)
-    async def describe_panels() -> Response:
-        return json_response(COMPONENTS[PANELS].document())
 
-    @router.get(LIFT)
-    async def describe_lift() -> Response:
-        return json_response(COMPONENTS[LIFT].document())
+@router.get(PANELS)
+async def describe_panels() -> Response:
+    return json_response(COMPONENTS[PANELS].document())
 
-    @router.post("/solve")
-    async def solve(request: Request) -> Response:
-        try:
-            return await _solve(request)
-        except HexwrapError as error:
-            return json_response({"values": [], "errors": [error.detail], "warnings": []}, 500)
 
-    return router
+@router.get(LIFT)
+async def describe_lift() -> Response:
+    return json_response(COMPONENTS[LIFT].document())
+
+
+@router.post("/solve")
+async def solve(request: Request) -> Response:
+    try:
+        return await _solve(request)
+    except HexwrapError as error:
+        return json_response({"values": [], "errors": [error.detail], "warnings": []}, 500)
 
 
 async def _solve(request: Request) -> Response:
@@ -56,27 +55,12 @@ async def _solve(request: Request) -> Response:
         )
     if call.request is None:
         job = _finished(service.manager.get(call.job))
-        answer = await service.errand(
-            "hexwrap_server.http.hops.calls:lift_answer", _path(service, job), call.branch, call.curves
-        )
     else:
-        job = await _run(service, call)
-        answer = await service.errand(
-            "hexwrap_server.http.hops.calls:panels_answer", _path(service, job), call.branch, job.id
-        )
-    return json_response(answer)
-
-
-async def _run(service: Service, call: Call) -> Job:
-    """The finished job of a call. Raises HexwrapError."""
-    parsed = call.request
-    assert parsed is not None
-    job = await service.manager.submit(parsed)
-    return _finished(await service.manager.wait(job.id, PATIENCE))
-
-
-def _path(service: Service, job: Job) -> str:
-    return str(service.store.solution_path(job.identity))
+        sent = await service.manager.submit(call.request)
+        job = _finished(await service.manager.wait(sent.id, PATIENCE))
+    step = "panels_answer" if call.request else "lift_answer"
+    path = str(service.store.solution_path(job.identity))
+    return json_response(await service.errand(f"hexwrap_server.http.hops.calls:{step}", path, call, job.id))
 
 
 def _finished(job: Job) -> Job:

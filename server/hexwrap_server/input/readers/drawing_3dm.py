@@ -7,8 +7,8 @@ import rhino3dm
 
 from hexwrap_server.errors import DrawingError
 from hexwrap_server.input.readers.drawing import Drawing, curve, too_many
-from hexwrap_server.input.readers.rhino_curves import rhino_curve, xyz
-from hexwrap_server.input.readers.rhino_model import Model, Placed, TooManyObjectsError
+from hexwrap_server.input.readers.rhino_curves import rhino_curve
+from hexwrap_server.input.readers.rhino_model import Model, Placed, TooManyObjectsError, xyz
 
 
 def read_3dm_drawing(data: bytes) -> Drawing:

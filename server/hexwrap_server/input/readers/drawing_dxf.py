@@ -8,6 +8,7 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Iterable, Iterator
+from itertools import count
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -51,7 +52,7 @@ def read_dxf(data: bytes) -> Drawing:
     drawing = Drawing()
     hidden = {layer.dxf.name.lower() for layer in document.layers if layer.is_off() or layer.is_frozen()}
     paths: list[Any] = []
-    for entity in _resolved(document.modelspace(), drawing, _Budget(), 0):
+    for entity in _resolved(document.modelspace(), drawing, count(), 0):
         kind = entity.dxftype()
         if entity.dxf.get("invisible", 0) or entity.dxf.get("layer", "0").lower() in hidden:
             drawing.left_out[f"hidden {kind}"] += 1
@@ -85,35 +86,23 @@ def _document(data: bytes) -> Document:
     return recover.read(io.BytesIO(text.strip() + b"\n"))[0]
 
 
-class _Budget:
-    """How many entities may still be looked at."""
-
-    def __init__(self) -> None:
-        self.left = MOST_OBJECTS
-
-    def spend(self) -> None:
-        self.left -= 1
-        if self.left < 0:
-            raise too_many()
-
-
-def _resolved(entities: Iterable[Any], drawing: Drawing, budget: _Budget, depth: int) -> Iterator[Any]:
-    """Entities other than block references, at any depth; multilines as the lines they show."""
+def _resolved(entities: Iterable[Any], drawing: Drawing, seen: Iterator[int], depth: int) -> Iterator[Any]:
+    """Entities other than block references, at any depth; multilines as the lines they show. seen: counts
+    them."""
     for entity in entities:
+        if next(seen) == MOST_OBJECTS:
+            raise too_many()
         kind = entity.dxftype()
         if kind == "INSERT":
-            budget.spend()
             block = entity.block()
             if depth == DEEPEST or block is None or block.block.is_xref:
                 drawing.left_out["external reference" if block is None or depth < DEEPEST else kind] += 1
                 continue
             for one in entity.multi_insert() if entity.mcount > 1 else [entity]:
-                budget.spend()
-                yield from _resolved(one.virtual_entities(), drawing, budget, depth + 1)
+                yield from _resolved(one.virtual_entities(), drawing, seen, depth + 1)
         elif kind == "MLINE":
             yield from entity.virtual_entities()
         else:
-            budget.spend()
             yield entity
 
 

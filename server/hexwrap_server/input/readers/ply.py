@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import struct
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,13 +12,14 @@ from numpy.typing import NDArray
 from hexwrap_server.errors import UnreadableFileError
 from hexwrap_server.input.readers.found import FileContent, of_mesh
 from hexwrap_server.input.readers.text import MARKS, Width, as_utf8, count, floats, rows
-from hexwrap_solver.arrays import Floats, Ints, Ragged
+from hexwrap_solver.arrays import Ragged
 from hexwrap_solver.surface import SentMesh
 
+#: Names of types, and the letter that ``struct`` and numpy know them by.
 _TYPES = {
-    "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2", "ushort": "u2",
-    "uint16": "u2", "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4", "long": "i8", "int64": "i8",
-    "ulong": "u8", "uint64": "u8", "float": "f4", "float32": "f4", "double": "f8", "float64": "f8",
+    "char": "b", "int8": "b", "uchar": "B", "uint8": "B", "short": "h", "int16": "h", "ushort": "H",
+    "uint16": "H", "int": "i", "int32": "i", "uint": "I", "uint32": "I", "long": "q", "int64": "q",
+    "ulong": "Q", "uint64": "Q", "float": "f", "float32": "f", "double": "d", "float64": "d",
 }  # fmt: skip
 _ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 _END = re.compile(rb"(?<=[\r\n])[ \t]*end_header[ \t]*(\r\n|\n|\r)", re.IGNORECASE)
@@ -155,73 +157,39 @@ def _binary(body: bytes, elements: list[_Element], order: str) -> dict[str, _Row
 
 
 def _binary_rows(body: bytes, at: int, element: _Element, order: str) -> tuple[_Rows, int]:
-    """The rows of an element that begins there, and where the next one begins."""
-    n, items = element.count, element.properties
-    if n == 0 or not items:
-        return _Rows({i.name: np.zeros(0) for i in items if i.count is None}, {}), at
-    starts, counts, end = _places(body, at, element, order)
-    raw = np.frombuffer(body, dtype=np.uint8)
-    single: dict[str, NDArray[np.float64]] = {}
-    lists: dict[str, Ragged] = {}
-    place = starts
-    for number, item in enumerate(items):
-        size = np.dtype(item.kind).itemsize
-        if item.count is None:
-            single[item.name] = _gathered(raw, place, order + item.kind)
-            place = place + size
-            continue
-        first = place + np.dtype(item.count).itemsize
-        many = counts[number]
-        offsets = np.append(0, np.cumsum(many)).astype(np.int64)
-        within = np.arange(offsets[-1]) - np.repeat(offsets[:-1], many)
-        lists[item.name] = Ragged(
-            _gathered(raw, np.repeat(first, many) + size * within, order + item.kind), offsets
-        )
-        place = first + size * many
-    return _Rows(single, lists), end
-
-
-def _gathered(raw: NDArray[np.uint8], starts: Ints, kind: str) -> Floats:
-    """The numbers that begin at these bytes."""
-    size = np.dtype(kind).itemsize
-    numbers: Floats = raw[starts[:, None] + np.arange(size)].view(kind)[:, 0].astype(np.float64)
-    return numbers
-
-
-def _places(body: bytes, at: int, element: _Element, order: str) -> tuple[Ints, dict[int, Ints], int]:
-    """Where each row begins, the lengths of its lists by property, and where the last row ends.
-
-    Raises UnreadableFileError where the file ends before.
-    """
-    n, items = element.count, element.properties
-    if len(body) - at < n:  # a row has at least one byte, so memory is bounded by the file
-        raise _cut_short(element, len(body) - at)
-    sizes = [np.dtype(item.kind).itemsize for item in items]
+    """The rows of an element that begins there, and where the next one begins. Raises UnreadableFileError
+    where the file ends before."""
+    items = element.properties
     if all(item.count is None for item in items):
-        step = sum(sizes)
-        if at + n * step > len(body):
-            raise _cut_short(element, (len(body) - at) // step)
-        return at + step * np.arange(n), {}, at + n * step
-    heads = [item.count and (np.dtype(item.count).itemsize, item.count[0] == "i") for item in items]
-    byteorder = "little" if order == "<" else "big"
-    starts = np.zeros(n, dtype=np.int64)
-    counts = {k: np.zeros(n, dtype=np.int64) for k, head in enumerate(heads) if head}
-    end = len(body)
-    for row in range(n):  # where a row begins is known only when the one before has been read
-        starts[row] = at
-        for k, head in enumerate(heads):
-            if not head:
-                at += sizes[k]
-                continue
-            wide, signed = head
-            many = int.from_bytes(body[at : at + wide], byteorder, signed=signed)  # type: ignore[arg-type]
-            at += wide + many * sizes[k]
-            if many < 0 or at > end:
-                raise _cut_short(element, row)
-            counts[k][row] = many
-        if at > end:
-            raise _cut_short(element, row)
-    return starts, counts, at
+        table = np.dtype([(str(k), order + item.kind) for k, item in enumerate(items)])
+        held = element.count if not items else (len(body) - at) // table.itemsize
+        if held < element.count:
+            raise _cut_short(element, held)
+        read = np.frombuffer(body, table, element.count if items else 0, at)
+        columns = {item.name: read[str(k)].astype(np.float64) for k, item in enumerate(items)}
+        return _Rows(columns, {}), at + element.count * table.itemsize
+    values: list[list[float]] = [[] for _ in items]
+    counts: list[list[int]] = [[] for _ in items]
+    for row in range(element.count):  # where one begins is known only when the one before has been read
+        for item, numbers, lengths in zip(items, values, counts, strict=True):
+            many = 1
+            try:
+                if item.count is not None:
+                    (many,) = struct.unpack_from(order + item.count, body, at)
+                    lengths.append(many)
+                    at += struct.calcsize(item.count)
+                numbers += struct.unpack_from(f"{order}{many}{item.kind}", body, at)
+            except struct.error:  # too few bytes, or a length below 0
+                raise _cut_short(element, row) from None
+            at += many * struct.calcsize(item.kind)
+    columns, lists = {}, {}
+    for item, numbers, lengths in zip(items, values, counts, strict=True):
+        if item.count is None:
+            columns[item.name] = np.array(numbers, dtype=np.float64)
+        else:
+            offsets = np.append(0, np.cumsum(lengths)).astype(np.int64)
+            lists[item.name] = Ragged(np.array(numbers, dtype=np.float64), offsets)
+    return _Rows(columns, lists), at
 
 
 def _cut_short(element: _Element, held: int) -> UnreadableFileError:

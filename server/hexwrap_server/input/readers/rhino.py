@@ -13,7 +13,7 @@ import rhino3dm
 from hexwrap_server.errors import UnreadableFileError
 from hexwrap_server.input.readers.found import LINKED, FileContent, Found, Geometry
 from hexwrap_server.input.readers.rhino_brep import brep_of, nurbs_surface, rhino_mesh, subd_mesh
-from hexwrap_server.input.readers.rhino_model import MOST_OBJECTS, Model, Placed, TooManyObjectsError
+from hexwrap_server.input.readers.rhino_model import MOST_OBJECTS, Model, Placed, TooManyObjectsError, xyz
 from hexwrap_solver.arrays import Floats
 from hexwrap_solver.surface import NurbsSurface
 
@@ -116,7 +116,7 @@ def _size(geometry: Any, matrix: Floats | None) -> tuple[float, float, float]:
     box = geometry.GetBoundingBox()
     if not box.IsValid:  # of nothing
         return 0.0, 0.0, 0.0
-    corners = np.array(list(product(*zip(_xyz(box.Min), _xyz(box.Max), strict=True))))
+    corners = np.array(list(product(*zip(xyz(box.Min), xyz(box.Max), strict=True))))
     if matrix is not None:
         corners = corners @ matrix[:3, :3].T
     x, y, z = np.ptp(corners, axis=0).tolist()
@@ -161,10 +161,6 @@ def convert(geometry: Any, tolerance: float = 0.0) -> Geometry:
     if isinstance(geometry, rhino3dm.Brep):
         return brep_of(geometry, tolerance)
     return nurbs_surface(geometry)
-
-
-def _xyz(point: Any) -> tuple[float, float, float]:
-    return point.X, point.Y, point.Z
 
 
 def _turned(surface: NurbsSurface) -> NurbsSurface:

@@ -8,6 +8,7 @@ import numpy as np
 import rhino3dm
 
 from hexwrap_server.errors import UnreadableFileError
+from hexwrap_server.input.readers.rhino_model import xyz
 from hexwrap_solver.arrays import Floats, Ragged
 from hexwrap_solver.surface import NurbsSurface, SentMesh
 from hexwrap_solver.surface.brep import Brep, Edge, Face, NurbsCurve, Trim
@@ -24,7 +25,7 @@ def brep_of(geometry: Any, tolerance: float) -> Brep:
             f"The {type(geometry).__name__} in the Rhino file has no faces: run SelBadObjects in Rhino, "
             "then explode and join it again."
         )
-    vertices = np.array([_xyz(vertex.Location) for vertex in brep.Vertices], dtype=float).reshape(-1, 3)
+    vertices = np.array([xyz(vertex.Location) for vertex in brep.Vertices], dtype=float).reshape(-1, 3)
     ends: dict[int, tuple[int, int]] = {}
     faces = []
     for face in brep.Faces:
@@ -62,7 +63,7 @@ def _edge(edge: Any, ends: tuple[int, int]) -> Edge:
     curve = edge.ToNurbsCurve()
     if curve is None:
         raise UnreadableFileError("An edge in the Rhino file has no NURBS form: run RebuildEdges in Rhino.")
-    net = np.array([(*_xyz(p), p.W) for p in curve.Points], dtype=float)
+    net = np.array([(*xyz(p), p.W) for p in curve.Points], dtype=float)
     net[:, :3] /= net[:, 3:]
     made = NurbsCurve(int(curve.Degree), _full(curve.Knots), net)
     return Edge(made, made.domain, *ends)
@@ -76,7 +77,7 @@ def nurbs_surface(surface: Any) -> NurbsSurface:
     points = nurbs.Points
     net = np.array(
         [
-            [(*_xyz(p), p.W) for p in (points[i, j] for j in range(points.CountV))]
+            [(*xyz(p), p.W) for p in (points[i, j] for j in range(points.CountV))]
             for i in range(points.CountU)
         ],
         dtype=np.float64,
@@ -92,7 +93,7 @@ def nurbs_surface(surface: Any) -> NurbsSurface:
 
 def rhino_mesh(mesh: Any) -> SentMesh:
     """Raises UnreadableFileError."""
-    vertices = np.array([_xyz(mesh.Vertices.Point3dAt(i)) for i in range(len(mesh.Vertices))], dtype=float)
+    vertices = np.array([xyz(mesh.Vertices.Point3dAt(i)) for i in range(len(mesh.Vertices))], dtype=float)
     table = np.array([mesh.Faces[i] for i in range(len(mesh.Faces))], dtype=np.int64).reshape(-1, 4)
     if table.size == 0:
         raise UnreadableFileError(
@@ -107,7 +108,7 @@ def rhino_mesh(mesh: Any) -> SentMesh:
 def _normals(mesh: Any, n: int) -> Floats | None:
     if len(mesh.Normals) != n:
         return None
-    return np.array([_xyz(mesh.Normals[i]) for i in range(n)], dtype=float)
+    return np.array([xyz(mesh.Normals[i]) for i in range(n)], dtype=float)
 
 
 def _full(knots: Any) -> Floats:
@@ -127,7 +128,3 @@ def control_net(subd: Any) -> Any:
         return rhino3dm.Mesh.CreateFromSubDControlNet(subd, False)
     except TypeError:  # older versions ask for no texture coordinates
         return rhino3dm.Mesh.CreateFromSubDControlNet(subd)
-
-
-def _xyz(point: Any) -> tuple[float, float, float]:
-    return point.X, point.Y, point.Z

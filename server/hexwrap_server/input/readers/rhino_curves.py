@@ -10,6 +10,7 @@ import rhino3dm
 
 from hexwrap_server.errors import DrawingError
 from hexwrap_server.input.readers.drawing import FLATNESS, Curve, curve
+from hexwrap_server.input.readers.rhino_model import xyz
 from hexwrap_solver.arrays import Floats
 
 #: Places within an interval of parameters where the curve is compared with its chord.
@@ -82,7 +83,3 @@ def _refined(nurbs: Any, knots: Floats, tolerance: float) -> Floats:
 def _at(nurbs: Any, parameters: Floats) -> Floats:
     points = [xyz(nurbs.PointAt(t)) for t in parameters.ravel().tolist()]
     return np.array(points).reshape(*parameters.shape, 3)
-
-
-def xyz(point: Any) -> list[float]:
-    return [point.X, point.Y, point.Z]

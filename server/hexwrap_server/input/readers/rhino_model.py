@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -14,6 +14,10 @@ from hexwrap_solver.arrays import Floats
 
 #: Blocks within blocks, at most this deep, and this many objects in all.
 DEEPEST, MOST_OBJECTS = 32, 200_000
+
+
+def xyz(point: Any) -> list[float]:
+    return [point.X, point.Y, point.Z]
 
 
 class TooManyObjectsError(Exception):
@@ -125,15 +129,13 @@ class Model:
         locked = layer_locked or attributes.Mode == rhino3dm.ObjectMode.Locked
         placed = Placed(item.Geometry, attributes, str(attributes.Id), layer, visible, locked)
         if around is not None:
-            placed = Placed(
-                placed.geometry,
-                attributes,
-                f"{around.id}/{placed.id}",
-                layer,
-                visible and around.visible,
-                locked or around.locked,
-                around.matrix,
-                around.within,
+            placed = replace(
+                placed,
+                id=f"{around.id}/{placed.id}",
+                visible=visible and around.visible,
+                locked=locked or around.locked,
+                matrix=around.matrix,
+                within=around.within,
             )
         if not isinstance(item.Geometry, rhino3dm.InstanceReference) or len(placed.within) == DEEPEST:
             yield placed
@@ -143,15 +145,8 @@ class Model:
             yield placed  # a linked file that was not saved with this one
             return
         own = np.array(item.Geometry.Xform.ToFloatArray(True), dtype=float).reshape(4, 4)
-        inner = Placed(
-            placed.geometry,
-            attributes,
-            placed.id,
-            layer,
-            placed.visible,
-            placed.locked,
-            own if placed.matrix is None else placed.matrix @ own,
-            (*placed.within, Instance(str(attributes.Name or ""), layer, name, tuple(_strings(attributes)))),
-        )
+        matrix = own if placed.matrix is None else placed.matrix @ own
+        one = Instance(str(attributes.Name or ""), layer, name, tuple(_strings(attributes)))
+        inner = replace(placed, matrix=matrix, within=(*placed.within, one))
         for member in members:
             yield from self._resolved(member, inner)

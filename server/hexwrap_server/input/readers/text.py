@@ -5,6 +5,7 @@ from __future__ import annotations
 import codecs
 import re
 from collections.abc import Callable, Sequence
+from itertools import accumulate
 
 import numpy as np
 
@@ -98,31 +99,31 @@ def rows(lines: list[list[bytes]], parts: Sequence[tuple[str, int, Width]]) -> l
         )
     flat = [(what, k, width) for what, number, width in parts for k in range(number)]
     if len(lines) < total:
-        found = _streamed([word for line in lines for word in line], flat)
+        found = _run_on(lines, flat)
+        if len(found) < total:
+            what, k, _ = flat[len(found)]
+            raise UnreadableFileError(
+                f"The file ends before {what} {k}, of the {total} rows that it announces: it is truncated, "
+                "so export it again."
+            )
     else:
-        short = next((i for i in range(total) if _lacks(lines[i], flat[i][2])), None)
-        if short is None:
-            found = lines[:total]
-        else:
-            wrapped = _wrapped(lines, flat) if len(lines) > total else None
-            if wrapped is None:
+        found, pairs = lines[:total], enumerate(zip(lines, flat, strict=False))
+        short = next((i for i, (line, row) in pairs if len(line) < _needed(line, 0, row[2])), None)
+        if short is not None:
+            found = _run_on(lines, flat, whole_lines=True)
+            if len(found) < total:
                 what, k, _ = flat[short]
                 text = b" ".join(lines[short])[:60].decode("utf-8", "replace")
                 raise UnreadableFileError(
                     f"The row of {what} {k} is '{text}': it holds fewer numbers than it needs. Export the "
                     "file again."
                 )
-            found = wrapped
     cut: list[list[list[bytes]]] = []
     at = 0
     for _, number, _ in parts:
         cut.append(found[at : at + number])
         at += number
     return cut
-
-
-def _lacks(line: list[bytes], width: Width) -> bool:
-    return len(line) < _needed(line, 0, width)
 
 
 def _needed(words: list[bytes], at: int, width: Width) -> int:
@@ -138,36 +139,19 @@ def _needed(words: list[bytes], at: int, width: Width) -> int:
     return needed
 
 
-def _wrapped(lines: list[list[bytes]], flat: Sequence[tuple[str, int, Width]]) -> list[list[bytes]] | None:
-    """Rows that begin with a line and fill one or more; None where they do not."""
-    found = []
+def _run_on(
+    lines: list[list[bytes]], flat: Sequence[tuple[str, int, Width]], *, whole_lines: bool = False
+) -> list[list[bytes]]:
+    """Rows of just the words they need, one after the other, as many as there are. whole_lines: each begins
+    and ends with a line."""
+    words = [word for line in lines for word in line]
+    ends = set(accumulate(map(len, lines)))
+    found: list[list[bytes]] = []
     at = 0
     for _, _, width in flat:
-        if at == len(lines):
-            return None
-        row = list(lines[at])
-        at += 1
-        while len(row) < _needed(row, 0, width):
-            if at == len(lines):
-                return None
-            row += lines[at]
-            at += 1
-        if len(row) != _needed(row, 0, width):
-            return None
-        found.append(row)
-    return found
-
-
-def _streamed(words: list[bytes], flat: Sequence[tuple[str, int, Width]]) -> list[list[bytes]]:
-    found = []
-    at = 0
-    for what, k, width in flat:
         end = at + _needed(words, at, width)
-        if end > len(words):
-            raise UnreadableFileError(
-                f"The file ends before {what} {k}, of the {len(flat)} rows that it announces: it is "
-                "truncated, so export it again."
-            )
+        if end > len(words) or (whole_lines and end not in ends):
+            break
         found.append(words[at:end])
         at = end
     return found

@@ -56,6 +56,14 @@ class PatternEdges:
         """(…, 4) see gluing."""
         return self.isometries[self.gluing[tail, slot]]
 
+    def both_ways(self) -> PatternEdges:
+        """Without those whose way back leads elsewhere: around a vertex of the boundary with more than a full
+        turn two lines go straight on, one on either side."""
+        n = self.head.size
+        back = np.where(self.head >= 0, self.back, np.arange(n).reshape(self.back.shape))
+        returns = back.ravel()[back] == np.arange(n).reshape(back.shape)
+        return self if returns.all() else replace(self, head=np.where(returns, self.head, -1))
+
     def clockwise(self, node: Ints, slot: Ints) -> tuple[Ints, Ints, Bools]:
         """The slot clockwise from each; by how many directions; and whether the seam lies between."""
         passed = slot == 0

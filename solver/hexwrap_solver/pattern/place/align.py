@@ -194,7 +194,7 @@ def place_by_sides(
     notes = (
         ("phase has no effect: lattice lines on all sides leave no freedom.",) if any(settings.phase) else ()
     )
-    return Placement.on_annulus(cmap, place, best.motion, angle, around, distortion, notes)
+    return Placement.on_sheet(cmap, place, best.motion, angle, around, distortion, notes)
 
 
 def predicted(
