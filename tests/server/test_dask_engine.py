@@ -11,6 +11,7 @@ import time
 import warnings
 from collections.abc import AsyncIterator, Coroutine, Iterator
 from contextlib import asynccontextmanager
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -24,23 +25,34 @@ from tests.server.bodies import request, tube
 from tests.server.live import finished, over_first, running, until_at
 from tests.server.patience import PATIENCE
 
-distributed = pytest.importorskip("distributed", reason="dask.distributed is not installed (extra 'dask')")
+if find_spec("distributed") is None:  # it takes seconds to import, which only these tests should cost
+    pytest.skip("dask.distributed is not installed (extra 'dask')", allow_module_level=True)
 CALLS = "tests.server.calls:"
 
 
-@asynccontextmanager
-async def cluster(machines: int = 2) -> AsyncIterator[Any]:
+def machines(number: int, **more: Any) -> Any:
     """A scheduler, and worker processes that their nannies start again when they die."""
-    made = distributed.LocalCluster(
-        n_workers=machines,
+    import dask
+    import distributed
+
+    if os.name == "posix":  # they are forked from one that has the seconds of its imports behind it
+        dask.config.set({"distributed.worker.multiprocessing-method": "forkserver"})
+    return distributed.LocalCluster(
+        n_workers=number,
         threads_per_worker=1,
-        processes=True,
-        asynchronous=True,
         dashboard_address=":0",
         protocol="tcp://",
         silence_logs=50,
+        **more,
     )
-    async with made, distributed.Client(made.scheduler_address, asynchronous=True) as client:
+
+
+@asynccontextmanager
+async def cluster(number: int = 2) -> AsyncIterator[Any]:
+    from distributed import Client
+
+    made = machines(number, asynchronous=True)
+    async with made, Client(made.scheduler_address, asynchronous=True) as client:
         await client.run(load_nothing)
         yield made
 
@@ -171,6 +183,8 @@ def test_machine_that_does_not_answer_keeps_nobody(tmp_path: Path) -> None:
 @pytest.mark.long
 @pytest.mark.filterwarnings("ignore")
 def test_lost_scheduler_fails_its_job_and_is_found_again(tmp_path: Path) -> None:
+    from distributed import Nanny, Scheduler
+
     from hexwrap_server.errors import ClusterError
     from hexwrap_server.jobs.dask_engine import DaskEngine
 
@@ -188,8 +202,8 @@ def test_lost_scheduler_fails_its_job_and_is_found_again(tmp_path: Path) -> None
             with pytest.raises(ClusterError, match="no machines"):
                 await call(e, "echo", 1)
             async with (
-                distributed.Scheduler(port=port, dashboard_address=":0"),
-                distributed.Nanny(f"tcp://127.0.0.1:{port}", nthreads=1),
+                Scheduler(port=port, dashboard_address=":0"),
+                Nanny(f"tcp://127.0.0.1:{port}", nthreads=1),
             ):
                 deadline = time.monotonic() + PATIENCE
                 while not e.is_ready:
@@ -207,9 +221,7 @@ def test_job_whose_machine_is_killed_fails_alone(tmp_path: Path) -> None:
     """As the job whose worker process is killed on one machine."""
     gate = tmp_path / "gate"
     with (
-        distributed.LocalCluster(
-            n_workers=2, threads_per_worker=1, dashboard_address=":0", protocol="tcp://", silence_logs=50
-        ) as made,
+        machines(2) as made,
         running(tmp_path / "data", held_by(gate, made.scheduler_address)) as client,
     ):
         bodies = [request(surface=tube(60, 20, height=10 + i)) for i in range(2)]
@@ -233,9 +245,7 @@ def one_machine() -> Iterator[str]:
     """The address of a cluster that nobody kills."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        with distributed.LocalCluster(
-            n_workers=1, threads_per_worker=1, dashboard_address=":0", protocol="tcp://", silence_logs=50
-        ) as made:
+        with machines(1) as made:
             yield made.scheduler_address
 
 
@@ -264,9 +274,7 @@ def test_jobs_run_on_a_cluster(tmp_path: Path, one_machine: str) -> None:
 @pytest.mark.filterwarnings("ignore")
 def test_jobs_wait_for_the_first_machine(tmp_path: Path) -> None:
     with (
-        distributed.LocalCluster(
-            n_workers=0, threads_per_worker=1, dashboard_address=":0", protocol="tcp://", silence_logs=50
-        ) as made,
+        machines(0) as made,
         running(tmp_path, engine="dask", scheduler=made.scheduler_address) as client,
     ):
         id = client.post("/v1/jobs", json=request()).json()["id"]

@@ -9,15 +9,7 @@ from typing import Any
 
 import httpx
 import pytest
-import schemathesis
 from hypothesis import HealthCheck, given, settings
-from schemathesis.checks import not_a_server_error
-from schemathesis.core.failures import Failure, FailureGroup
-from schemathesis.specs.openapi.checks import (
-    content_type_conformance,
-    response_schema_conformance,
-    status_code_conformance,
-)
 
 from hexwrap_server.http.docs import DocumentedApp
 from hexwrap_server.http.openapi import OPERATIONS
@@ -27,12 +19,6 @@ from tests.server.bodies import request
 from tests.server.live import Live, running
 from tests.server.patience import PATIENCE
 
-CHECKS = [
-    not_a_server_error,
-    status_code_conformance,
-    content_type_conformance,
-    response_schema_conformance,
-]
 ordinary = settings(max_examples=8, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 thorough = settings(max_examples=500, deadline=None, suppress_health_check=list(HealthCheck))
 
@@ -45,13 +31,19 @@ def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Live]:
         yield live
 
 
+def read_by_schemathesis(document: dict[str, Any]) -> Any:
+    import schemathesis  # here: only the process that runs these tests has to spend its seconds
+
+    return schemathesis.openapi.from_dict(document)
+
+
 @cache
 def operations() -> dict[str, Any]:
     """Every route of the application, by method and path."""
     app = DocumentedApp()
     app.include_router(router)
     app.include_router(viewer)
-    read = schemathesis.openapi.from_dict(app.openapi()).get_all_operations()
+    read = read_by_schemathesis(app.openapi()).get_all_operations()
     return {operation.ok().label: operation.ok() for operation in read}
 
 
@@ -78,7 +70,7 @@ def test_documentation_is_served(client: Live) -> None:
 
 def described(client: Live, path: str, method: str) -> Any:
     """The operation in the document, which can tell whether an answer is one of those announced."""
-    return schemathesis.openapi.from_dict(client.get("/openapi.json").json())[path][method]
+    return read_by_schemathesis(client.get("/openapi.json").json())[path][method]
 
 
 @pytest.mark.parametrize(
@@ -115,6 +107,8 @@ def test_results_are_as_described(client: Live, changes: dict[str, Any], include
     ],
 )
 def test_other_results_are_not_as_described(client: Live, part: str, name: str, value: object) -> None:
+    from schemathesis.core.failures import Failure, FailureGroup
+
     operation = described(client, "/v1/solve", "POST")
     answer = client.post("/v1/solve", json=request())
     headers = {"Content-Type": "application/json"}
@@ -128,10 +122,20 @@ def test_other_results_are_not_as_described(client: Live, part: str, name: str, 
 
 
 def attack(client: Live, operation: Any, how: settings) -> None:
+    from schemathesis.checks import not_a_server_error
+    from schemathesis.specs.openapi import checks
+
+    announced = [
+        not_a_server_error,
+        checks.status_code_conformance,
+        checks.content_type_conformance,
+        checks.response_schema_conformance,
+    ]
+
     @how
     @given(case=operation.as_strategy())
     def answers(case: Any) -> None:
-        case.call_and_validate(base_url=str(client.base_url), checks=CHECKS, timeout=PATIENCE)
+        case.call_and_validate(base_url=str(client.base_url), checks=announced, timeout=PATIENCE)
 
     answers()
 

@@ -42,9 +42,7 @@ def print_summary(console: Console, name: str, result: dict[str, Any]) -> None:
     if result["panels"] is not None:
         console.print(_sizes(result["sizes"]))
         if result["quality"]["trade_off"]:
-            console.print(
-                _trade_off(result["quality"]["trade_off"], sum(not size["fold"] for size in result["sizes"]))
-            )
+            console.print(_trade_off(result["quality"]["trade_off"]))
     if result["quality"].get("singularity_curve"):
         console.print(_curve(result["quality"]["singularity_curve"]))
     for note in (*result["mesh"]["repairs"], *result["quality"]["notes"]):
@@ -114,8 +112,9 @@ def _quality(result: dict[str, Any]) -> Rows:
             yield "kinks", f"at most {angle(found['kink']['max'])}"
 
 
-def _trade_off(curve: dict[str, Any], taken: int) -> Table:
+def _trade_off(curve: dict[str, Any]) -> Table:
     """What fewer or more sizes would leave open."""
+    taken = curve["taken"]
     table = _chart("sizes", "uncovered", "mean joint", "worst joint")
     most = max(max(curve["uncovered"]), 1e-12)
     for i, sizes in enumerate(curve["sizes"]):

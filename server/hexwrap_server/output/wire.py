@@ -198,7 +198,7 @@ def quality(solution: Solution) -> dict[str, Any]:
         "convex": summary(measured.convex, "mean")["mean"],
         "not_convex": 0 if measured.convex is None else int(np.sum(~measured.convex)),
         "movement": measured.movement,
-        "trade_off": curve and fields(curve, "sizes uncovered worst_gap joint_mean joint_max"),
+        "trade_off": curve and fields(curve, "sizes uncovered worst_gap joint_mean joint_max taken"),
         "singularity_curve": measured.singularities and choices(measured.singularities),
         "notes": notes(solution),
     }
