@@ -98,8 +98,8 @@ def lay_pattern(cmap: ConformalMap, settings: PatternSettings, progress: Progres
             )
     if not pattern.distortion < FOLDED:
         notes.append(
-            "The pattern is bent so much that triangles of the surface turn over in it; smaller cells are bent "
-            "less."
+            "The pattern is bent so much that triangles of the surface turn over in it; smaller cells are "
+            "bent less."
         )
         pattern = replace(pattern, distortion=FOLDED)
     return replace(pattern, notes=(*notes, *pattern.notes))
