@@ -17,13 +17,13 @@ from hexwrap_server.errors import (
     BusyError,
     FormError,
     GoneError,
-    HttpError,
     InternalError,
     ShuttingDownError,
     StorageError,
     TimeLimitError,
     WorkerDiedError,
     not_found,
+    refusal,
 )
 from hexwrap_server.http.metrics import Metrics
 from hexwrap_server.input.requests import CacheSettings, Exploration, Order, Outcome, ParsedRequest, Wanted
@@ -177,12 +177,9 @@ class JobManager:
             raise FormError.at("/surface/id", "no such surface is kept here; send it to /v1/surfaces again")
         item = self._items.get(identity)
         if item is None and sum(bool(one.jobs) for one in self._queue.values()) >= self._settings.max_queue:
-            raise HttpError(
-                503,
+            raise refusal(
                 "queue-full",
-                "The queue is full",
                 f"{len(self._queue)} jobs are waiting, the limit of this server; try again in a few seconds.",
-                {"Retry-After": "5"},
             )
         if item is not None and any(other.status == "running" for other in item.jobs.values()):
             job = replace(job, status="running", started=job.created)

@@ -83,6 +83,7 @@ def quantize(fitted: FittedPanels, settings: PanelSettings, curve: TradeOff | No
     may be.
     """
     regular = fitted.regular
+    curve = curve or trade_off(fitted, settings)
     smallest = settings.edge_range[0] if settings.edge_range else 0.0
     choices, limits = _limits(fitted, settings)
     said: tuple[str, ...] = ()
@@ -121,7 +122,7 @@ def quantize(fitted: FittedPanels, settings: PanelSettings, curve: TradeOff | No
         class_length=np.concatenate([class_length, edge_length[alone]]),
         class_count=np.concatenate([class_count, np.ones(len(alone), dtype=np.int64)]).astype(np.int64),
         class_sides=np.concatenate([_sides(fitted)[class_kind], polygons.lengths[alone]]).astype(np.int64),
-        trade_off=curve or trade_off(fitted, settings),
+        trade_off=curve and replace(curve, taken=_most(class_kind, fitted.pieces)),
         energy=fitted.energy,
         notes=(
             *fitted.notes,
@@ -134,6 +135,11 @@ def quantize(fitted: FittedPanels, settings: PanelSettings, curve: TradeOff | No
         n_special=len(alone) + int((class_kind >= fitted.pieces).sum()),
         bends=fitted.bends,
     )
+
+
+def _most(class_kind: Ints, kinds: int) -> int:
+    """Classes of the kind that has most. kinds: those of whole cells come first."""
+    return int(np.bincount(class_kind[class_kind < kinds]).max(initial=0))
 
 
 def _limits(fitted: FittedPanels, settings: PanelSettings) -> tuple[list[FittedPanels], list[Floats]]:
