@@ -30,8 +30,8 @@ from hexwrap_solver.surface.types import Origin, Surface, SurfaceSettings
 #: Finished solutions that a worker keeps for lift, flatten and files.
 KEPT_SOLUTIONS = 4
 #: The stages on which parts of the Result depend that are often the same as before, the last of each that
-#: was run; ``map`` says where cells are drawn.
-DEPENDS = {"mesh": ("map",), "map": ("map", "pattern"), "pattern": ("pattern",)}
+#: was run.
+DEPENDS = {"mesh": ("map",), "map": ("map",), "pattern": ("pattern",)}
 
 
 def solve(report: Report, order: Order, caching: CacheSettings) -> Outcome:
@@ -61,11 +61,23 @@ def outcome_of(order: Order, result: bytes, kept: Sequence[bytes | memoryview]) 
 def packed_result(solution: pipeline.Solution, runner: CachingRunner) -> bytes:
     """The whole Result, see ``output.packed``."""
 
+    panels = solution.panels
+
     def made(name: str) -> Packed:
+        if name == "panels" and panels is not None:
+            lies = f"panels {codec.digest(panels.limit, panels.center)}"
+            end = Packed.of(b"," + wire.dump(wire.sized(solution))[1:])
+            return Packed.joined([runner.remembered(lies, ("fit",), placed), end])
         return packed_part(name, wire.dump(wire.part(solution, name, runner.timings)))
 
+    def placed() -> Packed:
+        return packed_part("panels", wire.dump(wire.placed(solution))[:-1])
+
+    depends: dict[str, tuple[str, ...]] = dict(DEPENDS)
+    if runner.remembered("overlaps itself", ("map",), lambda: wire.drawn_apart(solution) is not None):
+        depends["map"] = ("map", "pattern")  # where its cells are drawn
     return document(
-        {name: runner.remembered(name, DEPENDS.get(name, ()), partial(made, name)) for name in wire.PARTS}
+        {name: runner.remembered(name, depends.get(name, ()), partial(made, name)) for name in wire.PARTS}
     )
 
 
