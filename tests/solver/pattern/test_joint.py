@@ -21,7 +21,6 @@ from hexwrap_solver.pattern.types import Pattern, PatternSettings
 from hexwrap_solver.surface.topology import next_half_edge
 from hexwrap_solver.surface.types import Surface
 from tests.solver.conformal.nets import CENTRES, SPHERE, sent, spread_points
-from tests.solver.pattern import annuli
 from tests.solver.pattern.nets import QUANTUM
 from tests.solver.pattern.test_nets import check_theorems, places_of_cells
 
@@ -133,30 +132,3 @@ def test_no_other_rounding_changes_the_domain_less(loops: int, index: tuple[int,
             others = x + rng.integers(-2, 3, (2000, steps.shape[1])) @ steps.T
             off: Floats = others - joint.target(np.array([A]))
             assert np.einsum("ki,ij,kj->k", off, joint.form, off).min() >= least - 1e-9
-
-
-@pytest.mark.parametrize("kind", ["hex", "quad", "trihexagonal"])
-def test_one_translation_is_rounded_to_the_nearest(kind: str) -> None:
-    """Why tubes need no search: the energy is the same in all directions."""
-    lattice = LATTICES[kind]  # type: ignore[index]
-    tube = annuli.revolution(np.cosh, np.linspace(-1, 1, 9), 24, turn=0.7 + 0.4j)
-    joint = Joint.of(tube, lattice, holonomy_of(tube, lattice, tube.net))
-    unit = np.array([1, lattice.unit])
-    assert joint.form / joint.form[0, 0] == pytest.approx((unit.conj()[:, None] * unit).real, abs=1e-9)
-    for factor in (np.geomspace(0.1, 10, 7) * np.exp(1j * np.arange(7))).tolist():
-        rows = joint.rows(joint.nearest(0, factor)[0])
-        assert (rows[1, 1:3] == lattice.translation_near(factor * tube.deck.translation)).all()
-
-
-@pytest.mark.parametrize(
-    ("angle", "kind"), [(np.pi, "hex"), (np.pi / 3, "trihexagonal"), (np.pi / 2, "quad")]
-)
-def test_no_translation_of_one_rotation_costs_anything(angle: float, kind: str) -> None:
-    """Why cones need no search: the origin makes up for it."""
-    lattice = LATTICES[kind]  # type: ignore[index]
-    tube = annuli.revolution(np.cosh, np.linspace(-1, 1, 7), 24)
-    form, other = (
-        abs(Joint.of(cmap, lattice, holonomy_of(cmap, lattice, cmap.net)).form).max()
-        for cmap in (annuli.flat_cone(angle, 1.0, 2.0, 24, 6), tube)
-    )
-    assert form < 1e-6 * other

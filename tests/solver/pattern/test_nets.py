@@ -15,13 +15,14 @@ import pytest
 from hexwrap_solver.arrays import Ragged
 from hexwrap_solver.conformal import conformal_map
 from hexwrap_solver.conformal.net import Net
-from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap
+from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap, Deck
 from hexwrap_solver.domain import flatten, lift
 from hexwrap_solver.errors import NotAdaptedError
 from hexwrap_solver.geometry import face_normals, normalize
 from hexwrap_solver.pattern import lay_pattern
 from hexwrap_solver.pattern.lattice import LATTICES
 from hexwrap_solver.pattern.place.choose import place_lattice
+from hexwrap_solver.pattern.place.net import place_on_net
 from hexwrap_solver.pattern.place.placement import edge_angle
 from hexwrap_solver.pattern.place.polygons import Polygons
 from hexwrap_solver.pattern.place.rows import rows_along
@@ -230,14 +231,35 @@ def test_nothing_depends_on_the_numbering_of_faces(case):
     assert away.min(axis=1).max() < 1e-5 * one.edge_length
 
 
-def test_an_annulus_as_a_net_has_the_same_cells():
-    """Nothing of cells depends on sheets: only labels do."""
-    cmap = annuli.flat_cone(np.pi / 3, 1.0, 3.0, 36, 12)
-    net = cmap.net
-    other = replace(cmap, domain=replace(net, winding=None))
-    one, two = (lay_pattern(c, PatternSettings(edge_length=0.12, align="none")) for c in (cmap, other))
-    assert abs(one.n_cells - two.n_cells) < 0.1 * one.n_cells
-    assert euler(two) == 0
+def spiral() -> ConformalMap:
+    """A flat ring that does not quite close."""
+    cmap = annuli.flat_cone(2 * np.pi, 1.0, 3.0, 48, 10)
+    step = 0.5 + 0.3j
+    uv = cmap.uv + step * np.tile(np.arange(48) / 48, 11)
+    return cmap.with_domain(uv=uv, deck=Deck(2 * np.pi, step))
+
+
+SHEETS = {
+    "cone": lambda: annuli.flat_cone(np.pi, 1.0, 2.0, 48, 10),
+    "saddle": lambda: annuli.flat_cone(-np.pi, 1.0, 2.0, 48, 10, cut=5),
+    "ring": spiral,
+    "tube": lambda: annuli.revolution(np.cosh, np.linspace(-1, 1, 15), 40, cut=3, turn=0.7 + 0.4j),
+}
+
+
+@pytest.mark.parametrize("kind", ["hex", "quad", "trihexagonal"])
+@pytest.mark.parametrize("case", SHEETS)
+def test_on_one_generator_the_search_of_nets_finds_what_is_solved_for(case, kind):
+    """The same lattice up to its symmetries, and as little distortion."""
+    cmap, lattice = SHEETS[case](), LATTICES[kind]
+    asked = PatternSettings(kind=kind, around=48, align="none")
+    solved, searched = place_lattice(cmap, lattice, asked), place_on_net(cmap, lattice, asked)
+    p, q = (found.glued.corners(cmap.surface.faces, found.place) for found in (solved, searched))
+    turn = (q[:, 1] - q[:, 0]) / (p[:, 1] - p[:, 0])
+    np.testing.assert_allclose(turn**lattice.fold, 1, atol=1e-9)
+    apart = q - turn[:, None] * p
+    np.testing.assert_allclose([lattice.without_translations(z) for z in apart.ravel()], 0, atol=1e-9)
+    assert searched.distortion == pytest.approx(solved.distortion, abs=1e-9)
 
 
 @pytest.mark.parametrize("case", ["dome", "pentagon", "opening", "closed"])

@@ -37,7 +37,7 @@ class Placement:
     glued: how the corners of the faces follow. isometries: (t, 4) what the motions of the net are on the
     lattice. rotation: angle from the boundary direction to an edge. around: cells once around (middle ring on
     cones, longest loop on nets). distortion: worst ratio of singular values − 1 of the stretch. step: around
-    is one of its multiples. motion: on annuli, what g is. straight: features that lie on lattice lines.
+    is one of its multiples. motion: on sheets, what g is. straight: features that lie on lattice lines.
     """
 
     place: Complexes
@@ -52,7 +52,7 @@ class Placement:
     straight: frozenset[int] = frozenset()
 
     @classmethod
-    def on_annulus(
+    def on_sheet(
         cls,
         cmap: ConformalMap,
         place: Complexes,

@@ -104,7 +104,7 @@ def laid(
             system = System(cmap, glued, nowhere.astype(complex))
             place, distortion = deform(system, glued, factor, place, nowhere)
     around = cells_around(cmap, motion, abs(factor), target.width)
-    return Placement.on_annulus(cmap, place, motion, target.rotation(factor), around, distortion, notes, step)
+    return Placement.on_sheet(cmap, place, motion, target.rotation(factor), around, distortion, notes, step)
 
 
 def as_sheet(cmap: ConformalMap) -> ConformalMap:
