@@ -52,7 +52,7 @@ def part(solution: Solution, name: str, timings: dict[str, float]) -> Any:
         case "pattern":
             return solution.pattern and pattern(solution.pattern)
         case "panels":
-            return panels(solution)
+            return solution.panels and placed(solution) | sized(solution)
         case "sizes":
             return sizes(solution.panels)
         case "quality":
@@ -132,15 +132,26 @@ def pattern(laid: Pattern) -> dict[str, Any]:
     }
 
 
-def panels(solution: Solution) -> dict[str, Any] | None:
-    made, laid, measured = solution.panels, solution.pattern, solution.quality
-    if made is None or laid is None:
-        return None
+def placed(solution: Solution) -> dict[str, Any]:
+    """Of the panels, what depends on nothing else than the pattern, where they lie, and their limits."""
+    made, laid = solution.panels, solution.pattern
+    assert made is not None
+    assert laid is not None
     labels = laid.labels()
     return {
-        **fields(made, "mode polygons face"),
+        **fields(made, "mode face"),
         "label": [labels[i] for i in made.face.tolist()],
-        **fields(made, "size edge_length limit center normal whole outside"),
+        **fields(made, "limit center normal whole"),
+    }
+
+
+def sized(solution: Solution) -> dict[str, Any]:
+    """The rest, which their lengths change."""
+    made, laid, measured = solution.panels, solution.pattern, solution.quality
+    assert made is not None
+    assert laid is not None
+    return {
+        **fields(made, "polygons size edge_length outside"),
         **fields(measured, "planarity edge_deviation angle_deviation surface_distance"),
         "gap_tangential": _widest(measured.gap_tangential, laid.neighbours, made),
         "gap_normal": _widest(measured.gap_normal, laid.neighbours, made),
