@@ -118,7 +118,7 @@ def flatten(report: Report, body: Body, settings: Settings, path: str) -> bytes:
 
 
 def _unrolled(path: str) -> ConformalMap:
-    """The map of the solution; on a net that overlaps itself as it is drawn: there each place is one point."""
+    """The map of the solution; a net that overlaps itself as it is drawn, so that each place is one point."""
     cmap = solution_at(path).map
     return drawn(cmap)[0] if cmap.kind == "net" else cmap
 
