@@ -8,9 +8,9 @@ field is a fault; what the model has accepted becomes the dataclass again.
 from __future__ import annotations
 
 import types
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import MISSING, Field, dataclass, fields, is_dataclass, replace
-from functools import cache
+from functools import cache, partial
 from math import inf, nextafter
 from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
@@ -84,7 +84,7 @@ class Leaf:
     def entry(self) -> tuple[str | None, str, str]:
         """Of the entries of such a list: the field that numbers their place, if any; the one that gives it by
         a point or a line of points; and the one that says what is wanted there."""
-        hints = get_type_hints(self._row, include_extras=True)
+        hints = _hints(self._row)
         names = [f.name for f in fields(self._row) if f.default is None and int in _parts(hints[f.name])]
         number, points = next(iter(names), None), "line" if "line" in hints else "point"
         return number, points, next(name for name in hints if name not in (number, points))
@@ -113,6 +113,10 @@ def document(settings: Any) -> dict[str, Any]:
     return written
 
 
+#: The types of a dataclass's fields. Not to be written to.
+_hints: Callable[[type], dict[str, Any]] = cache(partial(get_type_hints, include_extras=True))
+
+
 @cache
 def schema(kind: type) -> dict[str, Any]:
     """JSON Schema of the settings, with its definitions inside."""
@@ -122,7 +126,7 @@ def schema(kind: type) -> dict[str, Any]:
 @cache
 def model_of(kind: type) -> type[BaseModel]:
     """The model that accepts these settings."""
-    hints = get_type_hints(kind, include_extras=True)
+    hints = _hints(kind)
     members: dict[str, Any] = {}
     for f in _open_fields(kind):
         setting = setting_of(hints[f.name])
@@ -141,7 +145,7 @@ def model_of(kind: type) -> type[BaseModel]:
 
 def leaves(kind: type, root: Path = ()) -> Iterator[Leaf]:
     """The settings that are not sections themselves, in order."""
-    hints = get_type_hints(kind, include_extras=True)
+    hints = _hints(kind)
     for f in _open_fields(kind):
         path = (*root, f.name)
         section = next((part for part in _parts(hints[f.name]) if is_dataclass(part)), None)
@@ -155,7 +159,7 @@ def leaves(kind: type, root: Path = ()) -> Iterator[Leaf]:
 
 def values(settings: Any, root: tuple[str | int, ...] = ()) -> Iterator[tuple[str, Setting, Any]]:
     """JSON pointer, annotation and value of every setting, entries of lists included."""
-    hints = get_type_hints(type(settings), include_extras=True)
+    hints = _hints(type(settings))
     for f in _open_fields(type(settings)):
         value, path = getattr(settings, f.name), (*root, f.name)
         rows = enumerate(value) if isinstance(value, tuple) else ()
@@ -170,7 +174,7 @@ def values(settings: Any, root: tuple[str | int, ...] = ()) -> Iterator[tuple[st
 
 def is_nullable(kind: type, name: str) -> bool:
     """Whether a field may be null."""
-    return type(None) in _parts(get_type_hints(kind, include_extras=True)[name])
+    return type(None) in _parts(_hints(kind)[name])
 
 
 def setting_of(annotation: Any) -> Setting:
@@ -180,7 +184,7 @@ def setting_of(annotation: Any) -> Setting:
 
 def _open_fields(kind: type) -> list[Field[Any]]:
     """Those that a request may set."""
-    hints = get_type_hints(kind, include_extras=True)
+    hints = _hints(kind)
     return [f for f in fields(kind) if not setting_of(hints[f.name]).limit]
 
 
@@ -260,7 +264,7 @@ def _inlined(schema: dict[str, Any]) -> dict[str, Any]:
 def _in_radians(settings: T, factor: float = 1.0) -> T:
     """Angles in radians instead of the ``angle_unit`` beside or above them."""
     factor = ANGLE_UNITS[settings.angle_unit] if hasattr(settings, "angle_unit") else factor
-    hints = get_type_hints(type(settings), include_extras=True)
+    hints = _hints(type(settings))
     changes: dict[str, Any] = {}
     for f in _open_fields(type(settings)):
         value = getattr(settings, f.name)
@@ -276,7 +280,7 @@ def _in_radians(settings: T, factor: float = 1.0) -> T:
 def _document(settings: Any, factor: float, is_entry: bool) -> Any:
     """is_entry: of a list, where what is null is left out."""
     factor = ANGLE_UNITS[settings.angle_unit] if hasattr(settings, "angle_unit") else factor
-    hints = get_type_hints(type(settings), include_extras=True)
+    hints = _hints(type(settings))
     written: dict[str, Any] = {}
     for f in _open_fields(type(settings)):
         value = getattr(settings, f.name)
