@@ -17,16 +17,28 @@ def dot(a: Floats, b: Floats) -> Floats:
     return np.asarray(np.einsum("...d,...d->...", a, b))
 
 
+def lengths(vectors: Floats) -> Floats:
+    """(…,) of vectors (…, d)."""
+    return np.asarray(np.sqrt(dot(vectors, vectors)))
+
+
+def cross(a: Floats, b: Floats) -> Floats:
+    """(n, 3) vector products of vectors (n, 3); NumPy's own, of any shapes, takes half as long again."""
+    (x, y, z), (u, v, w) = a.T, b.T
+    product = np.empty((len(a), 3))
+    product[:, 0], product[:, 1], product[:, 2] = y * w - z * v, z * u - x * w, x * v - y * u
+    return product
+
+
 def normalize(vectors: Floats) -> Floats:
     """(…, d) vectors at length one, zero vectors kept."""
-    length = np.sqrt(dot(vectors, vectors))[..., None]
+    length = lengths(vectors)[..., None]
     return np.asarray(vectors / np.where(length > 0, length, 1.0))
 
 
 def angles_between(one: Floats, two: Floats) -> Floats:
     """(n,) angles between vectors (n, 3), 0 … π; small ones keep their digits, unlike those of arccos."""
-    sine = np.linalg.norm(np.cross(one, two), axis=1)
-    return np.asarray(np.arctan2(sine, dot(one, two)))
+    return np.asarray(np.arctan2(lengths(cross(one, two)), dot(one, two)))
 
 
 def cross_2d(a: Floats, b: Floats) -> Floats:
@@ -43,8 +55,8 @@ def plane_axes(normal: Floats) -> Floats:
     """(n, 2, 3) orthonormal, right-handed with the unit normals (n, 3)."""
     least = np.zeros_like(normal)
     least[np.arange(len(normal)), np.abs(normal).argmin(axis=1)] = 1.0
-    x = normalize(np.cross(normal, least))
-    return np.stack([x, np.cross(normal, x)], axis=1)
+    x = normalize(cross(normal, least))
+    return np.stack([x, cross(normal, x)], axis=1)
 
 
 def face_normals(vertices: Floats, faces: Ints) -> Floats:

@@ -125,14 +125,15 @@ def _solve(
             run("quality", None, lambda progress: replace(measure(cmap, None, None), singularities=choices)),
         )
     laid = run("pattern", pattern, lambda progress: lay_pattern(cmap, pattern, progress))
-    made, wanted = None, None
+    made, wanted, facing = None, None, None
     if panels is not None:
         # Three stages, so that a change of the size classes alone reuses the poses and limits.
         fitted = run("fit", FitKey.of(panels), lambda progress: fit_panels(cmap, laid, panels, progress))
         curve = run("trade-off", CurveKey.of(panels), lambda progress: trade_off(fitted, panels))
         made = run("panels", SizeKey.of(panels), lambda progress: quantize(fitted, panels, curve))
+        facing = fitted.facing
         wanted = panels.components or (ComponentSettings() if settings.support else None)
-    quality = run("quality", None, lambda progress: measure(cmap, laid, made, progress))
+    quality = run("quality", None, lambda progress: measure(cmap, laid, made, progress, facing))
     quality = replace(quality, notes=note + quality.notes)  # not in the stage, which any request may share
     quality = _with_choices(quality, cmap, laid, made, panels, choices, run)
     parts, frame = None, None

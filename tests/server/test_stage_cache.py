@@ -8,6 +8,7 @@ import os
 import time
 import zlib
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,13 +18,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
+from hexwrap_server import samples
 from hexwrap_server.errors import CodecError, StorageError
+from hexwrap_server.input.requests import SentSurface, Wanted
+from hexwrap_server.input.schemas import parse_request
 from hexwrap_server.jobs import codec
 from hexwrap_server.jobs.cache import SHARES, CachingRunner, StageCache, size_of
 from hexwrap_server.jobs.codec import decode, digest, encode
 from hexwrap_server.jobs.disk import prune, write_whole
+from hexwrap_server.jobs.work import packed_result, run_stages
 from hexwrap_solver.arrays import Ragged
 from hexwrap_solver.conformal.types import BoundaryCondition, Deck
+from hexwrap_solver.panels.types import PanelSettings
 from hexwrap_solver.pattern.types import PatternSettings
 from tests.server.analytic import cylinder
 
@@ -178,6 +184,26 @@ def test_a_stage_beside_the_others_is_kept_whatever_changes_between() -> None:
         run("panels", None, lambda progress: 1)
         found.append(run.found)
     assert found[1] == {"map": "memory", "pattern": "computed", "outlook": "memory", "panels": "computed"}
+
+
+def test_a_change_answers_to_the_byte_as_if_nothing_were_remembered() -> None:
+    request = parse_request(samples.load("box"), 10**6, 10**6)
+    assert isinstance(request.surface, SentSurface)
+    assert isinstance(request.wanted, Wanted)
+    kept = StageCache(None, 10**8)
+
+    def solved(cache: StageCache, around: int, sizes: int) -> tuple[bytes, bytes]:
+        assert isinstance(request.surface, SentSurface)
+        pattern = PatternSettings(around=around, boundary="trim")
+        wanted = replace(request.wanted, pattern=pattern, panels=PanelSettings(sizes=sizes))
+        run = CachingRunner(cache, lambda stage, fraction, what: None)
+        solution = run_stages(request.surface, wanted, run)
+        run.timings.clear()
+        return encode(solution), packed_result(solution, run)
+
+    for around, sizes in ((20, 5), (24, 5), (20, 7)):
+        answer = solved(kept, around, sizes)
+    assert answer == solved(StageCache(None, 0), 20, 7)
 
 
 def test_progress_never_goes_back() -> None:

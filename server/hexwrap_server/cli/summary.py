@@ -15,6 +15,8 @@ from hexwrap_server.output.text import angle, length, lengths
 MOST_SIZES = 24
 #: Numbers of sizes whose cost is shown, beside the number that was taken.
 SHOWN = (1, 2, 3, 5, 8, 11, 16, 24, 40)
+#: The distortion of a pattern in which a triangle of the surface turns over.
+FOLDED = 1e6
 #: Width of the longest bar of the chart, characters.
 BAR = 30
 Rows = Iterable[tuple[str, str]]
@@ -42,9 +44,7 @@ def print_summary(console: Console, name: str, result: dict[str, Any]) -> None:
     if result["panels"] is not None:
         console.print(_sizes(result["sizes"]))
         if result["quality"]["trade_off"]:
-            console.print(
-                _trade_off(result["quality"]["trade_off"], sum(not size["fold"] for size in result["sizes"]))
-            )
+            console.print(_trade_off(result["quality"]["trade_off"]))
     if result["quality"].get("singularity_curve"):
         console.print(_curve(result["quality"]["singularity_curve"]))
     for note in (*result["mesh"]["repairs"], *result["quality"]["notes"]):
@@ -74,7 +74,7 @@ def _pattern(found: dict[str, Any] | None) -> Rows:
     yield "around", str(found["around"])
     yield "rings", str(found["rings"])
     yield "edge", length(found["edge_length"])
-    yield "distortion", f"{found['distortion']:.2%}"
+    yield "distortion", "folds over" if found["distortion"] >= FOLDED else f"{found['distortion']:.2%}"
 
 
 def _panels(result: dict[str, Any]) -> Rows:
@@ -114,8 +114,9 @@ def _quality(result: dict[str, Any]) -> Rows:
             yield "kinks", f"at most {angle(found['kink']['max'])}"
 
 
-def _trade_off(curve: dict[str, Any], taken: int) -> Table:
+def _trade_off(curve: dict[str, Any]) -> Table:
     """What fewer or more sizes would leave open."""
+    taken = curve["taken"]
     table = _chart("sizes", "uncovered", "mean joint", "worst joint")
     most = max(max(curve["uncovered"]), 1e-12)
     for i, sizes in enumerate(curve["sizes"]):

@@ -8,19 +8,20 @@ when the process is killed at any moment.
 from __future__ import annotations
 
 import contextlib
-import gzip
 import json
 import logging
 import os
 import re
 import sqlite3
 import time
-import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Literal
+
+from isal import igzip
+from isal.igzip_lib import IsalError
 
 from hexwrap_server.errors import CodecError, DamagedError, FolderInUseError, StorageError
 from hexwrap_server.input.requests import Exploration, Outcome, Wanted
@@ -215,20 +216,12 @@ class Store:
             self._write("UPDATE works SET used = ? WHERE identity = ?", time.time(), identity)
         return work
 
-    def keep_outcome(self, identity: str, outcome: Outcome) -> bytes:
-        """Write the files of a result, if the worker did not; ``done`` comes after. The packed result.
-
-        Raises StorageError.
-        """
+    def keep_outcome(self, identity: str, outcome: Outcome) -> None:
+        """Write the files of a result, if the worker did not; ``done`` comes after. Raises StorageError."""
         if outcome.solution is not None:
             write_whole(self.solution_path(identity), [outcome.solution])
         if outcome.result is not None:
             write_whole(self.result_path(identity), [outcome.result])
-            return outcome.result
-        try:
-            return self.result_path(identity).read_bytes()
-        except OSError as error:
-            raise StorageError.of(error) from error
 
     def result(self, identity: str) -> bytes | None:
         """Reads a packed result; None where it is gone or damaged, and then it is forgotten."""
@@ -420,10 +413,9 @@ def _divided(
 def _is_packed(data: bytes) -> bool:
     """Whether gzip data is complete and its checksum right."""
     try:
-        gzip.decompress(data)
-    except (OSError, EOFError, zlib.error):
+        return bool(igzip.decompress(data))  # type: ignore[no-untyped-call]
+    except (OSError, EOFError, IsalError):  # type: ignore[misc]
         return False
-    return True
 
 
 def _locked(path: Path) -> sqlite3.Connection:

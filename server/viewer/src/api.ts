@@ -62,6 +62,8 @@ export interface TradeOff {
   sizes: number[];
   uncovered: number[];
   worst_gap: number[];
+  /** how many the panels have */
+  taken: number;
 }
 
 /** What numbers of singularities leave uncovered; at: where they would stand. */

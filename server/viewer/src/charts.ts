@@ -15,7 +15,8 @@ const W = 340;
 const H = 132;
 const PAD = { left: 40, right: 8, top: 10, bottom: 24 };
 
-export function histogram(sizes: NonNullable<Result["sizes"]>): SVGElement {
+/** regular: how many come first, in ascending order; those of singularities and pieces of cells follow. */
+export function histogram(sizes: NonNullable<Result["sizes"]>, regular: number): SVGElement {
   const root = svg("svg", { viewBox: `0 0 ${W} ${H}`, role: "img", "aria-label": "Panels per size" });
   const most = Math.max(...sizes.map((s) => s.count), 1);
   const width = (W - PAD.left - PAD.right) / sizes.length;
@@ -31,7 +32,7 @@ export function histogram(sizes: NonNullable<Result["sizes"]>): SVGElement {
     svg("line", { x1: PAD.left, x2: W - PAD.right, y1: H - PAD.bottom, y2: H - PAD.bottom, class: "axis" }),
     svg("text", { x: PAD.left - 5, y: PAD.top + 8, "text-anchor": "end" }, String(most)),
     svg("text", { x: PAD.left, y: H - 8 }, number(sizes[0].edge_length)),
-    svg("text", { x: W - PAD.right, y: H - 8, "text-anchor": "end" }, number(sizes[sizes.length - 1].edge_length)),
+    svg("text", { x: PAD.left + regular * width, y: H - 8, "text-anchor": "end" }, regular > 1 ? number(sizes[regular - 1].edge_length) : ""),
   );
   return root;
 }
@@ -83,7 +84,8 @@ function curveOf(choices: Choice[], label: string): SVGElement {
   return root;
 }
 
-export function tradeOff(curve: TradeOff, current: number | null, choose: (k: number) => void): SVGElement {
+export function tradeOff(curve: TradeOff, choose: (k: number) => void): SVGElement {
+  const current = curve.taken;
   const choices = curve.sizes.map((k, i): Choice => {
     const label = `${k} sizes: ${number(100 * curve.uncovered[i], 3)} % uncovered`;
     return {

@@ -451,9 +451,9 @@ function legendNodes(legend: Legend): Node[] {
 
 function drawCharts(): void {
   const { result } = state;
-  $("histogram").replaceChildren(...(result?.sizes?.length ? [histogram(result.sizes)] : []));
-  const sizes = result?.sizes?.length ?? null;
-  $("curve").replaceChildren(...(result?.quality.trade_off ? [tradeOff(result.quality.trade_off, sizes, chooseSizes)] : []));
+  const curve = result?.quality.trade_off;
+  $("histogram").replaceChildren(...(result?.sizes?.length ? [histogram(result.sizes, curve?.taken || result.sizes.length)] : []));
+  $("curve").replaceChildren(...(curve ? [tradeOff(curve, chooseSizes)] : []));
   drawSingularities();
 }
 

@@ -12,9 +12,10 @@ import numpy as np
 from hexwrap_solver.arrays import Complexes, Floats, Ints
 from hexwrap_solver.conformal.net import Net
 from hexwrap_solver.errors import SettingError
+from hexwrap_solver.geometry import dot
 from hexwrap_solver.setting import Setting
 from hexwrap_solver.surface.types import Surface
-from hexwrap_solver.tolerances import is_whole_turn, is_zero
+from hexwrap_solver.tolerances import TINY, is_whole_turn, is_zero
 
 AngleUnit = Literal["rad", "deg", "pi"]
 #: Radians of one unit.
@@ -360,3 +361,18 @@ class ConformalMap:
         corners = domain.corners.view() if isinstance(domain, Net) else domain.corners(self.surface.faces)
         corners.flags.writeable = False
         return corners
+
+    @cached_property
+    def stretch(self) -> Floats:
+        """(m,) ratio of the singular values of the map on each face. Not to be written to."""
+        corners = self.surface.vertices[self.surface.faces]
+        e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+        x = np.sqrt(dot(e1, e1))
+        # In the face's own plane e1 = (x, 0) and e2 = (a, h); the map's derivative is [w1 w2]·[e1 e2]⁻¹.
+        a, h = dot(e1, e2) / x, 2 * self.surface.areas / x
+        places = self.corners()
+        w1, w2 = places[:, 1] - places[:, 0], places[:, 2] - places[:, 0]
+        dx = w1 / x
+        dy = (w2 - a * dx) / h
+        conformal, anti = np.abs(dx - 1j * dy) / 2, np.abs(dx + 1j * dy) / 2
+        return np.asarray((conformal + anti) / np.maximum(np.abs(conformal - anti), TINY))

@@ -15,7 +15,6 @@ from hexwrap_solver.panels.best import Bound, jointly_largest
 from hexwrap_solver.panels.energy import NEAREST, functionals, minimise_watertight
 from hexwrap_solver.panels.facing import facing_edges
 from hexwrap_solver.panels.folds import AlongFolds, places_of
-from hexwrap_solver.panels.halfedges import HalfEdges, half_edges
 from hexwrap_solver.panels.planar import crossing_themselves
 from hexwrap_solver.panels.polygons import (
     best_plane_distances,
@@ -34,6 +33,7 @@ from hexwrap_solver.panels.regular import Poses, bending, corners, outline_areas
 from hexwrap_solver.panels.separation import Separation, separating_planes
 from hexwrap_solver.panels.trimmed import flatten_and_clear, plane_normals
 from hexwrap_solver.panels.types import Bends, FittedPanels, PanelSettings, Weights
+from hexwrap_solver.pattern.halfedges import HalfEdges
 from hexwrap_solver.pattern.lattice import LATTICES
 from hexwrap_solver.pattern.types import Pattern
 from hexwrap_solver.surface.curvature import saddle_share
@@ -182,7 +182,7 @@ def _fit_split(
     cells, n = pattern.cells, pattern.n_cells
     groups, energy, notes = _groups(surface, pattern, settings, progress)
     kinds, others = [g for g in groups if g.regular], [g for g in groups if not g.regular]
-    edges = half_edges(pattern)
+    edges = pattern.half_edges
     normal = plane_normals(cells)
     for group in groups:
         normal[group.face] = group.poses.normal

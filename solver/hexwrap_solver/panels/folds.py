@@ -19,13 +19,13 @@ import numpy as np
 
 from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints, Ragged
 from hexwrap_solver.geometry import dot, normalize
-from hexwrap_solver.panels.halfedges import HalfEdges
 from hexwrap_solver.panels.limits import inscribed
 from hexwrap_solver.panels.polygons import area_vectors, means, take_rows
 from hexwrap_solver.panels.regular import Poses, bending, copies
 from hexwrap_solver.panels.separation import Separation
 from hexwrap_solver.panels.tangents import surface_normals
 from hexwrap_solver.panels.types import Bends, Panels, PanelSettings
+from hexwrap_solver.pattern.halfedges import HalfEdges
 from hexwrap_solver.pattern.types import FoldPieces, Pattern
 from hexwrap_solver.surface.types import Surface
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexwrap_solver.arrays import Floats
-from hexwrap_solver.geometry import angles_between, dot
+from hexwrap_solver.geometry import dot
 from hexwrap_solver.panels.facing import Facing, edge_ends, widths
 from hexwrap_solver.panels.types import Panels
 
@@ -30,11 +30,10 @@ def gaps(facing: Facing, panels: Panels, n_half_edges: int) -> Gaps:
     """n_half_edges: of the pattern."""
     a, b = edge_ends(panels.polygons, facing.left, facing.start_left)
     c, d = edge_ends(panels.polygons, facing.right, facing.start_right)
-    n1, n2 = panels.normal[facing.left], panels.normal[facing.right]
     figures = (
         widths(panels.polygons, facing),
         np.abs(dot((c + d - a - b) / 2, facing.mean)),
-        angles_between(n1, n2),
+        facing.kink,
     )
     result = np.full((3, n_half_edges), np.nan)
     result[:, facing.here] = result[:, facing.there] = figures

@@ -65,26 +65,27 @@ def _lie_apart(
 ) -> Bools:
     """(k,) whether the shadows of the panels on the directions, made square to the mean of the normals, are
     apart."""
-    mean = normal[first] + normal[second]
+    mean = normal.take(first, axis=0) + normal.take(second, axis=0)
     flat = across - (dot(across, mean) / dot(mean, mean))[:, None] * mean
-    axis = normalize(flat).T
-    points = np.ascontiguousarray(polygons.values.T)
-    origin = points[:, polygons.offsets[first]]
+    axis = normalize(flat)
+    start = np.asarray(polygons.values.take(polygons.offsets[:-1], axis=0), dtype=np.float64)
+    spoke = np.ascontiguousarray((polygons.values - start.take(polygons.row, axis=0)).T)
+    along = np.ascontiguousarray(axis.T)
 
     def shadow(which: Ints) -> Floats:
         corner = _corners(polygons, which)
-        return np.asarray(sum((points[d].take(corner) - origin[d]) * axis[d] for d in range(3)))
+        return np.asarray(sum(spoke[d].take(corner) * along[d] for d in range(3)))
 
-    own, other = shadow(first), shadow(second)
-    return np.asarray((other.min(axis=0) >= own.max(axis=0) - slack) & flat.any(axis=1))
+    apart = dot(start.take(second, axis=0) - start.take(first, axis=0), axis)
+    ahead = apart + shadow(second).min(axis=0) >= shadow(first).max(axis=0) - slack
+    return np.asarray(ahead & flat.any(axis=1))
 
 
 def _corners(polygons: Ragged, which: Ints) -> Ints:
     """(most corners, k) places of the corners of each panel; the last again where there are fewer."""
-    most = int(polygons.lengths[which].max(initial=3))
-    return np.asarray(
-        polygons.offsets[which] + np.minimum(np.arange(most)[:, None], polygons.lengths[which] - 1)
-    )
+    last = polygons.lengths.take(which) - 1
+    corner = np.arange(int(last.max(initial=2)) + 1)[:, None]
+    return np.asarray(polygons.offsets.take(which) + np.minimum(corner, last))
 
 
 def _project(polygons: Ragged, which: Ints, origin: Floats, x: Floats, y: Floats) -> Floats:

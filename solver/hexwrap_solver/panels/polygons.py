@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged
-from hexwrap_solver.geometry import dot, normalize
+from hexwrap_solver.geometry import cross, dot, lengths, normalize
 
 #: Corners this near to a plane, relative to their distance from the middle, lie in it but for rounding.
 FLAT = 1e-12
@@ -42,8 +42,7 @@ def edge_vectors(polygons: Ragged) -> Floats:
 
 def edge_lengths(polygons: Ragged) -> Floats:
     """(·,) length of the edge from each corner to the next."""
-    edge = edge_vectors(polygons)
-    return np.asarray(np.sqrt(dot(edge, edge)))
+    return lengths(edge_vectors(polygons))
 
 
 def mean_edges(polygons: Ragged) -> Floats:
@@ -59,13 +58,13 @@ def _spokes(polygons: Ragged) -> Floats:
 def area_vectors(polygons: Ragged) -> Floats:
     """(q, 3) ½ Σ p_k × p_{k+1} about the mean: the area for flat polygons, along the normal."""
     spoke = _spokes(polygons)
-    return row_sums(np.cross(spoke, spoke.take(polygons.next(), axis=0)) / 2, polygons.offsets)
+    return row_sums(cross(spoke, spoke.take(polygons.next(), axis=0)) / 2, polygons.offsets)
 
 
 def fan_areas(polygons: Ragged) -> Floats:
     """(q,) area of the fan of triangles around the mean of the corners."""
     spoke = _spokes(polygons)
-    triangle = np.linalg.norm(np.cross(spoke, spoke.take(polygons.next(), axis=0)), axis=1) / 2
+    triangle = lengths(cross(spoke, spoke.take(polygons.next(), axis=0))) / 2
     return row_sums(triangle, polygons.offsets)
 
 
@@ -75,11 +74,10 @@ def interior_angles(polygons: Ragged, normal: Floats) -> Floats:
     back = np.empty_like(ahead)
     back[polygons.next()] = -ahead
     n = normal.take(polygons.row, axis=0)
-    turn = np.cross(ahead, back)
+    turn = cross(ahead, back)
     sine, cosine = dot(turn, n), dot(ahead, back)
     # The full length of the cross product, not its part along n, gives the angle of bent corners.
-    length = np.linalg.norm(turn, axis=1)
-    angle = np.arctan2(length, cosine)
+    angle = np.arctan2(lengths(turn), cosine)
     return np.asarray(np.where(sine >= 0, angle, 2 * np.pi - angle))
 
 
@@ -95,7 +93,7 @@ def best_plane_distances(polygons: Ragged) -> Floats:
     """
     row = polygons.row
     spoke = _spokes(polygons)
-    normal = normalize(row_sums(np.cross(spoke, spoke.take(polygons.next(), axis=0)), polygons.offsets))
+    normal = normalize(row_sums(cross(spoke, spoke.take(polygons.next(), axis=0)), polygons.offsets))
     distance = dot(spoke, normal.take(row, axis=0))
     reach = row_maxima(dot(spoke, spoke), polygons.offsets)
     bent = np.flatnonzero(

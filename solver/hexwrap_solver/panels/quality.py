@@ -8,13 +8,12 @@ import numpy as np
 
 from hexwrap_solver.arrays import Floats, Progress, no_progress
 from hexwrap_solver.conformal.types import ConformalMap
-from hexwrap_solver.geometry import dot
+from hexwrap_solver.geometry import cross
 from hexwrap_solver.panels.congruence import congruence_classes
 from hexwrap_solver.panels.facing import Facing, edge_ends, facing_edges
 from hexwrap_solver.panels.fewest import SLACK
 from hexwrap_solver.panels.folds import parts_by_cell
 from hexwrap_solver.panels.gaps import gaps
-from hexwrap_solver.panels.halfedges import HalfEdges, half_edges
 from hexwrap_solver.panels.overlap import overlapping_pairs
 from hexwrap_solver.panels.polygons import (
     best_plane_distances,
@@ -27,21 +26,28 @@ from hexwrap_solver.panels.polygons import (
     row_sums,
 )
 from hexwrap_solver.panels.types import Panels, Quality
+from hexwrap_solver.pattern.halfedges import HalfEdges
 from hexwrap_solver.pattern.lattice import LATTICES
 from hexwrap_solver.pattern.types import Pattern
 from hexwrap_solver.surface.orient import inward_note
 from hexwrap_solver.surface.types import Surface
-from hexwrap_solver.tolerances import TINY
 
 #: A smaller share of the surface without cells is not worth a note.
 BARE = 0.03
 
 
 def measure(
-    cmap: ConformalMap, pattern: Pattern | None, panels: Panels | None, progress: Progress = no_progress
+    cmap: ConformalMap,
+    pattern: Pattern | None,
+    panels: Panels | None,
+    progress: Progress = no_progress,
+    facing: Facing | None = None,
 ) -> Quality:
-    """Everything is measured on the finished geometry, nothing is taken over from how it was made."""
-    stretch, area = stretch_ratio(cmap)
+    """Everything is measured on the finished geometry, nothing is taken over from how it was made.
+
+    facing: edges of these panels, where it is known which face each other.
+    """
+    stretch, area = cmap.stretch, cmap.surface.areas
     quality = Quality(
         scale_ratio=float(np.exp(np.ptp(cmap.log_scale))),
         quasi_conformal_mean=float(np.average(stretch, weights=area)),
@@ -56,13 +62,14 @@ def measure(
     progress(0.1, "measuring panels")
     polygons, cell_area = panels.polygons, float(fan_areas(pattern.cells).sum())
     bare = max(1 - cell_area / float(area.sum()), 0.0)
-    edges = half_edges(pattern)
+    edges = pattern.half_edges
     parts, owner = parts_by_cell(panels)
-    facing = _facing(pattern, edges, parts)
-    between = gaps(facing, parts, len(edges.cell))
     angle = interior_angles(polygons, panels.normal)
     flat = parts is panels  # none is bent
+    if facing is None or not flat:
+        facing = _facing(pattern, edges, parts)
     part_angle = angle if flat else interior_angles(parts.polygons, parts.normal)
+    between = gaps(facing, parts, len(edges.cell))
     row, count, edge = polygons.row, polygons.lengths, edge_lengths(polygons)
     mean = row_sums(edge, polygons.offsets) / count
     ideal = _ideal_angles(pattern, panels, angle, (np.pi * (count - 2) / count)[row])
@@ -115,13 +122,13 @@ def _surface_distances(surface: Surface, pattern: Pattern, panels: Panels) -> Fl
     """(q,) of corners and centre: where a panel spans a ridge its middle stands farther off."""
     tree, polygons, n = surface.tree, panels.polygons, panels.n_panels
     points = np.concatenate([np.asarray(polygons.values, dtype=np.float64), panels.center])
-    row = np.concatenate([polygons.row, np.arange(n)])
-    start = pattern.faces.offsets[panels.face]
-    corner = np.arange(len(polygons.values)) - polygons.offsets[polygons.row]  # a trimmed panel may have more
-    corner = np.minimum(corner, pattern.faces.lengths[panels.face][polygons.row] - 1)
-    beside = pattern.triangle[pattern.faces.values[start[polygons.row] + corner].astype(np.int64)]
-    near = tree.walked(points, np.concatenate([beside, beside[polygons.offsets[:-1]]]), surface.twin)
-    return tree.farthest(points, row, n, near)
+    row = polygons.row
+    within = np.arange(len(row)) - polygons.offsets.take(row)  # a trimmed panel may have more
+    within = np.minimum(within, pattern.faces.lengths.take(panels.face).take(row) - 1)
+    corner = pattern.faces.values.take(pattern.faces.offsets.take(panels.face).take(row) + within)
+    beside = pattern.triangle.take(corner)
+    near = np.concatenate([beside, beside[polygons.offsets[:-1]]])
+    return tree.farthest(points, np.concatenate([row, np.arange(n)]), n, near, surface.twin)
 
 
 def _facing(pattern: Pattern, edges: HalfEdges, panels: Panels) -> Facing:
@@ -147,7 +154,7 @@ def _count_overlaps(facing: Facing, panels: Panels, mean_edge: Floats) -> int:
     polygons, normal = panels.polygons, panels.normal
     pairs = np.stack([facing.left, facing.right], axis=1)
     start, end = edge_ends(polygons, facing.left, facing.start_left)
-    outwards = np.cross(end - start, normal[facing.left] + normal[facing.right])
+    outwards = cross(end - start, facing.mean)
     found = np.sort(pairs[overlapping_pairs(polygons, normal, mean_edge, pairs, outwards)], axis=1)
     return len(np.unique(found, axis=0))
 
@@ -165,19 +172,3 @@ def _movement(pattern: Pattern, panels: Panels) -> float:
     if panels.mode == "split":
         return 0.0
     return float(np.linalg.norm(panels.polygons.values - pattern.cells.values, axis=1).max(initial=0.0))
-
-
-def stretch_ratio(cmap: ConformalMap) -> tuple[Floats, Floats]:
-    """(m,) ratio of the singular values of the map on each face, and the faces' areas on the surface."""
-    corners = cmap.surface.vertices[cmap.surface.faces]
-    e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    x = np.linalg.norm(e1, axis=1)
-    double_area = np.linalg.norm(np.cross(e1, e2), axis=1)
-    # In the face's own plane e1 = (x, 0) and e2 = (a, h); the map's derivative is [w1 w2]·[e1 e2]⁻¹.
-    a, h = dot(e1, e2) / x, double_area / x
-    places = cmap.corners()
-    w1, w2 = places[:, 1] - places[:, 0], places[:, 2] - places[:, 0]
-    dx = w1 / x
-    dy = (w2 - a * dx) / h
-    conformal, anti = np.abs(dx - 1j * dy) / 2, np.abs(dx + 1j * dy) / 2
-    return (conformal + anti) / np.maximum(np.abs(conformal - anti), TINY), double_area / 2

@@ -83,6 +83,7 @@ def quantize(fitted: FittedPanels, settings: PanelSettings, curve: TradeOff | No
     may be.
     """
     regular = fitted.regular
+    curve = curve or trade_off(fitted, settings)
     smallest = settings.edge_range[0] if settings.edge_range else 0.0
     choices, limits = _limits(fitted, settings)
     said: tuple[str, ...] = ()
@@ -121,7 +122,7 @@ def quantize(fitted: FittedPanels, settings: PanelSettings, curve: TradeOff | No
         class_length=np.concatenate([class_length, edge_length[alone]]),
         class_count=np.concatenate([class_count, np.ones(len(alone), dtype=np.int64)]).astype(np.int64),
         class_sides=np.concatenate([_sides(fitted)[class_kind], polygons.lengths[alone]]).astype(np.int64),
-        trade_off=curve or trade_off(fitted, settings),
+        trade_off=curve and replace(curve, taken=_most(class_kind, fitted.pieces)),
         energy=fitted.energy,
         notes=(
             *fitted.notes,
@@ -134,6 +135,11 @@ def quantize(fitted: FittedPanels, settings: PanelSettings, curve: TradeOff | No
         n_special=len(alone) + int((class_kind >= fitted.pieces).sum()),
         bends=fitted.bends,
     )
+
+
+def _most(class_kind: Ints, kinds: int) -> int:
+    """Classes of the kind that has most. kinds: those of whole cells come first."""
+    return int(np.bincount(class_kind[class_kind < kinds]).max(initial=0))
 
 
 def _limits(fitted: FittedPanels, settings: PanelSettings) -> tuple[list[FittedPanels], list[Floats]]:
@@ -301,18 +307,18 @@ def _curve(fitted: FittedPanels, allowed: Floats, settings: PanelSettings) -> Fl
         kinds.append((own, made.start, floored))
     joints = None if fitted.facing is None else _joints(fitted)
     own_width = np.zeros(0) if joints is None else joints.width(allowed)
-    # The last: of panels with a given shape, which lose nothing.
-    lost, shrink = np.zeros(len(allowed) + 1), np.append(inradius, 0.0)
+    # The first: of panels with a given shape, which lose nothing.
+    shrunk = np.zeros(len(allowed) + 1)
     length = np.zeros_like(allowed)
     curve = []
     for k in range(max(len(start) for _, start, _ in kinds)):
         for own, start, floored in kinds:
             length[own] = lengths_of(start[min(k, len(start) - 1)], floored)
         uncovered = 1 - float(area @ length**2) / cell_area
-        lost[:-1] = allowed - length
+        shrunk[1:] = inradius * (allowed - length)
         joint = own_width
         if joints is not None:
-            joint = own_width + (shrink * lost)[joints.left] + (shrink * lost)[joints.right]
+            joint = own_width + shrunk.take(joints.left + 1) + shrunk.take(joints.right + 1)
         # A cell's inradius exceeds its panel's by half the gap between cells of the same size.
         widest = float(np.max(2 * inradius * (free_length - length)))
         curve.append((uncovered, widest, joint.mean() if len(joint) else 0.0, joint.max(initial=0.0)))

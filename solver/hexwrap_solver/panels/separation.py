@@ -14,7 +14,7 @@ import numpy as np
 
 from hexwrap_solver.arrays import Floats
 from hexwrap_solver.geometry import dot, normalize
-from hexwrap_solver.panels.halfedges import HalfEdges
+from hexwrap_solver.pattern.halfedges import HalfEdges
 from hexwrap_solver.pattern.types import Pattern
 
 

@@ -13,7 +13,6 @@ from scipy.sparse import csr_array
 from hexwrap_solver.arrays import Floats, Ints, Progress, no_progress
 from hexwrap_solver.geometry import angles_between, dot, normalize, plane_axes
 from hexwrap_solver.linalg.normal_matrix import NormalMatrix
-from hexwrap_solver.panels.halfedges import half_edges
 from hexwrap_solver.panels.types import Support
 from hexwrap_solver.pattern.types import Pattern
 
@@ -63,7 +62,7 @@ def support(pattern: Pattern, depth: float, progress: Progress = no_progress) ->
 
 def _edges(pattern: Pattern) -> Ints:
     """(e, 2) each edge of the pattern once."""
-    halves = half_edges(pattern)
+    halves = pattern.half_edges
     once = np.flatnonzero((halves.twin < 0) | (np.arange(len(halves.twin)) < halves.twin))
     return np.stack([halves.start[once], halves.end[once]], axis=1)
 

@@ -103,7 +103,8 @@ class TradeOff:
     sizes: (k,) numbers of classes 1…; uncovered: (k,) fraction of the cells' area left open;
     worst_gap: (k,) greatest mean gap of a panel to its cell, model units.
     joint_mean, joint_max: (k,) mean and greatest width of the joints between neighbours, model units, as they
-    would be were all facing edges parallel.
+    would be were all facing edges parallel. taken: how many the panels have, singularities and pieces of
+    cells apart; of patterns with several kinds of cells, of the kind that has most.
     """
 
     sizes: Ints
@@ -111,6 +112,7 @@ class TradeOff:
     worst_gap: Floats
     joint_mean: Floats
     joint_max: Floats
+    taken: int = 0
 
 
 @dataclass(frozen=True)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Annotated, Literal
 
 import numpy as np
 
 from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints, Ragged
 from hexwrap_solver.errors import SettingError
+from hexwrap_solver.pattern.halfedges import HalfEdges
 from hexwrap_solver.setting import Setting
 
 Kind = Literal[
@@ -130,8 +132,8 @@ class Pattern:
     loop 0 and place in the row; on nets around is the greatest number of cells in one.
     rotation: angle actually taken, radians, from the boundary direction (or the horizontal axis on cones).
     edge_length: mean edge length on the surface. distortion: worst singular-value ratio − 1 of the stretch
-    that ``align`` and features needed, 0 where none. features: what became of those of the surface. pieces:
-    cells cut along them, None where there are none.
+    that ``align`` and features needed, 0 where none, 10⁶ where a triangle turns over. features: what
+    became of those of the surface. pieces: cells cut along them, None where there are none.
     """
 
     kind: Kind
@@ -161,9 +163,14 @@ class Pattern:
     def n_cells(self) -> int:
         return self.faces.n_rows
 
-    @property
+    @cached_property
+    def half_edges(self) -> HalfEdges:
+        """The sides of the cells. Not to be written to."""
+        return HalfEdges.of(self.faces, len(self.vertices))
+
+    @cached_property
     def cells(self) -> Ragged:
-        """The corners of the cells on the surface."""
+        """The corners of the cells on the surface. Not to be written to."""
         return Ragged(self.vertices.take(self.faces.values.astype(np.int64), axis=0), self.faces.offsets)
 
     def labels(self) -> list[str]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from hexwrap_solver.arrays import Floats, Ints
@@ -22,6 +23,9 @@ LARGEST_GROUP = 8
 #: So many of these groups descend the upper half of the tree together, where boxes are large.
 BUNDLE = 16
 
+#: Triangles whose boxes are no further apart than this part of a usual one's extent are beside each other;
+#: which ones is remembered, for no more than MOST_PAIRS of them.
+MARGIN = 0.125
 #: A point walks over at most this many sides of triangles.
 MOST_STEPS = 12
 
@@ -44,6 +48,9 @@ SPREAD = (
 ROUNDINGS = 8
 
 
+_NO_PAIRS = np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+
+
 @dataclass(frozen=True)
 class Nearest:
     """face: (k,) a nearest triangle. barycentric: (k, 3) of the nearest point in it. distance: (k,)."""
@@ -51,6 +58,36 @@ class Nearest:
     face: Ints
     barycentric: Floats
     distance: Floats
+
+
+@dataclass(frozen=True)
+class _Beside:
+    """Leaves beside triangles. first, count: (m,) where those of each stand in leaf; first is −1 where they
+    were not asked for yet."""
+
+    first: Ints
+    count: Ints
+    leaf: NDArray[np.int32]
+
+    def pairs(self, face: Ints) -> tuple[Ints, Ints]:
+        """Which of the triangles (k,), and a leaf beside it."""
+        count = self.count.take(face)
+        one = np.repeat(np.arange(len(face)), count)
+        at = np.arange(len(one)) + np.repeat(self.first.take(face) - np.cumsum(count) + count, count)
+        return one, self.leaf.take(at).astype(np.int64)
+
+    def knowing(self, face: Ints, one: Ints, leaf: Ints) -> _Beside:
+        """With the pairs of further triangles (k,); without all others where there are too many."""
+        known = self if len(self.leaf) + len(leaf) <= MOST_PAIRS else _Beside.none(len(self.first))
+        first, count = known.first.copy(), known.count.copy()
+        count[face] = np.bincount(one, minlength=len(face))
+        first[face] = len(known.leaf) + np.cumsum(count[face]) - count[face]
+        added = leaf[np.argsort(one, kind="stable")].astype(np.int32)
+        return _Beside(first, count, np.concatenate([known.leaf, added]))
+
+    @classmethod
+    def none(cls, m: int) -> _Beside:
+        return cls(np.full(m, -1), np.zeros(m, dtype=np.int64), np.zeros(0, dtype=np.int32))
 
 
 @dataclass(frozen=True)
@@ -97,56 +134,87 @@ class TriangleTree:
         found.distance[far] = _length(gap)
         return found
 
-    def farthest(self, points: Floats, row: Ints, rows: int, near: Ints) -> Floats:
+    def farthest(self, points: Floats, row: Ints, rows: int, near: Ints, twin: Ints) -> Floats:
         """(rows,) the greatest distance from the mesh among the points of each row, exactly; 0 for none.
 
         points: (k, 3), finite. row: (k,) row of each. near: (k,) a triangle believed to be near each point.
-        Its distance bounds the point's own from above, so that most points need not be searched for.
+        The distance of the one to which the way from there leads bounds the point's own from above, so that
+        most points need not be searched for. twin: of half-edges, as ``Triangles.twin``.
         """
-        bound = self._distance(points, near)
+        near, bound = self._walked(points, near, twin)
         greatest = np.full(rows, -1.0)
         np.maximum.at(greatest, row, bound)
-        first = np.flatnonzero(bound == greatest[row])
+        first = np.flatnonzero(bound == greatest.take(row))
         greatest[:] = 0.0
         greatest[row[first]] = self._least_distance(points[first], near[first], bound[first])
-        rest = np.flatnonzero(bound > greatest[row])
+        rest = np.flatnonzero(bound > greatest.take(row))
         np.maximum.at(greatest, row[rest], self._least_distance(points[rest], near[rest], bound[rest]))
         return greatest
 
-    def walked(self, points: Floats, face: Ints, twin: Ints) -> Ints:
-        """(k,) triangles nearer to the points (k, 3), as a rule, than those given: while a point lies beyond
-        a side of its own, the one across. twin: of half-edges, as ``Triangles.twin``."""
+    def _walked(self, points: Floats, face: Ints, twin: Ints) -> tuple[Ints, Floats]:
+        """(k,) triangles nearer to the points (k, 3), as a rule, than those given, and the distances from
+        them: while a point lies beyond a side of its own, the one across is next."""
         face, left = face.copy(), np.arange(len(face))
+        placed = self._placed(points, face)
         for _ in range(MOST_STEPS):
-            here = face[left]
-            second, third, _ = self._placed(points[left], here)
+            second, third, _ = placed.take(left, axis=1)
             weight = np.stack([1 - second - third, second, third])
-            side = weight.argmin(axis=0)  # the half-edge from the next corner on lies opposite
-            across = np.where(weight.min(axis=0) < 0, twin[3 * here + (side + 1) % 3], -1)
+            beyond = np.flatnonzero(weight.min(axis=0) < 0)
+            left, side = left.take(beyond), weight.take(beyond, axis=1).argmin(axis=0)
+            # the half-edge from the next corner on lies opposite
+            across = twin.take(3 * face.take(left) + (side + 1) % 3)
             left, across = left[across >= 0], across[across >= 0]
             if not len(left):
                 break
             face[left] = across // 3
-        return face
+            placed[:, left] = self._placed(points.take(left, axis=0), face.take(left))
+        return face, self._distance(points, face, placed=placed)
 
     def _least_distance(self, points: Floats, near: Ints, bound: Floats) -> Floats:
         """(k,) distances from the mesh. bound: from the triangles near (k,); where these are not near, the
         search begins elsewhere."""
-        corners = self.corners[near]
+        corners = self.corners.take(near, axis=0)
         close = bound <= np.abs(corners[:, 1] - corners[:, 0]).max(axis=1)
         some, least = points[close], bound.copy()
         scale = np.maximum(np.abs(some).max(axis=1, initial=0.0), np.abs(self.corners).max())
         reach = bound[close] * (1 + RELATIVE) + ROUNDINGS * np.finfo(float).eps * scale
-        found = self._within(some, reach) if len(some) else None
+        found = self._around(some, near[close], reach) if len(some) else None
         if found is None:
             close[:] = False
         else:
             point, leaf = found
             there = least[close]
-            np.minimum.at(there, point, self._distance(some[point], self.order[leaf], there[point]))
+            distance = self._distance(some.take(point, axis=0), self.order.take(leaf), there.take(point))
+            np.minimum.at(there, point, distance)
             least[close] = there
         least[~close] = self.nearest(points[~close]).distance
         return least
+
+    def _around(self, points: Floats, near: Ints, reach: Floats) -> tuple[Ints, Ints] | None:
+        """The pairs of ``_within``, and others, of points within reach of the triangles near (k,)."""
+        beside, others = np.flatnonzero(reach <= self._margin), np.flatnonzero(reach > self._margin)
+        known: _Beside = self.__dict__.get("_beside", _Beside.none(len(self.corners)))
+        new = np.unique(near[beside][known.first.take(near[beside]) < 0])
+        low, high = (end(self.corners[new], axis=1).T for end in (np.min, np.max))
+        added = self._meeting(low - self._margin, high + self._margin) if len(new) else _NO_PAIRS
+        searched = self._within(points[others], reach[others]) if len(others) else _NO_PAIRS
+        if added is None or searched is None:
+            return None
+        if len(new):
+            known = known.knowing(new, *added)
+            self.__dict__["_beside"] = known  # as a cached property would be
+        point, leaf = known.pairs(near[beside])
+        place, reach = points[beside].T, reach[beside]
+        for axis in range(3):
+            at, far = place[axis].take(point), reach.take(point)
+            meets = self.low[-1][axis].take(leaf) - at <= far
+            meets &= at - self.high[-1][axis].take(leaf) <= far
+            point, leaf = point[meets], leaf[meets]
+        return np.concatenate([beside.take(point), others.take(searched[0])]), np.append(leaf, searched[1])
+
+    @cached_property
+    def _margin(self) -> float:
+        return MARGIN * float(np.median(np.ptp(self.corners, axis=1).max(axis=1)))
 
     @cached_property
     def _frames(self) -> Floats:
@@ -161,16 +229,20 @@ class TriangleTree:
 
     def _placed(self, points: Floats, face: Ints) -> Floats:
         """(3, k) barycentric coordinates for the second and third corner, and height above the triangle."""
-        return np.asarray(np.einsum("kij,kj->ik", self._frames[face], points - self.corners[face, 0]))
+        offset = points - self.corners[:, 0].take(face, axis=0)
+        return np.asarray(np.einsum("kij,kj->ik", self._frames.take(face, axis=0), offset))
 
-    def _distance(self, points: Floats, face: Ints, most: Floats | float = np.inf) -> Floats:
+    def _distance(
+        self, points: Floats, face: Ints, most: Floats | float = np.inf, placed: Floats | None = None
+    ) -> Floats:
         """(k,) distance of each point from a triangle of its own; where it is not below ``most``, only
-        something that is not, either."""
-        second, third, height = self._placed(points, face)
+        something that is not, either. placed: as ``_placed`` gives it, where it is known."""
+        second, third, height = self._placed(points, face) if placed is None else placed
         distance: Floats = np.abs(height)
         outside = ~((second >= 0) & (third >= 0) & (second + third <= 1)) & ~(distance >= most)
         outer = np.flatnonzero(outside)
-        distance[outer] = nearest_in_triangles(points[outer], self.corners[face[outer]])[1]
+        corners = self.corners.take(face.take(outer), axis=0)
+        distance[outer] = nearest_in_triangles(points.take(outer, axis=0), corners)[1]
         return distance
 
     def _moved_near(self, points: Floats) -> tuple[Ints, Floats]:
@@ -213,7 +285,7 @@ class TriangleTree:
         for i in range(0, len(face), COMPARED):
             part = slice(i, i + COMPARED)
             barycentric[part], distance[part] = nearest_in_triangles(
-                points[point[part]], self.corners[face[part]]
+                points.take(point[part], axis=0), self.corners.take(face[part], axis=0)
             )
         best = np.lexsort((face, distance, point))
         best = best[np.diff(point[best], prepend=-1) > 0]
@@ -221,20 +293,35 @@ class TriangleTree:
 
     def _within(self, points: Floats, reach: Floats) -> tuple[Ints, Ints] | None:
         """All pairs (point, leaf) whose box comes within reach of the point; None where several points have
-        too many.
-
-        Points that are neighbours along the curve descend the tree together, in one box.
-        """
-        together = min(LARGEST_GROUP, 1 + len(points) // len(self.order))
+        too many."""
         place = np.ascontiguousarray(points.T)
-        below, above = place - reach, place + reach
+        found = self._meeting(place - reach, place + reach)
+        if found is None:
+            return None
+        point, leaf = found
+        square = np.zeros(len(leaf))
+        for axis in range(3):
+            at = place[axis].take(point)
+            outside = np.maximum(self.low[-1][axis].take(leaf) - at, at - self.high[-1][axis].take(leaf))
+            square += np.maximum(outside, 0.0) ** 2
+        keep = np.sqrt(square) <= reach.take(point)
+        return point[keep], leaf[keep]
+
+    def _meeting(self, below: Floats, above: Floats) -> tuple[Ints, Ints] | None:
+        """All pairs of a box, (3, k) its ends, and a leaf that it meets, and others; None where several boxes
+        have too many.
+
+        Boxes that are neighbours along the curve descend the tree together, in one.
+        """
+        k = below.shape[1]
+        together = min(LARGEST_GROUP, 1 + k // len(self.order))
         bundle = BUNDLE if len(self.low) > 1 else 1
-        start = np.arange(0, len(points), together * bundle)
+        start = np.arange(0, k, together * bundle)
         low, high = np.minimum.reduceat(below, start, axis=1), np.maximum.reduceat(above, start, axis=1)
         group, node = np.arange(len(start)), np.zeros(len(start), dtype=np.int64)
         for level in range(1, len(self.low)):
             if level == max(1, len(self.low) // 2):
-                start = np.arange(0, len(points), together)
+                start = np.arange(0, k, together)
                 low = np.minimum.reduceat(below, start, axis=1)
                 high = np.maximum.reduceat(above, start, axis=1)
                 group = (BUNDLE * group[:, None] + np.arange(BUNDLE)).ravel()
@@ -244,21 +331,14 @@ class TriangleTree:
             node = np.repeat(2 * node, 2)
             node[1::2] += 1
             for axis in range(3):
-                meets = self.low[level][axis][node] <= high[axis][group]
-                meets &= self.high[level][axis][node] >= low[axis][group]
+                meets = self.low[level][axis].take(node) <= high[axis].take(group)
+                meets &= self.high[level][axis].take(node) >= low[axis].take(group)
                 group, node = group[meets], node[meets]
-            if len(group) * together > MOST_PAIRS and len(points) > 1:
+            if len(group) * together > MOST_PAIRS and k > 1:
                 return None
-        size = np.minimum(together, len(points) - start)[group]
-        point = np.repeat(start[group] - np.cumsum(size) + size, size) + np.arange(size.sum())
-        leaf = np.repeat(node, size)
-        square = np.zeros(len(leaf))
-        for axis in range(3):
-            at = place[axis][point]
-            outside = np.maximum(self.low[-1][axis][leaf] - at, at - self.high[-1][axis][leaf])
-            square += np.maximum(outside, 0.0) ** 2
-        keep = np.sqrt(square) <= reach[point]
-        return point[keep], leaf[keep]
+        size = np.minimum(together, k - start)[group]
+        box = np.repeat(start[group] - np.cumsum(size) + size, size) + np.arange(size.sum())
+        return box, np.repeat(node, size)
 
 
 def nearest_in_triangles(points: Floats, corners: Floats) -> tuple[Floats, Floats]:

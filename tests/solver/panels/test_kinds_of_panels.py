@@ -78,3 +78,4 @@ def test_more_classes_leave_less_uncovered(kind):
     curve = panels.trade_off
     assert (np.diff(curve.uncovered) <= 1e-12).all()
     assert curve.uncovered[0] > curve.uncovered[-1]
+    assert curve.taken == 5 < panels.n_sizes  # for each kind of cell

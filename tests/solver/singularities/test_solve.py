@@ -207,6 +207,11 @@ def test_says_what_singularities_would_bring(plain, found):
     assert not any("would leave about" in note for note in even.quality.notes)
 
 
+def test_the_curve_of_sizes_counts_no_singularities(found):
+    assert found.panels.n_special == len(found.map.cones) > 0
+    assert found.panels.trade_off.taken == len(found.panels.class_length) - found.panels.n_special
+
+
 class TestCurve:
     def test_what_was_taken_is_measured(self, found):
         curve = found.quality.singularities

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial import Delaunay
 
 from hexwrap_solver.surface import closest
 from hexwrap_solver.surface.closest import TriangleTree, nearest_in_triangles
+from hexwrap_solver.surface.types import Triangles
 
 
 def brute_force(points, vertices, faces):
@@ -43,10 +45,29 @@ def test_farthest_of_a_row_is_exact_whatever_triangles_are_guessed(seed, good):
     tree = TriangleTree.build(vertices, soup)
     if good:
         near = tree.nearest(points).face
-    found = tree.farthest(points, row, 13, near)
+    found = tree.farthest(points, row, 13, near, Triangles(vertices, soup).twin)
     distance = brute_force(points, vertices, soup)
     wanted = [distance[row == r].max(initial=0.0) for r in range(13)]
     assert np.allclose(found, wanted, rtol=1e-9, atol=1e-12)
+
+
+def test_farthest_is_the_same_to_the_bit_whatever_the_tree_remembers():
+    u, v = (x.ravel() for x in np.meshgrid(np.linspace(0, 1, 30), np.linspace(0, 1, 30)))
+    mesh = Triangles(
+        np.stack([u, v, 0.1 * np.sin(7 * u + 5 * v)], axis=1), Delaunay(np.stack([u, v], 1)).simplices
+    )
+    tree, rng = TriangleTree.build(mesh.vertices, mesh.faces), np.random.default_rng(3)
+    for _ in range(5):
+        row, place = rng.integers(0, 50, 300), rng.random((300, 2))
+        points = np.append(
+            place, 0.1 * np.sin(place @ [[7], [5]]) + rng.normal(scale=0.002, size=(300, 1)), axis=1
+        )
+        near = tree.nearest(points).face
+        fresh = TriangleTree.build(mesh.vertices, mesh.faces)
+        assert np.array_equal(
+            tree.farthest(points, row, 50, near, mesh.twin), fresh.farthest(points, row, 50, near, mesh.twin)
+        )
+    assert len(tree._beside.leaf) > len(fresh._beside.leaf) > 0
 
 
 def test_nearest_in_a_triangle_is_no_farther_than_any_sample():

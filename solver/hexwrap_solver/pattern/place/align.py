@@ -312,27 +312,29 @@ def _common(
 
 def trials_at(frame: _Frame, strain: Strain, scale: complex, cost_of_size: float) -> list[_Trial]:
     """For every centre the best lines at one scale."""
-    lattice, sides, normal = frame.lattice, frame.sides, frame.normal
-    first, period = frame.first, frame.period
+    lattice, sides, first, period = frame.lattice, frame.sides, frame.first, frame.period
     trials = []
-    for motion, origin in _origins(frame, scale):
-        depth = frame.depth * abs(scale) + (normal.conj() * origin).real
-        moved = first + period * np.rint((depth - first) / period) - depth
+    for motion, origins in _origins(frame, scale):
+        depth = frame.depth * abs(scale) + (frame.normal.conj() * origins[:, None]).real
+        also = [abs(scale)]
         if frame.cmap.deck.apex is None:
             apart = complex(lattice.position(np.array(motion.shift))) - scale * frame.cmap.deck.translation
-            moved = np.append(moved, [apart.real, apart.imag])
-        moved = np.append(moved, abs(scale))
-        moved = strain.nearest(moved, period)
-        line = depth + moved[: sides.n]
-        extra = cost_of_size + COST_OF_CORNERS * misplaced_corners(frame, motion, line)
-        trials.append(_Trial(scale, origin, motion, line, moved, extra))
+            also = [apart.real, apart.imag, *also]
+        moved = first + period * np.rint((depth - first) / period) - depth
+        moved = strain.nearest(np.append(moved, np.tile(also, (len(origins), 1)), axis=1), period)
+        lines = depth + moved[:, : sides.n]
+        extra = cost_of_size + COST_OF_CORNERS * misplaced_corners(frame, motion, lines)
+        each = zip(origins.tolist(), lines, moved, extra.tolist(), strict=True)
+        trials += [_Trial(scale, origin, motion, line, move, cost) for origin, line, move, cost in each]
     return trials
 
 
 def _best_of(trials: list[_Trial], strain: Strain) -> list[_Trial]:
     """Those with the least costs, the least first, each choice of lines once."""
     different: dict[tuple[object, ...], _Trial] = {}
-    for trial in sorted(trials, key=lambda trial: trial.cost(strain.mean(trial.moved))):
+    means = strain.mean(np.stack([trial.moved for trial in trials]))
+    costs = [trial.cost(mean) for trial, mean in zip(trials, means.tolist(), strict=True)]
+    for trial in (trials[i] for i in np.argsort(costs, kind="stable")):
         lines = (*trial.motion.shift, *np.rint(1e6 * trial.depth).tolist())
         if different.setdefault(lines, trial) is trial and len(different) == COMPARED:
             break
@@ -374,27 +376,29 @@ def _mean_depth(cmap: ConformalMap, sides: Sides, normal: Complexes, turn: Compl
     return np.asarray(np.bincount(sides.side, weights=value) / np.bincount(sides.side))
 
 
-def _origins(frame: _Frame, scale: complex) -> Sequence[tuple[Isometry, complex]]:
-    """Every way in which g can be a motion of the lattice, and where the apex, or the layout's origin, stands
-    then: on a cone at the kinds of symmetry centres; for a translation as two sides may lie on lines."""
+def _origins(frame: _Frame, scale: complex) -> Sequence[tuple[Isometry, Complexes]]:
+    """Every way in which g can be a motion of the lattice, and where the apex, or the layout's origin, may
+    stand then: on a cone at a symmetry centre of each kind; for a translation as two sides may lie on
+    lines."""
     lattice, normal, first = frame.lattice, frame.normal, frame.first
     if frame.cmap.deck.apex is not None:
-        return symmetry_centres(lattice, frame.cone_index)
+        centres = symmetry_centres(lattice, frame.cone_index)
+        return [(motion, np.array([centre])) for motion, centre in centres]
     shift = _translation(frame, scale * frame.cmap.deck.translation)
     motion = Isometry(lattice, frame.cone_index, (int(shift[0]), int(shift[1])))
     depth = frame.depth * abs(scale)
     across = np.flatnonzero(abs((normal.conj() * normal[0]).imag) > 1e-6)
     if not len(across):
-        return [(motion, complex(normal[0] * (first[0] - depth[0])))]
+        return [(motion, np.array([normal[0] * (first[0] - depth[0])]))]
     if (frame.sides.loop < 0).any():
         # One side on a line; places along it, as features across it share what they cannot all have.
         along = lattice.period_along(1j * normal[0])
         places = along * np.arange(PHASES) / PHASES
-        return [(motion, complex(normal[0] * (first[0] - depth[0] + 1j * place))) for place in places]
+        return [(motion, normal[0] * (first[0] - depth[0] + 1j * places))]
     p, q = normal[0], normal[across[0]]
     d = first[0] - depth[0]
     lines = first[across[0]] + frame.period[across[0]] * np.arange(MOST_LINES) - depth[across[0]]
-    return [(motion, complex(origin)) for origin in meeting(p, d, q, lines)]
+    return [(motion, meeting(p, d, q, lines))]
 
 
 def _translation(frame: _Frame, wanted: complex) -> Ints:
@@ -426,28 +430,27 @@ def symmetry_centres(lattice: Lattice, cone_index: int) -> Sequence[tuple[Isomet
     return tuple(found)
 
 
-def misplaced_corners(frame: _Frame, motion: Isometry, line: Floats) -> float:
-    """Part of the corners between successive sides that stand badly.
+def misplaced_corners(frame: _Frame, motion: Isometry, lines: Floats) -> Floats:
+    """(…) part of the corners between successive sides that stand badly, for depths (…, s) of the sides.
 
     Corners stand well on nodes. Where three edges meet there, though, the lattice is mirrored at the
     bisector of 2π/3 and 4π/3, but not of π/3 and 5π/3: those stand well on the centres of cells.
     """
     lattice = frame.lattice
     following, sheet = frame.following
-    shift = lattice.position(motion.apply(np.zeros((len(sheet), 2), dtype=np.int64), sheet))
-    p, d = frame.normal[: len(sheet)], line[: len(sheet)]
+    p = frame.normal[: len(sheet)]
     q = p[following] * np.exp(1j * lattice.step_angle * motion.rotation(sheet))
-    e = d[following] + (q.conj() * shift).real
-    area = (p.conj() * q).imag
-    inner = abs(area) > 1e-6
-    p, q, d, e = p[inner], q[inner], d[inner], e[inner]
-    if not len(p):
-        return 0.0
-    corner = meeting(p, d, q, e)
+    inner = abs((p.conj() * q).imag) > 1e-6
+    if not inner.any():
+        return np.zeros(lines.shape[:-1])
+    shift = lattice.position(motion.apply(np.zeros((len(sheet), 2), dtype=np.int64), sheet))
+    d, e = lines[..., : len(sheet)], lines[..., following] + (q.conj() * shift).real
+    p, q = p[inner], q[inner]
+    corner = meeting(p, d[..., inner], q, e[..., inner])
     point = np.rint(lattice.coordinates(corner)).astype(np.int64)
     on_lattice = abs(lattice.position(point) - corner) < 1e-6
     on_node = on_lattice & lattice.is_node(point)
     odd = np.rint(np.angle(q / p) / lattice.quantum) % 2 == 1
-    lopsided = odd & on_node if lattice.kind == "hex" else np.zeros(len(odd), dtype=bool)
+    lopsided = odd & on_node if lattice.kind == "hex" else np.zeros_like(on_node)
     mirrored = odd & on_lattice & ~on_node if lattice.kind == "hex" else lopsided
-    return float((COST_OF_LOPSIDED * lopsided + ~(on_node | mirrored)).mean())
+    return np.asarray((COST_OF_LOPSIDED * lopsided + ~(on_node | mirrored)).mean(axis=-1))

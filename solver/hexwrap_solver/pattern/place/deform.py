@@ -15,7 +15,8 @@ from scipy import sparse
 
 from hexwrap_solver.arrays import Complexes, Floats, Ints
 from hexwrap_solver.conformal.types import ConformalMap
-from hexwrap_solver.linalg.normal_matrix import NormalMatrix
+from hexwrap_solver.linalg.factor import Factorisation
+from hexwrap_solver.linalg.normal_matrix import RIDGE
 from hexwrap_solver.pattern.place.glued import Glued
 from hexwrap_solver.pattern.place.meeting import meeting
 from hexwrap_solver.tolerances import TINY
@@ -120,10 +121,13 @@ def derivatives(cmap: ConformalMap, glued: Glued) -> Derivatives:
 @dataclass(frozen=True)
 class Freedom:
     """basis: (2n, unknowns), orthonormal, of the movements that lines leave to the vertices (real parts, then
-    imaginary parts); vertex: (unknowns,) that each belongs to. normal: (n, 2) of the lines."""
+    imaginary parts); vertex: (unknowns,) that each belongs to. unknown, way: (n, 2) the unknowns of each
+    vertex, −1 where there is none, and in which direction it moves with them. normal: (n, 2) of the lines."""
 
     basis: sparse.csr_array
     vertex: Ints
+    unknown: Ints
+    way: Complexes
     normal: Complexes
 
     @classmethod
@@ -133,11 +137,15 @@ class Freedom:
         free, one = np.flatnonzero(lines == 0), np.flatnonzero(lines == 1)
         along = 1j * normal[one].sum(axis=1)  # the other one is 0
         f, k = len(free), len(one)
-        rows = np.concatenate([free, free + n, one, one + n])
-        columns = np.concatenate([np.arange(2 * f), 2 * f + np.arange(k), 2 * f + np.arange(k)])
-        values = np.concatenate([np.ones(2 * f), along.real, along.imag])
-        basis = sparse.csr_array((values, (rows, columns)), shape=(2 * n, 2 * f + k))
-        return cls(basis, np.concatenate([free, free, one]), normal)
+        unknown, way = np.full((n, 2), -1), np.zeros((n, 2), dtype=complex)
+        unknown[free], way[free] = np.stack([np.arange(f), f + np.arange(f)], axis=1), (1, 1j)
+        unknown[one, 0], way[one, 0] = 2 * f + np.arange(k), along
+        vertex, which = np.nonzero(unknown >= 0)
+        column, step = unknown[vertex, which], way[vertex, which]
+        rows = np.concatenate([vertex, vertex + n])
+        values = np.concatenate([step.real, step.imag])
+        basis = sparse.csr_array((values, (rows, np.tile(column, 2))), shape=(2 * n, 2 * f + k))
+        return cls(basis, np.concatenate([free, free, one]), unknown, way, normal)
 
     def place_on_lines(self, depth: Floats) -> Complexes:
         """(n,) a place on each vertex's lines, linear in their depths (n, 2); 0 where there is none."""
@@ -157,11 +165,27 @@ class System:
         Re(conj(normal)·W) = depth that each vertex must lie on; normal 0 where there is none."""
         self.cmap = cmap
         self.change = derivatives(cmap, glued)
-        self.freedom = Freedom.of(normal)
-        # Both errors of a triangle as one matrix: angles, then sizes, each in real and imaginary parts.
-        parts = (_real(part) @ self.freedom.basis for part in (self.change.angles, self.change.sizes))
-        self._matrix = sparse.csr_array(sparse.vstack(list(parts)))
-        self._normal = NormalMatrix(cmap.surface.vertices[self.freedom.vertex])
+        self.freedom = freedom = Freedom.of(normal)
+        self._adjoints = [
+            sparse.csr_array(part.conj().T.tocsr()) for part in (self.change.angles, self.change.sizes)
+        ]
+        # What each triangle adds to the normal matrix if its weight is 1, for its six unknowns (6, m).
+        faces, n = cmap.surface.faces, len(freedom.vertex)
+        unknown = freedom.unknown[faces].reshape(-1, 6).T
+        way = freedom.way[faces] * glued.turn[:, :, None]
+        gradient = self.change.gradient[:, :, None]
+        angles, sizes = ((part * way).reshape(-1, 6).T for part in (gradient, gradient.conj()))
+        self._unknown = np.where(unknown < 0, n, unknown)
+        self._square = abs(angles) ** 2 + SIZE * abs(sizes) ** 2
+        i, j = np.nonzero(
+            np.arange(6)[:, None] // 2 > np.arange(6) // 2
+        )  # those of one corner are orthogonal
+        both, self._face = np.nonzero((unknown[i] >= 0) & (unknown[j] >= 0))
+        one, other = (i[both], self._face), (j[both], self._face)
+        self._product = (angles[one].conj() * angles[other] + SIZE * sizes[one].conj() * sizes[other]).real
+        low, high = np.minimum(unknown[one], unknown[other]), np.maximum(unknown[one], unknown[other])
+        pairs, self._pair = np.unique(low * n + high, return_inverse=True)
+        self._factor = Factorisation(cmap.surface.vertices[freedom.vertex], pairs // n, pairs % n)
         self._last: Floats | None = None
         self._pull = 0.0
 
@@ -171,25 +195,20 @@ class System:
         factorised once."""
         if not len(start):  # every vertex is a corner
             return np.zeros((len(self.freedom.normal), *angles.shape[1:]), dtype=complex)
-        weights = np.concatenate([weight, weight, SIZE * weight, SIZE * weight])
         if self._last is None or not np.array_equal(weight, self._last):
-            squares = self._matrix.copy()
-            squares.data = squares.data**2
-            self._pull = REST * float((weights @ squares).mean())
-            self._normal.factorise(self._matrix, weights, self._pull)
+            n = len(start)
+            diagonal = np.bincount(self._unknown.ravel(), (weight * self._square).ravel(), n + 1)[:n]
+            self._pull = REST * float(diagonal.mean())
+            products = np.bincount(self._pair, weights=weight[self._face] * self._product)
+            self._factor.factorise(np.asarray(diagonal * (1 + RIDGE) + self._pull), np.asarray(products))
             self._last = weight
-        aim = np.concatenate([_parts(angles), _parts(sizes)])
-        weighted = (weights * aim.T).T
-        unknown = self._normal.solve(self._matrix.T @ weighted + self._pull * start)
-        moved = self.freedom.basis @ unknown
+        aims = ((weight * angles.T).T, SIZE * (weight * sizes.T).T)
+        right = self._adjoints[0] @ aims[0] + self._adjoints[1] @ aims[1]
+        found = self._factor.solve(self.freedom.basis.T @ _parts(np.asarray(right)) + self._pull * start)
+        moved = self.freedom.basis @ found
         n = len(moved) // 2
         return np.asarray(moved[:n] + 1j * moved[n:])
 
 
 def _parts(z: Complexes) -> Floats:
     return np.concatenate([z.real, z.imag])
-
-
-def _real(matrix: sparse.csr_array) -> sparse.csr_array:
-    """A complex linear map on (real parts, imaginary parts)."""
-    return sparse.csr_array(sparse.block_array([[matrix.real, -matrix.imag], [matrix.imag, matrix.real]]))

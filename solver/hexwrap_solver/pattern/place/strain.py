@@ -47,9 +47,9 @@ class Strain:
         squares = ((response.conj() * area[:, None]).T @ response).real
         return cls(response, np.asarray(area), np.asarray(squares))
 
-    def mean(self, moved: Floats) -> float:
-        """Root mean square of |∂/∂z̄| where the columns are moved by so much."""
-        return float(np.sqrt(max(float(moved @ self.squares @ moved), 0.0)))
+    def mean(self, moved: Floats) -> Floats:
+        """(…) root mean square of |∂/∂z̄| where the columns are moved by so much, (…, columns)."""
+        return np.asarray(np.sqrt(np.maximum(((moved @ self.squares) * moved).sum(axis=-1), 0.0)))
 
     def sharp(self, moved: Floats) -> float:
         """Its fourth-power mean, which heeds the worst places more."""
@@ -61,20 +61,23 @@ class Strain:
         return np.asarray(2 * bent / np.maximum(scale - bent, RELATIVE * scale))
 
     def nearest(self, moved: Floats, period: Floats) -> Floats:
-        """Moves of the first columns, one per period, changed by multiples of them, as long as any single
-        change lessens ``mean``."""
+        """(t, columns) moves of the first columns, one per period, changed by multiples of them, as long as
+        any single change lessens ``mean``."""
         moved, sides = moved.copy(), len(period)
         own = period * period * np.diag(self.squares)[:sides]
-        product = self.squares[:sides] @ moved
+        product = moved @ self.squares[:, :sides]
+        rows = np.arange(len(moved))
         for _ in range(4 * sides):
-            slope = 2 * period * product
+            slope = 2 * period * product[rows]
             gain = own - np.abs(slope)
-            k = int(np.argmin(gain))
-            if gain[k] >= -1e-12 * own[k]:
+            k = gain.argmin(axis=1)
+            better = np.flatnonzero(gain[np.arange(len(k)), k] < -1e-12 * own[k])
+            if not len(better):
                 break
-            change = -period[k] * np.sign(slope[k])
-            moved[k] += change
-            product += change * self.squares[:sides, k]
+            rows, k = rows[better], k[better]
+            change = -period[k] * np.sign(slope[better, k])
+            moved[rows, k] += change
+            product[rows] += change[:, None] * self.squares[k, :sides]
         return moved
 
 
