@@ -150,6 +150,31 @@ class HttpError(HexwrapError):
         self.errors = list(errors)
 
 
+#: Slug of a refusal → its status and title.
+REFUSALS = {
+    "not-gzip": (400, "The body is not gzip"),
+    "incomplete": (400, "The body is incomplete"),
+    "token": (401, "A token is needed"),
+    "cross-site": (403, "Requests from other sites are refused"),
+    "cancelled": (409, "The job was cancelled"),
+    "not-finished": (409, "The job is not finished"),
+    "exploration": (409, "The job is an exploration"),
+    "body-too-large": (413, "The body is too large"),
+    "content-encoding": (415, "The content encoding is not supported"),
+    "host-not-allowed": (421, "This host name is not served here"),
+    "not-ready": (503, "Not ready"),
+    "queue-full": (503, "The queue is full"),
+    "shutting-down": (503, "The server is shutting down"),
+    "too-many-bodies": (503, "Too many large bodies at once"),
+}
+
+
+def refusal(slug: str, detail: str, headers: dict[str, str] | None = None) -> HttpError:
+    """One of those."""
+    status, title = REFUSALS[slug]
+    return HttpError(status, slug, title, detail, headers)
+
+
 def not_found(what: str, detail: str) -> HttpError:
     return HttpError(404, "not-found", f"No such {what}", detail)
 

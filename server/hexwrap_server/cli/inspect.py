@@ -52,15 +52,9 @@ def _summary(surface: Surface) -> str:
     """What would be mapped."""
     size = box(np.ptp(surface.vertices, axis=0))
     walls = len(surface.loops) - surface.openings
-    parts = [
-        f"{walls} boundary curve{'s' * (walls != 1)}",
-        *([f"{surface.openings} opening{'s' * (surface.openings != 1)}"] if surface.openings else []),
-        *(
-            [f"{len(surface.features)} crease{'s' * (len(surface.features) != 1)}"]
-            if surface.features
-            else []
-        ),
-    ]
+    counts = {"opening": surface.openings, "crease": len(surface.features)}
+    found = {"boundary curve": walls} | {noun: count for noun, count in counts.items() if count}
+    parts = [f"{count} {noun}{'s' * (count != 1)}" for noun, count in found.items()]
     unit = f" {surface.unit}" if surface.unit else ""
     return f"To be panelized: a surface of {size}{unit} with {', '.join(parts)}."
 

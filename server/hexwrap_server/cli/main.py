@@ -25,7 +25,7 @@ from hexwrap_server.cli.explore import WRITERS as FRONT_WRITERS
 from hexwrap_server.cli.explore import asked as asked_exploration
 from hexwrap_server.cli.explore import check_outputs, explore_here, print_front
 from hexwrap_server.cli.inspect import print_content
-from hexwrap_server.cli.local import Task, only_map, solve_here, surface_settings, task
+from hexwrap_server.cli.local import Task, only_map, read_bytes, solve_here, surface_settings, task
 from hexwrap_server.cli.options import (
     add_explore_options,
     add_request_options,
@@ -242,13 +242,8 @@ def _explore(asked: argparse.Namespace) -> int:
 
 def _inspect(asked: argparse.Namespace) -> int:
     settings = surface_settings(asked)
-    try:
-        data = Path(asked.input).read_bytes()
-    except OSError as error:
-        raise UsageError(f"{asked.input} cannot be read: {error.strerror or error}.") from None
-    return print_content(
-        Console(soft_wrap=True, highlight=False, markup=False), data, Path(asked.input).name, settings
-    )
+    console = Console(soft_wrap=True, highlight=False, markup=False)
+    return print_content(console, read_bytes(asked.input), Path(asked.input).name, settings)
 
 
 def _lift(asked: argparse.Namespace) -> int:

@@ -116,27 +116,21 @@ def add_request_options(parser: argparse.ArgumentParser, section: str = "") -> N
     """
     group = parser.add_argument_group("request (defaults as of the service, or what the request file says)")
     for option in (one for one in OPTIONS if section in ("", one.path[0])):
-        common: dict[str, Any] = {"dest": option.name, "default": argparse.SUPPRESS, "help": option.help}
-        if option.leaf.is_list:
-            group.add_argument(
-                option.flag, action="append", metavar=f"PLACE={option.leaf.entry[-1].upper()}", **common
-            )
-        elif option.leaf.is_lines:
-            group.add_argument(option.flag, action="append", metavar="FILE", **common)
-        elif option.leaf.default is False:
-            group.add_argument(option.flag, action="store_true", **common)
+        leaf, word = option.leaf, _metavar(option.leaf)
+        how: dict[str, Any] = {"dest": option.name, "default": argparse.SUPPRESS, "help": option.help}
+        if leaf.is_list:
+            how |= {"action": "append", "metavar": f"PLACE={leaf.entry[-1].upper()}"}
+        elif leaf.is_lines:
+            how |= {"action": "append", "metavar": "FILE"}
+        elif leaf.default is False:
+            how |= {"action": "store_true"}
         elif option.words:
-            group.add_argument(option.flag, choices=option.words, **common)
+            how |= {"choices": option.words}
         else:
-            n, of = option.leaf.numbers, str if option.leaf.is_text else _value
-            word = _metavar(option.leaf)
-            group.add_argument(
-                option.flag,
-                nargs=n if n > 1 else None,
-                type=of,
-                metavar=(word,) * n if n > 1 else word,
-                **common,
-            )
+            how |= {"type": str if leaf.is_text else _value, "metavar": word}
+            if leaf.numbers > 1:
+                how |= {"nargs": leaf.numbers, "metavar": (word,) * leaf.numbers}
+        group.add_argument(option.flag, **how)
 
 
 def asked_body(arguments: argparse.Namespace, body: dict[str, Any]) -> dict[str, Any]:

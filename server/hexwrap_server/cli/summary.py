@@ -15,6 +15,8 @@ from hexwrap_server.output.text import angle, length, lengths
 MOST_SIZES = 24
 #: Numbers of sizes whose cost is shown, beside the number that was taken.
 SHOWN = (1, 2, 3, 5, 8, 11, 16, 24, 40)
+#: The distortion of a pattern in which a triangle of the surface turns over.
+FOLDED = 1e6
 #: Width of the longest bar of the chart, characters.
 BAR = 30
 Rows = Iterable[tuple[str, str]]
@@ -72,7 +74,7 @@ def _pattern(found: dict[str, Any] | None) -> Rows:
     yield "around", str(found["around"])
     yield "rings", str(found["rings"])
     yield "edge", length(found["edge_length"])
-    yield "distortion", f"{found['distortion']:.2%}"
+    yield "distortion", "folds over" if found["distortion"] >= FOLDED else f"{found['distortion']:.2%}"
 
 
 def _panels(result: dict[str, Any]) -> Rows:

@@ -7,7 +7,7 @@ from contextlib import asynccontextmanager
 
 from starlette.requests import ClientDisconnect, Request
 
-from hexwrap_server.errors import HttpError
+from hexwrap_server.errors import refusal
 from hexwrap_server.http.service import Service
 from hexwrap_server.input.bodies import Body, body_too_large
 from hexwrap_server.settings import MIB
@@ -35,16 +35,16 @@ async def sent_body(request: Request) -> AsyncIterator[Body]:
             if size > limit:
                 raise body_too_large(max_mib)
             if service.body_bytes > BODIES_AT_ONCE * limit:
-                raise _too_many()
+                raise refusal(
+                    "too-many-bodies",
+                    "Other clients are sending bodies that fill the memory set aside for them; try again in "
+                    "a moment.",
+                    {"Retry-After": "2", "Connection": "close"},
+                )
             chunks.append(chunk)
         yield Body(b"".join(chunks), encoding)
     except ClientDisconnect:
-        raise HttpError(
-            400,
-            "incomplete",
-            "The body is incomplete",
-            "The connection closed before the whole body was sent.",
-        ) from None
+        raise refusal("incomplete", "The connection closed before the whole body was sent.") from None
     finally:
         service.body_bytes -= size
 
@@ -54,20 +54,8 @@ def _encoding(request: Request) -> str:
     known = {"": "", "identity": "", "gzip": "gzip", "x-gzip": "gzip"}
     if name in known:
         return known[name]
-    raise HttpError(
-        415,
+    raise refusal(
         "content-encoding",
-        "The content encoding is not supported",
         f"Content-Encoding '{name[:40]}' is not supported; send the body plain or as gzip.",
         {"Accept-Encoding": "gzip"},
-    )
-
-
-def _too_many() -> HttpError:
-    return HttpError(
-        503,
-        "too-many-bodies",
-        "Too many large bodies at once",
-        "Other clients are sending bodies that fill the memory set aside for them; try again in a moment.",
-        {"Retry-After": "2", "Connection": "close"},
     )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 from starlette.datastructures import Headers
 from starlette.middleware.gzip import GZipMiddleware
 from starlette.types import ASGIApp, Receive, Scope, Send
@@ -10,6 +12,8 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 WORTH_PACKING = 1024
 #: Higher ones take longer and hardly make numbers smaller.
 GZIP_LEVEL = 1
+#: A name in Accept-Encoding, and its quality where it has one.
+_ENCODING = re.compile(r"([^\s,;]+)\s*(?:;\s*q\s*=\s*([^\s,;]*))?")
 
 
 class Compressed(GZipMiddleware):
@@ -28,20 +32,8 @@ class Compressed(GZipMiddleware):
 
 def _takes_gzip(headers: Headers) -> bool:
     """Whether Accept-Encoding gives gzip a quality above 0; gzip by name goes before ``*``."""
-    qualities: dict[str, float] = {}
-    for entry in ",".join(headers.getlist("accept-encoding")).split(","):
-        name, *parameters = (word.strip().lower() for word in entry.split(";"))
-        qualities[name] = _quality(parameters)
-    return qualities.get("gzip", qualities.get("*", 0.0)) > 0
-
-
-def _quality(parameters: list[str]) -> float:
-    """1 where there is none; what is not a number counts as 0."""
-    for parameter in parameters:
-        name, _, value = parameter.partition("=")
-        if name.strip() == "q":
-            try:
-                return float(value)
-            except ValueError:
-                return 0.0
-    return 1.0
+    qualities = dict(_ENCODING.findall(",".join(headers.getlist("accept-encoding")).lower()))
+    try:
+        return float(qualities.get("gzip", qualities.get("*", "0")) or 1) > 0
+    except ValueError:  # what is not a number counts as 0
+        return False

@@ -10,7 +10,7 @@ from fastapi import APIRouter, Path, Query, Request
 from isal import igzip
 from starlette.responses import Response, StreamingResponse
 
-from hexwrap_server.errors import GoneError, HttpError, JobFailedError, bad_parameters, not_found
+from hexwrap_server.errors import GoneError, JobFailedError, bad_parameters, not_found, refusal
 from hexwrap_server.http import head
 from hexwrap_server.http.answers import JSON, json_response, problem_response
 from hexwrap_server.http.bodies import sent_body
@@ -69,9 +69,7 @@ async def ready(request: Request) -> Response:
     """Whether a job would be run now."""
     service = service_of(request)
     if not service.is_ready:
-        raise HttpError(
-            503, "not-ready", "Not ready", "The worker processes are starting.", {"Retry-After": "1"}
-        )
+        raise refusal("not-ready", "The worker processes are starting.", {"Retry-After": "1"})
     return json_response(service.health())
 
 
@@ -84,17 +82,13 @@ async def metrics(request: Request) -> Response:
 @router.post("/v1/jobs", status_code=202)
 async def post_job(request: Request) -> Response:
     """Have a surface panelized."""
-    manager = manager_of(request)
-    job = await manager.submit(await _read(request))
-    return json_response(manager.document(job), 202, {"Location": f"/v1/jobs/{job.id}"})
+    return await _taken(request, await _read(request))
 
 
 @router.post("/v1/explore", status_code=202)
 async def post_explore(request: Request) -> Response:
     """Have variants of a surface looked at, and the promising ones solved."""
-    manager = manager_of(request)
-    job = await manager.submit(await _read(request, "exploration"))
-    return json_response(manager.document(job), 202, {"Location": f"/v1/jobs/{job.id}"})
+    return await _taken(request, await _read(request, "exploration"))
 
 
 @router.get("/v1/jobs")
@@ -163,10 +157,8 @@ async def _solved(request: Request, parsed: ParsedRequest, parts: list[str] | No
     job = await manager.submit(parsed)
     job = await manager.wait(job.id, None)
     if not job.is_over:
-        raise HttpError(
-            503,
+        raise refusal(
             "shutting-down",
-            "The server is shutting down",
             f"The job is kept and goes on when the server runs again; then ask for /v1/jobs/{job.id}/result.",
             {"Retry-After": "5", "Location": f"/v1/jobs/{job.id}"},
         )
@@ -262,6 +254,12 @@ async def _read(request: Request, kind: str = "request") -> ParsedRequest:
     return parsed
 
 
+async def _taken(request: Request, parsed: ParsedRequest) -> Response:
+    manager = manager_of(request)
+    job = await manager.submit(parsed)
+    return json_response(manager.document(job), 202, {"Location": f"/v1/jobs/{job.id}"})
+
+
 async def _carry(request: Request, id: str, what: str) -> Response:
     service = service_of(request)
     job = service.manager.get(id)
@@ -296,27 +294,20 @@ def _finished(job: Job) -> None:
     if job.status == "failed" and job.problem:
         raise JobFailedError(job.problem)
     if job.status == "cancelled":
-        raise HttpError(
-            409, "cancelled", "The job was cancelled", "The job was cancelled, so it has no result."
-        )
+        raise refusal("cancelled", "The job was cancelled, so it has no result.")
     if job.status != "done":
-        raise HttpError(
-            409,
-            "not-finished",
-            "The job is not finished",
-            f"The job is {job.status}; wait with GET …?wait=60.",
-            {"Retry-After": "1"},
+        raise refusal(
+            "not-finished", f"The job is {job.status}; wait with GET …?wait=60.", {"Retry-After": "1"}
         )
 
 
 def _is_solved(job: Job) -> None:
     """Raises HttpError for an exploration, which has variants and no map of its own."""
     if job.kind == "explore":
-        raise HttpError(
-            409,
+        raise refusal(
             "exploration",
-            "The job is an exploration",
-            "An exploration has no map and no panels of its own: send the request of one of its variants to "
+            "An exploration has no map and no panels of its own: send the request of one of its "
+            "variants to "
             "/v1/jobs, and ask that job.",
         )
 
@@ -327,7 +318,8 @@ def _parts(include: str | None) -> list[str] | None:
     wanted = [name.strip() for name in include.split(",") if name.strip()]
     known = [name for name in (*PARTS, CORNERS) if name in wanted]
     if not known or len(known) < len(set(wanted)):
-        raise _bad_parameter("include", f"'include' names parts of the Result: {', '.join(PARTS)}.")
+        detail = f"'include' names parts of the Result: {', '.join(PARTS)}."
+        raise bad_parameters(detail, [("include", detail)])
     return known
 
 
@@ -335,12 +327,9 @@ def _sheet(text: str) -> tuple[float, float]:
     """Width and height of ``2500x1250``."""
     width, height = (float(side) for side in text.lower().split("x"))
     if width <= 0 or height <= 0:
-        raise _bad_parameter("sheet", f"Both sides of the sheet must be greater than 0, not {text}.")
+        detail = f"Both sides of the sheet must be greater than 0, not {text}."
+        raise bad_parameters(detail, [("sheet", detail)])
     return width, height
-
-
-def _bad_parameter(name: str, detail: str) -> HttpError:
-    return bad_parameters(detail, [(name, detail)])
 
 
 def _timing(job: Job) -> dict[str, str]:

@@ -13,7 +13,7 @@ from urllib.parse import urlsplit
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from hexwrap_server.errors import HttpError
+from hexwrap_server.errors import HttpError, refusal
 from hexwrap_server.http.answers import problem_response
 from hexwrap_server.settings import Settings
 
@@ -36,35 +36,28 @@ class Doorkeeper:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] == "http":
-            refusal = self._refusal(scope["method"], scope["path"], Headers(scope=scope))
-            if refusal is not None:
-                await problem_response(refusal)(scope, receive, send)
+            refused = self._refusal(scope["method"], scope["path"], Headers(scope=scope))
+            if refused is not None:
+                await problem_response(refused)(scope, receive, send)
                 return
         await self._app(scope, receive, send)
 
     def _refusal(self, method: str, path: str, headers: Headers) -> HttpError | None:
         host = headers.get("host", "").lower()
         if not self._any_host and host_name(host) not in self._hosts:
-            return HttpError(
-                421,
+            return refusal(
                 "host-not-allowed",
-                "This host name is not served here",
                 f"The Host header says '{host[:100]}'; use 127.0.0.1, or start the server "
                 "with --allowed-hosts.",
             )
         if method not in SAFE_METHODS and _is_foreign(headers, host):
-            return HttpError(
-                403,
-                "cross-site",
-                "Requests from other sites are refused",
-                "The browser says that this request comes from a page of another site.",
+            return refusal(
+                "cross-site", "The browser says that this request comes from a page of another site."
             )
         is_open = path in OPEN_PATHS or path.startswith(OPEN_FOLDER)
         if self._token and not is_open and not self._knows_token(headers):
-            return HttpError(
-                401,
+            return refusal(
                 "token",
-                "A token is needed",
                 "This server was started with a token; send it as 'Authorization: Bearer TOKEN'.",
                 {"WWW-Authenticate": "Bearer"},
             )

@@ -11,7 +11,7 @@ from typing import Any
 import platformdirs
 
 from hexwrap_server import __version__
-from hexwrap_server.errors import HttpError, MemoryLimitError, TimeLimitError
+from hexwrap_server.errors import HttpError, MemoryLimitError, TimeLimitError, refusal
 from hexwrap_server.http.metrics import Metrics
 from hexwrap_server.input.bodies import Body
 from hexwrap_server.jobs.disk import make_private
@@ -101,12 +101,9 @@ class Service:
             async with asyncio.timeout(settings.read_seconds):
                 await self.free_readers.acquire()
         except TimeoutError:
-            raise HttpError(
-                503,
+            raise refusal(
                 "too-many-bodies",
-                "Too many large bodies at once",
                 f"Other bodies were being read for {settings.read_seconds:g} s; try again in a moment.",
-                {"Retry-After": "5"},
             ) from None
         try:
             return await self._read(self.readers, function, body, settings, *arguments)

@@ -7,7 +7,7 @@ import io
 import zlib
 from dataclasses import dataclass
 
-from hexwrap_server.errors import HttpError
+from hexwrap_server.errors import HttpError, refusal
 
 
 @dataclass(frozen=True)
@@ -26,11 +26,8 @@ class Body:
             with gzip.open(io.BytesIO(self.data)) as file:
                 whole = file.read(limit + 1)
         except (OSError, EOFError, zlib.error):
-            raise HttpError(
-                400,
-                "not-gzip",
-                "The body is not gzip",
-                "Content-Encoding says gzip, but the body is damaged or truncated.",
+            raise refusal(
+                "not-gzip", "Content-Encoding says gzip, but the body is damaged or truncated."
             ) from None
         if len(whole) > limit:
             raise body_too_large(max_mib)
@@ -38,10 +35,8 @@ class Body:
 
 
 def body_too_large(max_mib: float) -> HttpError:
-    return HttpError(
-        413,
+    return refusal(
         "body-too-large",
-        "The body is too large",
         f"The body has more than {max_mib:g} MiB, the limit of this server (unpacked, where it is gzip); "
         "send a coarser mesh, or start the server with a larger --max-body-mib.",
         {"Connection": "close"},

@@ -6,12 +6,11 @@ import codecs
 import gc
 import json
 import sys
-from typing import Any
 
 import orjson
 
 from hexwrap_server.errors import FormError, NotJsonError
-from hexwrap_server.input.faults import escaped
+from hexwrap_server.input.faults import pointer
 from hexwrap_solver.surface.errors import NonFiniteError
 
 
@@ -42,21 +41,20 @@ def _not_finite(text: bytes) -> str | None:
     None where something else is wrong with the text. Slow, and only for texts that were refused.
     """
     try:
-        document = json.loads(text)
+        place = _place_of_infinite(json.loads(text))
     except (ValueError, RecursionError):
         return None
-    at: list[object] = []  # the steps to the list or object that is looked at
-    todo: list[tuple[int, object, Any]] = [(0, None, document)]
-    while todo:
-        depth, step, value = todo.pop()
-        at[depth:] = [step]
-        if isinstance(value, dict):
-            todo += [(depth + 1, name, inner) for name, inner in value.items()][::-1]
-        elif isinstance(value, list):
-            for i, entry in enumerate(value):
-                if isinstance(entry, (int, float)) and not abs(entry) <= sys.float_info.max:
-                    return "".join(f"/{escaped(str(step))}" for step in [*at[1:], i])
-            todo += [(depth + 1, i, row) for i, row in enumerate(value) if isinstance(row, (list, dict))][
-                ::-1
-            ]
+    return None if place is None else pointer(tuple(place))
+
+
+def _place_of_infinite(value: object) -> list[str | int] | None:
+    """The steps to it; pointers are not written for each list, whose names may be long."""
+    pairs = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for step, inner in pairs:
+        below = _place_of_infinite(inner)
+        if below is not None:
+            return [step, *below]
+        is_number = isinstance(inner, (int, float)) and isinstance(value, list)
+        if is_number and not abs(inner) <= sys.float_info.max:
+            return [step]
     return None

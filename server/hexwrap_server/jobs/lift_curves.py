@@ -45,12 +45,11 @@ def lift_curves(cmap: ConformalMap, curves: list[Curve], step: float | None) -> 
     fine = _followed(flat, step or _once_around(cmap) / STEPS_AROUND)
     at = np.vstack([curve.points for curve in fine])
     there = lift(cmap, at[:, 0] + 1j * at[:, 1])
-    carried: list[Curve] = []
-    start = 0
-    for curve in fine:
-        part = slice(start, start + len(curve.points))
-        start = part.stop
-        carried += _inside(Curve(there.points[part], curve.closed), there.inside[part])
+    ends = np.cumsum([len(curve.points) for curve in fine])[:-1]
+    parts = zip(fine, np.split(there.points, ends), np.split(there.inside, ends), strict=True)
+    carried = [
+        piece for curve, points, inside in parts for piece in _inside(Curve(points, curve.closed), inside)
+    ]
     return Carried(carried, outside=int(np.sum(~there.inside)))
 
 
@@ -75,10 +74,8 @@ def flatten_curves(cmap: ConformalMap, curves: list[Curve], step: float | None) 
     fine = _followed(curves, step) if step else curves
     found = flatten(cmap, np.vstack([curve.points for curve in fine]))
     carried = []
-    start = 0
-    for curve in fine:
-        z = found.uv[start : start + len(curve.points)]
-        start += len(curve.points)
+    ends = np.cumsum([len(curve.points) for curve in fine])[:-1]
+    for curve, z in zip(fine, np.split(found.uv, ends), strict=True):
         if cmap.kind == "net":
             carried.append(Curve(plane(over_cuts(cmap.net, z)), curve.closed))
             continue

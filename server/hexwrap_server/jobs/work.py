@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import cache, partial
+from functools import cache, lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -31,8 +30,8 @@ from hexwrap_solver.surface.types import Origin, Surface, SurfaceSettings
 #: Finished solutions that a worker keeps for lift, flatten and files.
 KEPT_SOLUTIONS = 4
 #: The stages on which parts of the Result depend that are often the same as before, the last of each that
-#: was run; ``map`` says where cells are drawn.
-DEPENDS = {"mesh": ("map",), "map": ("map", "pattern"), "pattern": ("pattern",)}
+#: was run.
+DEPENDS = {"mesh": ("map",), "map": ("map",), "pattern": ("pattern",)}
 
 
 def solve(report: Report, order: Order, caching: CacheSettings) -> Outcome:
@@ -62,11 +61,23 @@ def outcome_of(order: Order, result: bytes, kept: Sequence[bytes | memoryview]) 
 def packed_result(solution: pipeline.Solution, runner: CachingRunner) -> bytes:
     """The whole Result, see ``output.packed``."""
 
+    panels = solution.panels
+
     def made(name: str) -> Packed:
+        if name == "panels" and panels is not None:
+            lies = f"panels {codec.digest(panels.limit, panels.center)}"
+            end = Packed.of(b"," + wire.dump(wire.sized(solution))[1:])
+            return Packed.joined([runner.remembered(lies, ("fit",), placed), end])
         return packed_part(name, wire.dump(wire.part(solution, name, runner.timings)))
 
+    def placed() -> Packed:
+        return packed_part("panels", wire.dump(wire.placed(solution))[:-1])
+
+    depends: dict[str, tuple[str, ...]] = dict(DEPENDS)
+    if runner.remembered("overlaps itself", ("map",), lambda: wire.drawn_apart(solution) is not None):
+        depends["map"] = ("map", "pattern")  # where its cells are drawn
     return document(
-        {name: runner.remembered(name, DEPENDS.get(name, ()), partial(made, name)) for name in wire.PARTS}
+        {name: runner.remembered(name, depends.get(name, ()), partial(made, name)) for name in wire.PARTS}
     )
 
 
@@ -134,21 +145,15 @@ def stages(caching: CacheSettings) -> StageCache:
     return StageCache(Path(caching.folder) if caching.folder else None, caching.memory_bytes)
 
 
-_SOLUTIONS: OrderedDict[str, pipeline.Solution] = OrderedDict()
-
-
+@lru_cache(KEPT_SOLUTIONS)
 def solution_at(path: str) -> pipeline.Solution:
     """A finished solution. Raises GoneError, StorageError."""
-    if path not in _SOLUTIONS:
-        try:
-            _SOLUTIONS[path] = codec.decode(Path(path).read_bytes())
-        except (FileNotFoundError, CodecError):
-            with contextlib.suppress(OSError):
-                Path(path).unlink()  # so that the job is run again when it is sent again
-            raise GoneError from None
-        except OSError as error:
-            raise StorageError.of(error) from error
-        while len(_SOLUTIONS) > KEPT_SOLUTIONS:
-            _SOLUTIONS.popitem(last=False)
-    _SOLUTIONS.move_to_end(path)
-    return _SOLUTIONS[path]
+    try:
+        solution: pipeline.Solution = codec.decode(Path(path).read_bytes())
+    except (FileNotFoundError, CodecError):
+        with contextlib.suppress(OSError):
+            Path(path).unlink()  # so that the job is run again when it is sent again
+        raise GoneError from None
+    except OSError as error:
+        raise StorageError.of(error) from error
+    return solution

@@ -42,7 +42,7 @@ text { font-family: "DejaVu Sans", "Segoe UI", Helvetica, Arial, sans-serif; fil
 .cut { fill: none; stroke: #e8781e; stroke-width: 2.2; stroke-dasharray: 9 6; }
 .loop { fill: none; stroke: #16202e; stroke-width: 3.2; stroke-linecap: round; }
 .cone { fill: #6a3fa0; stroke: #ffffff; stroke-width: 2; }
-.corner { fill: #c8202f; stroke: #ffffff; stroke-width: 2; } .angle { font-size: 20px; fill: #c8202f; }
+.corner { fill: #c8202f; stroke: #ffffff; stroke-width: 2; } .angle { fill: #c8202f; }
 .halo { paint-order: stroke; stroke: #ffffff; stroke-width: 5; stroke-linejoin: round; }
 .apex { fill: none; stroke: #6a3fa0; stroke-width: 2.5; } .named { font-size: 20px; }
 """
@@ -214,11 +214,7 @@ def _loops(cmap: ConformalMap, frame: Frame, unrolled: Unrolled) -> list[str]:
         turn = -np.degrees(np.angle(along))
         arrow, turn = ("→", turn) if abs(turn) <= 90 else ("←", turn - np.copysign(180, turn))
         words = f"loop {number} {arrow}" if arrow == "→" else f"{arrow} loop {number}"
-        parts.append(
-            f'<text class="named halo" style="font-size:{size:.1f}px" text-anchor="middle" '
-            f'dominant-baseline="central" transform="translate({x:.2f} {y:.2f}) rotate({turn:.2f})">'
-            f"{words}</text>"
-        )
+        parts.append(_words(words, "named", x, y, size, turn))
     return parts
 
 
@@ -248,9 +244,15 @@ def _name_inside(frame: Frame, start: Complexes, end: Complexes, name: str) -> s
         (middle.real.max() + middle.real.min() + 1j * (middle.imag.max() + middle.imag.min())) / 2
     )
     size = float(np.clip(0.9 * width / (CHARACTER * len(name)), SMALLEST, LARGEST))
+    return _words(name, "named", x, y, size)
+
+
+def _words(words: str, kind: str, x: float, y: float, size: float, turn: float = 0.0) -> str:
+    """Words around a place. size: of the letters, pixels. turn: degrees."""
     return (
-        f'<text class="named halo" style="font-size:{size:.1f}px" text-anchor="middle" '
-        f'dominant-baseline="central" x="{x:.2f}" y="{y:.2f}">{name}</text>'
+        f'<text class="{kind} halo" style="font-size:{size:.1f}px" text-anchor="middle" '
+        f'dominant-baseline="central" transform="translate({x:.2f} {y:.2f}) rotate({turn:.2f})">'
+        f"{words}</text>"
     )
 
 
@@ -271,10 +273,7 @@ def _corner_marks(cmap: ConformalMap, frame: Frame, unrolled: Unrolled) -> list[
             along = unrolled.end[side] - place
             away = -along / abs(along) * np.exp(0.5j * marked[vertex]) * 30 / frame.scale
             x, y = frame.at(place + away)
-            parts.append(
-                f'<text class="angle halo" text-anchor="middle" dominant-baseline="central" '
-                f'x="{x:.2f}" y="{y:.2f}">{angle(marked[vertex])}</text>'
-            )
+            parts.append(_words(angle(marked[vertex]), "angle", x, y, LARGEST))
     return parts
 
 

@@ -25,8 +25,8 @@ WIDTH, ROW, FINE = 420, 54, 2
 DPI = 100
 #: Pixels: letters of the title, of one in many lines, of the rows, of a row's first and second line.
 TITLE, SMALL_TITLE, LARGE, NORMAL, SMALL = 35, 21, 24, 21, 15
-#: More sizes than this are shown as a bar of colours.
-ROWS = 24
+#: More sizes than this are shown as a bar of colours, as high as so many rows.
+ROWS, BAR = 24, 10
 #: Letters of the title in a line, and lines before it becomes smaller.
 LETTERS, LINES = 18, 4
 NAMES = {
@@ -41,11 +41,21 @@ NAMES = {
 INK, GREY = "#23262b", "#70757d"
 
 
+@dataclass(frozen=True)
+class Row:
+    """A line of the legend. sides: of its polygon; 0: as most panels have. below: a smaller line under it."""
+
+    tint: str
+    sides: int
+    words: str
+    count: int
+    below: str = ""
+
+
 def compose(image: NDArray[np.uint8], panels: Panels, meta: Meta, unit: str | None = None) -> bytes:
     """PNG of the image (h, w, 3) with the legend on its right. unit: of the lengths."""
     ground = Image.new("RGB", (FINE * WIDTH, FINE * image.shape[0]), "white")
-    draw = _shapes if panels.mode == "watertight" else _legend
-    draw(Sheet(ImageDraw.Draw(ground)), image.shape[0], panels, meta, behind(unit))
+    _draw(Sheet(ImageDraw.Draw(ground)), image.shape[0], panels, meta, behind(unit))
     pixels = np.concatenate([image, np.asarray(ground.reduce(FINE))], axis=1)
     out = io.BytesIO()
     Image.fromarray(pixels).save(out, "png", compress_level=4, dpi=(DPI, DPI))
@@ -94,60 +104,60 @@ def _title(sheet: Sheet, top: float, name: str) -> None:
         sheet.headline(top - k * size * 1.35, line, size, WIDTH - 12)
 
 
-def _legend(sheet: Sheet, height: int, panels: Panels, meta: Meta, unit: str) -> None:
-    n_sizes = len(panels.class_length)
-    shown = n_sizes if n_sizes <= ROWS else panels.n_sizes
-    rows = shown if shown <= ROWS else 10
-    others = [
-        (f"{n_sizes - shown:,} other types", int(np.sum(panels.size >= shown))),
-        ("of no size class", int(np.sum(panels.size < 0))),
-    ]
-    others = [(words, count) for words, count in others if count]
-    top = (height - ROW * (rows + len(others))) / 2
+def _draw(sheet: Sheet, height: int, panels: Panels, meta: Meta, unit: str) -> None:
+    """Title, number of panels, a bar of colours where there are many sizes, and the rows."""
+    by_shape = panels.mode == "watertight"
+    rows = _shapes(panels, unit) if by_shape else _sizes(panels, unit)
+    bar = BAR if panels.n_sizes > ROWS and not by_shape else 0
+    top = (height - ROW * (bar + len(rows))) / 2
     _title(sheet, top - 96, text.one_line(meta.name))
-    named = panels.n_sizes
-    sizes = {0: "", 1: ", 1 size"}.get(named, f", {named:,} sizes")
-    sheet.write(0, top - 48, f"{panels.n_panels:,} panels{sizes}", LARGE, GREY)
-    if shown <= ROWS:
-        _swatches(sheet, top, panels, unit, shown)
-    else:
-        _bar(sheet, top, rows * ROW - 20, panels, unit)
-    for k, (words, count) in enumerate(others):
-        y = top + ROW * (rows + k + 0.5)
-        _swatch(sheet, y, panels, colours.UNSIZED)
-        sheet.write(64, y, words, LARGE, GREY)
-        sheet.write(WIDTH - 60, y, f"{count:,}", LARGE, GREY, anchor="rm")
+    sizes = {0: "", 1: ", 1 size"}.get(panels.n_sizes, f", {panels.n_sizes:,} sizes")
+    what = "flat panels" if by_shape else f"panels{sizes}"
+    sheet.write(0, top - 48, f"{panels.n_panels:,} {what}", LARGE, GREY)
+    if bar:
+        _bar(sheet, top, bar * ROW - 20, panels, unit)
+    for k, row in enumerate(rows):
+        y, size = top + ROW * (bar + k + 0.5), NORMAL if row.below else LARGE
+        _swatch(sheet, y, panels, row.tint, row.sides)
+        sheet.write(64, y - 9 * bool(row.below), row.words, size, INK)
+        sheet.write(64, y + 14, row.below, SMALL, GREY)
+        sheet.write(WIDTH - 30, y, f"{row.count:,}", size, GREY, anchor="rm")
 
 
-def _shapes(sheet: Sheet, height: int, panels: Panels, meta: Meta, unit: str) -> None:
+def _sizes(panels: Panels, unit: str) -> list[Row]:
+    """One row per size unless there are too many: colour, edge length, how many; then the other panels."""
+    n = len(panels.class_length)
+    shown = n if n <= ROWS else panels.n_sizes
+    listed = zip(
+        colours.class_colours(panels),
+        panels.class_sides.tolist(),
+        text.lengths(panels.class_length.tolist()),
+        panels.class_count.tolist(),
+        strict=True,
+    )
+    rows = [Row(tint, sides, word + unit, count) for tint, sides, word, count in listed]
+    others = [
+        Row(colours.UNSIZED, 0, f"{n - shown:,} other types", int(np.sum(panels.size >= shown))),
+        Row(colours.UNSIZED, 0, "of no size class", int(np.sum(panels.size < 0))),
+    ]
+    return [*(rows[:shown] if shown <= ROWS else []), *(row for row in others if row.count)]
+
+
+def _shapes(panels: Panels, unit: str) -> list[Row]:
     """Of watertight panels, which have no sizes: one row per shape, its mean edges below its name."""
     index, kinds, tints = colours.shapes(panels)
-    rows = [
+    found = [
         (i, tint, sides, f"{NAMES.get(sides, f'{sides}-gons')}{'' if plain else ', not convex'}")
         for i, ((sides, plain), tint) in enumerate(zip(kinds, tints, strict=True))
     ]
     if (index < 0).any():
-        rows.append((-1, colours.UNSIZED, 0, "cut at the boundary"))
-    top = (height - ROW * len(rows)) / 2
-    _title(sheet, top - 96, text.one_line(meta.name))
-    sheet.write(0, top - 48, f"{panels.n_panels:,} flat panels", LARGE, GREY)
-    for k, (i, tint, sides, name) in enumerate(rows):
-        y, edge = top + ROW * (k + 0.5), panels.edge_length[index == i]
-        _swatch(sheet, y, panels, tint, sides)
-        words = sorted({text.length(float(end)) for end in (edge.min(), edge.max())}, key=float)
-        sheet.write(64, y - 9, name, NORMAL, INK)
-        sheet.write(64, y + 14, f"edges {' to '.join(words)}{unit}", SMALL, GREY)
-        sheet.write(WIDTH - 30, y, f"{len(edge):,}", NORMAL, GREY, anchor="rm")
-
-
-def _swatches(sheet: Sheet, top: float, panels: Panels, unit: str, shown: int) -> None:
-    """One row per size, of this many: colour, edge length, how many."""
-    counts, words = panels.class_count.tolist(), text.lengths(panels.class_length.tolist())
-    for i, colour in enumerate(colours.class_colours(panels)[:shown]):
-        y = top + ROW * (i + 0.5)
-        _swatch(sheet, y, panels, colour, int(panels.class_sides[i]))
-        sheet.write(64, y, words[i] + unit, LARGE, INK)
-        sheet.write(WIDTH - 60, y, f"{counts[i]:,}", LARGE, GREY, anchor="rm")
+        found.append((-1, colours.UNSIZED, 0, "cut at the boundary"))
+    rows = []
+    for i, tint, sides, name in found:
+        edge = panels.edge_length[index == i]
+        ends = sorted({text.length(float(end)) for end in (edge.min(), edge.max())}, key=float)
+        rows.append(Row(tint, sides, name, len(edge), f"edges {' to '.join(ends)}{unit}"))
+    return rows
 
 
 def _swatch(sheet: Sheet, y: float, panels: Panels, colour: str, sides: int = 0) -> None:
@@ -159,7 +169,6 @@ def _swatch(sheet: Sheet, y: float, panels: Panels, colour: str, sides: int = 0)
 
 def _bar(sheet: Sheet, top: float, length: float, panels: Panels, unit: str) -> None:
     """A bar from the shortest edge to the longest, for many sizes."""
-    ends = top + np.linspace(0, length, 257)
     ends = (top + np.linspace(0, length, 257)).tolist()
     tints = colours.to_hex(colours.gradient(np.linspace(0, 1, 256)))
     for tint, low, high in zip(tints, ends[:-1], ends[1:], strict=True):

@@ -37,6 +37,15 @@ class Packed:
         data = packer.compress(text) + packer.flush(isal_zlib.Z_FULL_FLUSH)
         return cls(data, len(text), isal_zlib.crc32(text))
 
+    @classmethod
+    def joined(cls, pieces: Iterable[Packed]) -> Packed:
+        """Their texts one after the other."""
+        pieces, size, checksum = list(pieces), 0, 0
+        for piece in pieces:
+            checksum = isal_zlib.crc32_combine(checksum, piece.checksum, piece.size)
+            size += piece.size
+        return cls(b"".join(piece.data for piece in pieces), size, checksum)
+
 
 def packed_part(name: str, value: bytes) -> Packed:
     """One member of a JSON object."""
@@ -50,12 +59,11 @@ def document(parts: Mapping[str, Packed]) -> bytes:
     pieces = [begin]
     for part in parts.values():
         pieces += [part, comma]
-    pieces = [*(pieces[:-1] if parts else pieces), end]
+    whole = Packed.joined([*(pieces[:-1] if parts else pieces), end])
     listed = orjson.dumps([len(begin.data), len(comma.data), table])
     field = _FIELD + struct.pack("<H", len(listed)) + listed
-    return b"".join(
-        [_HEAD, struct.pack("<H", len(field)), field, *(piece.data for piece in pieces), _END, _tail(pieces)]
-    )
+    tail = struct.pack("<II", whole.checksum, whole.size & 0xFFFFFFFF)
+    return b"".join([_HEAD, struct.pack("<H", len(field)), field, whole.data, _END, tail])
 
 
 def picked(packed: bytes, names: Iterable[str]) -> bytes | None:
@@ -71,11 +79,3 @@ def picked(packed: bytes, names: Iterable[str]) -> bytes | None:
     if not found.keys() >= set(names):
         return None
     return document({name: found[name] for name in names})
-
-
-def _tail(pieces: Iterable[Packed]) -> bytes:
-    checksum = size = 0
-    for piece in pieces:
-        checksum = isal_zlib.crc32_combine(checksum, piece.checksum, piece.size)
-        size += piece.size
-    return struct.pack("<II", checksum, size & 0xFFFFFFFF)

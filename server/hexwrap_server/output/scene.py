@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 from hexwrap_server.output.colours import encoded, from_hex, linear
 from hexwrap_server.output.raster import Camera, Polygons, draw, planes
@@ -202,7 +203,8 @@ def _lit(
     lit = np.ones(owner.shape)
     if scene.view[2] > 0:
         some = _on_the_ground(camera, owner.shape, sun, float(points[:, 2].min()))
-        lit = 1 - (1 - _enlarged(some, owner.shape)) * _fade(owner.shape)
+        fine = Image.fromarray(some.astype(np.float32)).resize(owner.shape[::-1], Image.Resampling.BILINEAR)
+        lit = 1 - (1 - np.asarray(fine, dtype=np.float64)) * _fade(owner.shape)
     hit = owner >= 0
     row, column = np.nonzero(hit)
     x, y = (np.asarray(FINE * (at + 0.5), dtype=np.float64) for at in (column, row))
@@ -231,18 +233,6 @@ def _fade(shape: tuple[int, ...]) -> Floats:
     rows, columns = (np.minimum(np.arange(n), n - 1 - np.arange(n)) for n in shape)
     t = np.clip(np.minimum(rows[:, None], columns) / FADE, 0, 1)
     return np.asarray(t * t * (3 - 2 * t))
-
-
-def _enlarged(image: Floats, shape: tuple[int, ...]) -> Floats:
-    """A coarse image at the size of a fine one, linearly between its pixels: first down, then across."""
-    for axis, n in enumerate(shape):
-        most = image.shape[axis] - 1
-        at = np.minimum(np.arange(n) * image.shape[axis] / n, most)
-        low = np.floor(at).astype(np.int64)
-        part = (at - low).astype(image.dtype).reshape((-1, 1) if axis == 0 else (1, -1))
-        before = np.take(image, low, axis)
-        image = before + part * (np.take(image, np.minimum(low + 1, most), axis) - before)
-    return image
 
 
 def _outline(owner: NDArray[np.int32], n_panels: int) -> NDArray[np.float32]:

@@ -15,7 +15,7 @@ from hexwrap_solver.arrays import Bools, Floats, Ragged
 from hexwrap_solver.conformal.net import Net
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.domain.apart import apart
-from hexwrap_solver.panels.folds import bend_angles
+from hexwrap_solver.panels.folds import bend_angles, hinges_of
 from hexwrap_solver.panels.types import Panels
 from hexwrap_solver.pattern.types import Pattern
 from hexwrap_solver.pipeline import Solution
@@ -52,7 +52,7 @@ def part(solution: Solution, name: str, timings: dict[str, float]) -> Any:
         case "pattern":
             return solution.pattern and pattern(solution.pattern)
         case "panels":
-            return panels(solution)
+            return solution.panels and placed(solution) | sized(solution)
         case "sizes":
             return sizes(solution.panels)
         case "quality":
@@ -132,15 +132,26 @@ def pattern(laid: Pattern) -> dict[str, Any]:
     }
 
 
-def panels(solution: Solution) -> dict[str, Any] | None:
-    made, laid, measured = solution.panels, solution.pattern, solution.quality
-    if made is None or laid is None:
-        return None
+def placed(solution: Solution) -> dict[str, Any]:
+    """Of the panels, what depends on nothing else than the pattern, where they lie, and their limits."""
+    made, laid = solution.panels, solution.pattern
+    assert made is not None
+    assert laid is not None
     labels = laid.labels()
     return {
-        **fields(made, "mode polygons face"),
+        **fields(made, "mode face"),
         "label": [labels[i] for i in made.face.tolist()],
-        **fields(made, "size edge_length limit center normal whole outside"),
+        **fields(made, "limit center normal whole"),
+    }
+
+
+def sized(solution: Solution) -> dict[str, Any]:
+    """The rest, which their lengths change."""
+    made, laid, measured = solution.panels, solution.pattern, solution.quality
+    assert made is not None
+    assert laid is not None
+    return {
+        **fields(made, "polygons size edge_length outside"),
         **fields(measured, "planarity edge_deviation angle_deviation surface_distance"),
         "gap_tangential": _widest(measured.gap_tangential, laid.neighbours, made),
         "gap_normal": _widest(measured.gap_normal, laid.neighbours, made),
@@ -151,14 +162,10 @@ def panels(solution: Solution) -> dict[str, Any] | None:
 
 def bent(made: Panels) -> dict[str, Any]:
     """Of each panel the corners between which it is bent, the angle there, and the cell of its other half."""
-    bends = made.bends
-    corner: list[list[int] | None] = [None] * made.n_panels
-    if bends is not None:
-        for panel, hinge in zip(bends.panel.tolist(), bends.hinge.tolist(), strict=True):
-            corner[panel] = [0, hinge]
+    corner = [None if hinge < 0 else [0, hinge] for hinge in hinges_of(made).tolist()]
     other = np.full(made.n_panels, -1)
-    if bends is not None:
-        other[bends.panel] = bends.other
+    if made.bends is not None:
+        other[made.bends.panel] = made.bends.other
     return {"bend": corner, "bend_angle": bend_angles(made), "other_face": other}
 
 

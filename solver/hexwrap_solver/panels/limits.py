@@ -28,8 +28,11 @@ LOOSE = 1e-6
 
 def support_function(poses: Poses, direction: Floats) -> Floats:
     """(q, k) farthest extent of the polygons of edge 1 around 0 in each direction (q, k, 3), one a corner."""
-    spokes = poses.spokes(direction.shape[1])
-    return np.asarray(np.einsum("qkd,qjd->qkj", direction, spokes).max(axis=2))
+    spokes, (x, y, z) = poses.spokes(direction.shape[1]), np.ascontiguousarray(direction.T)
+    reached = np.full(x.shape, -np.inf)
+    for u, v, w in np.ascontiguousarray(spokes.transpose(1, 2, 0)):
+        np.maximum(reached, x * u + y * v + z * w, out=reached)
+    return reached.T
 
 
 def inscribed(poses: Poses, direction: Floats, offset: Floats) -> tuple[Floats, Floats]:
@@ -44,13 +47,7 @@ def inscribed(poses: Poses, direction: Floats, offset: Floats) -> tuple[Floats, 
     flat = np.einsum("qkd,qed->qke", direction, axes)
     room = offset - np.einsum("qkd,qd->qk", direction, poses.center)
     h = support_function(poses, direction)
-    best = np.full(len(room), np.inf)
-    chosen = np.zeros((len(room), 3), dtype=np.int64)
-    for triple in combinations(range(direction.shape[1]), 3):
-        value = _dual_value(flat[:, triple], h[:, triple], room[:, triple])
-        better = value < best
-        best = np.where(better, value, best)
-        chosen[better] = triple
+    best, chosen = _least_dual(flat, h, room)
     shift = _touching_centre(flat, h, room, chosen)
     bounded = np.where(np.isfinite(best), best, 0.0)
     short = ~np.isfinite(best) | (_room_length(shift, flat, h, room) < bounded - SHORTFALL * np.abs(bounded))
@@ -84,16 +81,24 @@ def _room_length(shift: Floats, flat: Floats, h: Floats, room: Floats) -> Floats
     return np.asarray(((room - np.einsum("qke,qe->qk", flat, shift)) / h).min(axis=1))
 
 
-def _dual_value(s: Floats, h: Floats, room: Floats) -> Floats:
-    """Value of the dual vertex of three planes, s (q, 3, 2); infinite where it is not feasible."""
-    weight = np.stack(
-        [cross_2d(s[:, 1], s[:, 2]), cross_2d(s[:, 2], s[:, 0]), cross_2d(s[:, 0], s[:, 1])], axis=1
-    )
-    total = (weight * h).sum(axis=1)
-    feasible = (np.abs(total) > DUAL_TOLERANCE) & ~np.any(
-        weight * np.sign(total)[:, None] < -DUAL_TOLERANCE, 1
-    )
-    return np.where(feasible, (weight * room).sum(axis=1) / np.where(feasible, total, 1.0), np.inf)
+def _least_dual(flat: Floats, h: Floats, room: Floats) -> tuple[Floats, Ints]:
+    """(q,) least value of the dual vertices of three planes each, infinite where none is feasible, and the
+    three (q, 3)."""
+    x, y, h, room = (np.ascontiguousarray(part.T) for part in (flat[..., 0], flat[..., 1], h, room))
+    k, q = h.shape
+    turn = {(i, j): x[i] * y[j] - y[i] * x[j] for i, j in combinations(range(k), 2)}
+    triples = list(combinations(range(k), 3))
+    best, which = np.full(q, np.inf), np.zeros(q, dtype=np.int64)
+    for t, (a, b, c) in enumerate(triples):
+        u, v, w = turn[b, c], -turn[a, c], turn[a, b]
+        total = u * h[a] + v * h[b] + w * h[c]
+        sign = np.sign(total)
+        least = np.minimum(np.minimum(u * sign, v * sign), w * sign)
+        feasible = (np.abs(total) > DUAL_TOLERANCE) & ~(least < -DUAL_TOLERANCE)
+        value = (u * room[a] + v * room[b] + w * room[c]) / np.where(feasible, total, 1.0)
+        better = feasible & (value < best)
+        best[better], which[better] = value[better], t
+    return best, np.array(triples, dtype=np.int64).reshape(-1, 3)[which]
 
 
 def _touching_centre(flat: Floats, h: Floats, room: Floats, triple: Ints) -> Floats:

@@ -307,18 +307,18 @@ def _curve(fitted: FittedPanels, allowed: Floats, settings: PanelSettings) -> Fl
         kinds.append((own, made.start, floored))
     joints = None if fitted.facing is None else _joints(fitted)
     own_width = np.zeros(0) if joints is None else joints.width(allowed)
-    # The last: of panels with a given shape, which lose nothing.
-    lost, shrink = np.zeros(len(allowed) + 1), np.append(inradius, 0.0)
+    # The first: of panels with a given shape, which lose nothing.
+    shrunk = np.zeros(len(allowed) + 1)
     length = np.zeros_like(allowed)
     curve = []
     for k in range(max(len(start) for _, start, _ in kinds)):
         for own, start, floored in kinds:
             length[own] = lengths_of(start[min(k, len(start) - 1)], floored)
         uncovered = 1 - float(area @ length**2) / cell_area
-        lost[:-1] = allowed - length
+        shrunk[1:] = inradius * (allowed - length)
         joint = own_width
         if joints is not None:
-            joint = own_width + (shrink * lost)[joints.left] + (shrink * lost)[joints.right]
+            joint = own_width + shrunk.take(joints.left + 1) + shrunk.take(joints.right + 1)
         # A cell's inradius exceeds its panel's by half the gap between cells of the same size.
         widest = float(np.max(2 * inradius * (free_length - length)))
         curve.append((uncovered, widest, joint.mean() if len(joint) else 0.0, joint.max(initial=0.0)))

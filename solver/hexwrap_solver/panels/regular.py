@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hexwrap_solver.arrays import Complexes, Floats, Ragged
-from hexwrap_solver.geometry import dot, normalize
+from hexwrap_solver.geometry import cross, dot, lengths, normalize
 
 
 @dataclass(frozen=True)
@@ -44,10 +44,11 @@ class Poses:
 
 def outline_areas(spokes: Ragged) -> Floats:
     """(q,) areas of polygons from the centre to the corners."""
-    cross = np.cross(spokes.values, spokes.values[spokes.next()]) / 2
     if not spokes.n_rows:
         return np.zeros(0)
-    return np.asarray(np.linalg.norm(np.add.reduceat(cross, spokes.offsets[:-1]), axis=1))
+    spoke = np.asarray(spokes.values, dtype=np.float64)
+    vector = cross(spoke, spoke.take(spokes.next(), axis=0)) / 2
+    return lengths(np.add.reduceat(vector, spokes.offsets[:-1]))
 
 
 def bending(outline: Complexes) -> int:

@@ -35,7 +35,7 @@ from hexwrap_solver.pattern.lay.layout import Layout
 from hexwrap_solver.pattern.lay.nodes import Nodes, find_nodes
 from hexwrap_solver.pattern.pieces import fold_pieces
 from hexwrap_solver.pattern.place.choose import PlacementFamily
-from hexwrap_solver.pattern.place.placement import Placement, anchor_vertex, edge_angle
+from hexwrap_solver.pattern.place.placement import FOLDED, Placement, anchor_vertex, edge_angle
 from hexwrap_solver.pattern.place.rotation import with_rotation
 from hexwrap_solver.pattern.place.sense import check_edge, too_many
 from hexwrap_solver.pattern.place.size import ASKED, fitting_number, mean_stretch, wanted_edge
@@ -96,6 +96,12 @@ def lay_pattern(cmap: ConformalMap, settings: PatternSettings, progress: Progres
                 f"pattern closes up with little distortion ({pattern.around} cells around); others may be "
                 "had with around."
             )
+    if not pattern.distortion < FOLDED:
+        notes.append(
+            "The pattern is bent so much that triangles of the surface turn over in it; smaller cells are "
+            "bent less."
+        )
+        pattern = replace(pattern, distortion=FOLDED)
     return replace(pattern, notes=(*notes, *pattern.notes))
 
 

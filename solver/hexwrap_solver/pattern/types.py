@@ -132,8 +132,8 @@ class Pattern:
     loop 0 and place in the row; on nets around is the greatest number of cells in one.
     rotation: angle actually taken, radians, from the boundary direction (or the horizontal axis on cones).
     edge_length: mean edge length on the surface. distortion: worst singular-value ratio − 1 of the stretch
-    that ``align`` and features needed, 0 where none. features: what became of those of the surface. pieces:
-    cells cut along them, None where there are none.
+    that ``align`` and features needed, 0 where none, 10⁶ where a triangle turns over. features: what
+    became of those of the surface. pieces: cells cut along them, None where there are none.
     """
 
     kind: Kind

@@ -16,7 +16,7 @@ from hexwrap_solver.panels.polygons import fan_areas
 from hexwrap_solver.pattern import lay_pattern
 from hexwrap_solver.pattern.lattice import LATTICES
 from hexwrap_solver.pattern.lay_pattern import mean_edge
-from hexwrap_solver.pattern.place.choose import place_lattice
+from hexwrap_solver.pattern.place.choose import PlacementFamily, place_lattice
 from hexwrap_solver.pattern.place.placement import BEARABLE
 from hexwrap_solver.pattern.place.size import width_per_cell
 from hexwrap_solver.pattern.types import Pattern, PatternSettings
@@ -202,6 +202,14 @@ def test_the_default_size_of_a_cone_counts_its_cells_whatever_its_narrow_end():
     assert 1000 < pattern.n_cells < 3300
     assert "narrow end" in " ".join(pattern.notes)
     check_closed(pattern)
+
+
+def test_where_triangles_turn_over_the_distortion_is_a_number_and_told(monkeypatch):
+    placed = PlacementFamily.at
+    monkeypatch.setattr(PlacementFamily, "at", lambda self, s: replace(placed(self, s), distortion=np.inf))
+    pattern = lay_pattern(short_ring(10.0), PatternSettings(around=24))
+    assert pattern.distortion == 1e6
+    assert any("turn over" in note for note in pattern.notes)
 
 
 @pytest.mark.parametrize("kind", ["hex", "triangle", "quad"])
