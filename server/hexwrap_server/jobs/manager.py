@@ -105,6 +105,7 @@ class JobManager:
         self._running: set[_Item] = set()
         self._changed: dict[str, asyncio.Event] = {}
         self._chores: list[asyncio.Task[None]] = []
+        self._last = "", b""  # the result that was finished or asked for last, and whose it is
         self._closing = asyncio.Event()
         self._turn = asyncio.Lock()
 
@@ -263,10 +264,13 @@ class JobManager:
     async def result(self, job: Job) -> bytes:
         """The packed Result. Raises GoneError, StorageError."""
         self._kept(job)
-        packed = await asyncio.to_thread(self.store.result, job.identity)
-        if packed is None:
-            raise GoneError
-        return packed
+        if self._last[0] != job.identity:
+            packed = await asyncio.to_thread(self.store.result, job.identity)
+            if packed is None:
+                raise GoneError
+            self._last = job.identity, packed
+            return packed
+        return self._last[1]
 
     async def parts(self, job: Job, names: list[str], errand: Callable[..., Awaitable[bytes]]) -> bytes:
         """Some parts of the Result, packed. Raises GoneError, StorageError."""
@@ -342,8 +346,9 @@ class JobManager:
                 lambda: self._change(item, written=True, status="running", stage="", started=now)
             )
             outcome = await (self._explore(item) if item.explores else self._compute(item))
-            await asyncio.to_thread(self.store.keep_outcome, identity, outcome)
+            packed = await asyncio.to_thread(self.store.keep_outcome, identity, outcome)
             await _patiently(lambda: self.store.finish_work(identity, outcome))
+            self._last = identity, packed
             self._end([_done(job, outcome) for job in item.jobs.values()])
             item.tell()
         except asyncio.CancelledError:

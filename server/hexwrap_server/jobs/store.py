@@ -216,12 +216,20 @@ class Store:
             self._write("UPDATE works SET used = ? WHERE identity = ?", time.time(), identity)
         return work
 
-    def keep_outcome(self, identity: str, outcome: Outcome) -> None:
-        """Write the files of a result, if the worker did not; ``done`` comes after. Raises StorageError."""
+    def keep_outcome(self, identity: str, outcome: Outcome) -> bytes:
+        """Write the files of a result, if the worker did not; ``done`` comes after. The packed result.
+
+        Raises StorageError.
+        """
         if outcome.solution is not None:
             write_whole(self.solution_path(identity), [outcome.solution])
         if outcome.result is not None:
             write_whole(self.result_path(identity), [outcome.result])
+            return outcome.result
+        try:
+            return self.result_path(identity).read_bytes()
+        except OSError as error:
+            raise StorageError.of(error) from error
 
     def result(self, identity: str) -> bytes | None:
         """Reads a packed result; None where it is gone or damaged, and then it is forgotten."""
