@@ -171,7 +171,7 @@ def test_results_are_not_taken_for_gone_when_no_file_handle_is_left(
     monkeypatch.undo()
     assert store.result("a" * 64)
     assert solution_at(str(solution)).panels is not None
-    solution_at.__globals__["_SOLUTIONS"].clear()
+    solution_at.cache_clear()
     solution.unlink()
     with pytest.raises(GoneError):
         solution_at(str(solution))

@@ -10,6 +10,7 @@ import xml.etree.ElementTree as ET
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import ezdxf
 import numpy as np
@@ -21,12 +22,15 @@ from matplotlib.image import imread
 from hexwrap_server.cli import main as cli
 from hexwrap_server.errors import NotMadeError, SheetError
 from hexwrap_server.http import routes
+from hexwrap_server.input.bodies import Body
+from hexwrap_server.jobs import reading
 from hexwrap_server.output import scene, text
 from hexwrap_server.output.dxf import object_coordinates
 from hexwrap_server.output.flat import lay_flat, pack
 from hexwrap_server.output.unrolled import Unrolled
 from hexwrap_server.output.wire import result_json
 from hexwrap_server.output.writers import WRITERS, Meta, write
+from hexwrap_server.settings import Settings
 from hexwrap_solver.arrays import Ragged
 from hexwrap_solver.conformal.net import Net
 from hexwrap_solver.panels import make_components
@@ -426,7 +430,7 @@ def test_domain_dxf_is_the_domain_in_its_own_units(solution: Solution) -> None:
     assert corner.dxf.location.xyz == pytest.approx((vertex.real, vertex.imag, 0.0))
 
 
-def test_a_domain_that_overlaps_itself_is_drawn_apart(solution: Solution) -> None:
+def test_a_domain_that_overlaps_itself_is_drawn_apart(solution: Solution, monkeypatch: Any) -> None:
     surface, corners = solution.map.surface, solution.map.corners()
     middle = np.median(corners.imag)
     below = np.where(corners.imag.mean(axis=1) > middle, -1j * middle, 0)  # the upper half over the lower one
@@ -442,6 +446,16 @@ def test_a_domain_that_overlaps_itself_is_drawn_apart(solution: Solution) -> Non
     assert len(told["shift"]) == 2
     assert len(told["cell"]) == len(labels_of(solution))
     assert json.loads(result_json(solution))["map"]["apart"] is None
+    monkeypatch.setattr(reading, "solution_at", lambda path: twofold)
+    points = surface.vertices[surface.faces].mean(axis=1)
+    flat = carried("flatten", points)["uv"]
+    assert np.allclose(carried("lift", flat)["points"], points, atol=1e-9)
+
+
+def carried(what: str, points: Any) -> dict[str, Any]:
+    """The answer of that route."""
+    body = Body(json.dumps({"points": np.asarray(points).tolist()}).encode())
+    return json.loads(getattr(reading, what)(lambda *_: None, body, Settings(), ""))
 
 
 def test_npz_holds_the_arrays_themselves(solution: Solution) -> None:

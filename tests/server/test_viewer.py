@@ -30,7 +30,8 @@ STATIC = ROOT / "server" / "hexwrap_server" / "static"
 
 
 #: Draws without a graphics card, asks nobody on the network. Only the views themselves are drawn by a GPU's
-#: stand-in, and without smoothing: the page around them would take several times as long.
+#: stand-in, without smoothing and (where pages are opened) with a quarter of the pixels: the page around them
+#: would take several times as long.
 BROWSER_FLAGS = [
     "--no-sandbox",
     "--use-gl=angle",
@@ -123,7 +124,7 @@ def browser() -> Iterator[object]:
 @contextmanager
 def opened(browser, server: Server, path: str = "/") -> Iterator[Page]:
     """A page that must ask nobody else and must not complain, except where the test says so."""
-    page = browser.new_page(viewport={"width": 1280, "height": 720})
+    page = browser.new_page(viewport={"width": 1280, "height": 720}, device_scale_factor=0.5)
     page.context.set_default_timeout(MOMENT)
     page.context.set_default_navigation_timeout(MOMENT)
     page.complaints, page.strangers = [], []
@@ -570,7 +571,7 @@ def test_corners_are_found_at_vertices_that_were_welded_away(browser, server: Se
 
 def test_cancel_stops_the_job(browser, server: Server, tmp_path: Path) -> None:
     path = tmp_path / "fine.obj"
-    path.write_text(tube(900, 300))
+    path.write_text(tube(480, 160))
     with opened(browser, server) as page:
         page.set_input_files("#file", str(path))
         page.wait_for_selector("#cancel:not([hidden])")

@@ -43,11 +43,7 @@ def read_body(given: str) -> tuple[dict[str, Any], bytes | None]:
     """
     if given.startswith(SAMPLE):
         return sample_body(given.removeprefix(SAMPLE)), None
-    path = Path(given)
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise UsageError(f"{given} cannot be read: {error.strerror or error}.") from None
+    path, data = Path(given), read_bytes(given)
     if path.suffix.lower() != ".json":
         return {"name": path.stem[:200]}, data
     body = loads(as_utf8(data))
@@ -55,6 +51,14 @@ def read_body(given: str) -> tuple[dict[str, Any], bytes | None]:
         raise UsageError(f"{given} does not hold a JSON object: a request or a surface.")
     body = body if "surface" in body else {"surface": body}
     return {"name": path.stem[:200], **body}, None
+
+
+def read_bytes(path: str) -> bytes:
+    """Raises UsageError."""
+    try:
+        return Path(path).read_bytes()
+    except OSError as error:
+        raise UsageError(f"{path} cannot be read: {error.strerror or error}.") from None
 
 
 def sample_body(name: str) -> dict[str, Any]:

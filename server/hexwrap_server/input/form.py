@@ -8,9 +8,9 @@ field is a fault; what the model has accepted becomes the dataclass again.
 from __future__ import annotations
 
 import types
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import MISSING, Field, dataclass, fields, is_dataclass, replace
-from functools import cache, partial
+from functools import cache
 from math import inf, nextafter
 from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
@@ -84,7 +84,7 @@ class Leaf:
     def entry(self) -> tuple[str | None, str, str]:
         """Of the entries of such a list: the field that numbers their place, if any; the one that gives it by
         a point or a line of points; and the one that says what is wanted there."""
-        hints = _hints(self._row)
+        hints = get_type_hints(self._row, include_extras=True)
         names = [f.name for f in fields(self._row) if f.default is None and int in _parts(hints[f.name])]
         number, points = next(iter(names), None), "line" if "line" in hints else "point"
         return number, points, next(name for name in hints if name not in (number, points))
@@ -113,10 +113,6 @@ def document(settings: Any) -> dict[str, Any]:
     return written
 
 
-#: The types of a dataclass's fields. Not to be written to.
-_hints: Callable[[type], dict[str, Any]] = cache(partial(get_type_hints, include_extras=True))
-
-
 @cache
 def schema(kind: type) -> dict[str, Any]:
     """JSON Schema of the settings, with its definitions inside."""
@@ -126,13 +122,11 @@ def schema(kind: type) -> dict[str, Any]:
 @cache
 def model_of(kind: type) -> type[BaseModel]:
     """The model that accepts these settings."""
-    hints = _hints(kind)
     members: dict[str, Any] = {}
-    for f in _open_fields(kind):
-        setting = setting_of(hints[f.name])
+    for f, annotation, setting in _settings(kind):
         extra = {"unit": setting.unit or None, "rare": setting.rare or None}
         members[f.name] = (
-            _accepted(hints[f.name], setting),
+            _accepted(annotation, setting),
             pydantic.Field(
                 **_default(f),
                 title=f.name.replace("_", " ").capitalize(),
@@ -145,22 +139,20 @@ def model_of(kind: type) -> type[BaseModel]:
 
 def leaves(kind: type, root: Path = ()) -> Iterator[Leaf]:
     """The settings that are not sections themselves, in order."""
-    hints = _hints(kind)
-    for f in _open_fields(kind):
+    for f, annotation, setting in _settings(kind):
         path = (*root, f.name)
-        section = next((part for part in _parts(hints[f.name]) if is_dataclass(part)), None)
+        section = next((part for part in _parts(annotation) if is_dataclass(part)), None)
         if section is not None:
             yield from leaves(section, path)  # type: ignore[arg-type]
         else:
             default = f.default if f.default is not MISSING else None
-            parts = tuple(part for part in _parts(hints[f.name]) if part is not type(None))
-            yield Leaf(path, setting_of(hints[f.name]), parts, default)
+            parts = tuple(part for part in _parts(annotation) if part is not type(None))
+            yield Leaf(path, setting, parts, default)
 
 
 def values(settings: Any, root: tuple[str | int, ...] = ()) -> Iterator[tuple[str, Setting, Any]]:
     """JSON pointer, annotation and value of every setting, entries of lists included."""
-    hints = _hints(type(settings))
-    for f in _open_fields(type(settings)):
+    for f, _, setting in _settings(type(settings)):
         value, path = getattr(settings, f.name), (*root, f.name)
         rows = enumerate(value) if isinstance(value, tuple) else ()
         if is_dataclass(value):
@@ -169,12 +161,12 @@ def values(settings: Any, root: tuple[str | int, ...] = ()) -> Iterator[tuple[st
             for i, row in rows:
                 yield from values(row, (*path, i))
         else:
-            yield pointer(path), setting_of(hints[f.name]), value
+            yield pointer(path), setting, value
 
 
 def is_nullable(kind: type, name: str) -> bool:
     """Whether a field may be null."""
-    return type(None) in _parts(_hints(kind)[name])
+    return type(None) in _parts(get_type_hints(kind, include_extras=True)[name])
 
 
 def setting_of(annotation: Any) -> Setting:
@@ -182,10 +174,11 @@ def setting_of(annotation: Any) -> Setting:
     return next(extra for extra in get_args(annotation) if isinstance(extra, Setting))
 
 
-def _open_fields(kind: type) -> list[Field[Any]]:
-    """Those that a request may set."""
-    hints = _hints(kind)
-    return [f for f in fields(kind) if not setting_of(hints[f.name]).limit]
+def _settings(kind: type) -> list[tuple[Field[Any], Any, Setting]]:
+    """Field, annotation and setting of all that a request may set."""
+    hints = get_type_hints(kind, include_extras=True)
+    found = [(f, hints[f.name], setting_of(hints[f.name])) for f in fields(kind)]
+    return [one for one in found if not one[2].limit]
 
 
 def _parts(annotation: Any) -> tuple[Any, ...]:
@@ -264,11 +257,10 @@ def _inlined(schema: dict[str, Any]) -> dict[str, Any]:
 def _in_radians(settings: T, factor: float = 1.0) -> T:
     """Angles in radians instead of the ``angle_unit`` beside or above them."""
     factor = ANGLE_UNITS[settings.angle_unit] if hasattr(settings, "angle_unit") else factor
-    hints = _hints(type(settings))
     changes: dict[str, Any] = {}
-    for f in _open_fields(type(settings)):
+    for f, _, setting in _settings(type(settings)):
         value = getattr(settings, f.name)
-        if setting_of(hints[f.name]).unit == "angle" and value is not None:
+        if setting.unit == "angle" and value is not None:
             changes[f.name] = value * factor
         elif is_dataclass(value):
             changes[f.name] = _in_radians(value, factor)
@@ -280,19 +272,16 @@ def _in_radians(settings: T, factor: float = 1.0) -> T:
 def _document(settings: Any, factor: float, is_entry: bool) -> Any:
     """is_entry: of a list, where what is null is left out."""
     factor = ANGLE_UNITS[settings.angle_unit] if hasattr(settings, "angle_unit") else factor
-    hints = _hints(type(settings))
     written: dict[str, Any] = {}
-    for f in _open_fields(type(settings)):
+    for f, _, setting in _settings(type(settings)):
         value = getattr(settings, f.name)
         if value is None and is_entry:
             continue
-        if setting_of(hints[f.name]).unit == "angle" and value is not None:
+        if setting.unit == "angle" and value is not None:
             value = _in_unit(value, factor)
         elif is_dataclass(value):
             value = _document(value, factor, False)
-        elif isinstance(value, tuple):
-            value = _rows(value, factor)
-        written[f.name] = value
+        written[f.name] = _rows(value, factor)
     return written
 
 

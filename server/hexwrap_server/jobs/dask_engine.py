@@ -124,7 +124,7 @@ class DaskEngine:
             self._places.pop(ticket, None)
 
     async def _answer(self, future: Any, ticket: str) -> Any:
-        answer = asyncio.ensure_future(_result(future))
+        answer = asyncio.ensure_future(future)
         try:
             first = ""
             while True:
@@ -176,10 +176,6 @@ class DaskEngine:
             self._places[ticket] = content[1]
         else:
             self._listeners[ticket](*content)
-
-
-async def _result(future: Any) -> Any:
-    return await future
 
 
 def _content(answer: asyncio.Future[Any]) -> Any:

@@ -47,8 +47,6 @@ CATCH_UP_INTERVAL = 2.0
 PATIENCE, BUSY_INTERVAL = 10.0, 0.1
 #: Explorations that run at once; they take no worker themselves.
 EXPLORERS = 2
-#: Results kept in memory as they go over the wire.
-HOT_RESULT_BYTES = 64 * MIB
 log = logging.getLogger("hexwrap.jobs")
 
 
@@ -106,8 +104,8 @@ class JobManager:
         self._queue: OrderedDict[str, _Item] = OrderedDict()
         self._running: set[_Item] = set()
         self._changed: dict[str, asyncio.Event] = {}
-        self._hot: OrderedDict[str, bytes] = OrderedDict()
         self._chores: list[asyncio.Task[None]] = []
+        self._last = "", b""  # the result that was finished or asked for last, and whose it is
         self._closing = asyncio.Event()
         self._turn = asyncio.Lock()
 
@@ -266,13 +264,13 @@ class JobManager:
     async def result(self, job: Job) -> bytes:
         """The packed Result. Raises GoneError, StorageError."""
         self._kept(job)
-        if job.identity not in self._hot:
+        if self._last[0] != job.identity:
             packed = await asyncio.to_thread(self.store.result, job.identity)
             if packed is None:
                 raise GoneError
-            self._heat(job.identity, packed)
-        self._hot.move_to_end(job.identity)
-        return self._hot[job.identity]
+            self._last = job.identity, packed
+            return packed
+        return self._last[1]
 
     async def parts(self, job: Job, names: list[str], errand: Callable[..., Awaitable[bytes]]) -> bytes:
         """Some parts of the Result, packed. Raises GoneError, StorageError."""
@@ -350,7 +348,7 @@ class JobManager:
             outcome = await (self._explore(item) if item.explores else self._compute(item))
             packed = await asyncio.to_thread(self.store.keep_outcome, identity, outcome)
             await _patiently(lambda: self.store.finish_work(identity, outcome))
-            self._heat(identity, packed)
+            self._last = identity, packed
             self._end([_done(job, outcome) for job in item.jobs.values()])
             item.tell()
         except asyncio.CancelledError:
@@ -516,11 +514,6 @@ class JobManager:
         event = self._changed.pop(id, None)
         if event:
             event.set()
-
-    def _heat(self, identity: str, packed: bytes) -> None:
-        self._hot[identity] = packed
-        while len(self._hot) > 1 and sum(map(len, self._hot.values())) > HOT_RESULT_BYTES:
-            self._hot.popitem(last=False)
 
     async def _prune_forever(self) -> None:
         s = self._settings

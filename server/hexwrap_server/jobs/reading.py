@@ -33,21 +33,21 @@ from hexwrap_server.jobs.disk import keep_file, surface_file
 from hexwrap_server.jobs.work import solution_at, stages, take_in
 from hexwrap_server.jobs.worker import Report
 from hexwrap_server.output import wire
+from hexwrap_server.output.unrolled import drawn
 from hexwrap_server.problems import body_is_the_surface
 from hexwrap_server.settings import Settings
 from hexwrap_solver import domain
+from hexwrap_solver.conformal.types import ConformalMap
 
 
-def read_request(report: Report, body: Body, settings: Settings, folder: str) -> ParsedRequest:
-    """JSON → request. folder: where its surface is kept. Raises FormError, HttpError, StorageError."""
+def read_request(
+    report: Report, body: Body, settings: Settings, folder: str, explore: bool = False
+) -> ParsedRequest:
+    """JSON → request, or what to explore. folder: where its surface is kept. Raises FormError, HttpError,
+    StorageError."""
     document = loads(body.plain(settings.max_body_mib))
-    return kept(parse_request(document, settings.max_vertices, settings.max_panels), folder)
-
-
-def read_exploration(report: Report, body: Body, settings: Settings, folder: str) -> ParsedRequest:
-    """JSON → what to explore. As ``read_request``."""
-    document = loads(body.plain(settings.max_body_mib))
-    return kept(parse_exploration(document, settings.max_vertices, settings.max_panels), folder)
+    parse = parse_exploration if explore else parse_request
+    return kept(parse(document, settings.max_vertices, settings.max_panels), folder)
 
 
 def kept(request: Request[Wanted] | Request[Exploration], folder: str) -> ParsedRequest:
@@ -104,15 +104,21 @@ def lift(report: Report, body: Body, settings: Settings, path: str) -> bytes:
     Raises FormError, HttpError, GoneError.
     """
     at = parse_points(loads(body.plain(settings.max_body_mib)), 2, settings.max_points)
-    lifted = domain.lift(solution_at(path).map, at[:, 0] + 1j * at[:, 1])
+    lifted = domain.lift(_unrolled(path), at[:, 0] + 1j * at[:, 1])
     return wire.dump({"points": lifted.points, "normals": lifted.normals, "inside": lifted.inside})
 
 
 def flatten(report: Report, body: Body, settings: Settings, path: str) -> bytes:
     """Points near the surface → JSON answer of the flatten route. As ``lift``."""
     at = parse_points(loads(body.plain(settings.max_body_mib)), 3, settings.max_points)
-    flat = domain.flatten(solution_at(path).map, at)
+    flat = domain.flatten(_unrolled(path), at)
     return wire.dump({"uv": flat.uv, "distance": flat.distance})
+
+
+def _unrolled(path: str) -> ConformalMap:
+    """The map of the solution; a net that overlaps itself as it is drawn, so that each place is one point."""
+    cmap = solution_at(path).map
+    return drawn(cmap)[0] if cmap.kind == "net" else cmap
 
 
 def _file(body: Body, settings: Settings, content_type: str, name: str) -> FromFile:

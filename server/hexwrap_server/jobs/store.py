@@ -8,19 +8,20 @@ when the process is killed at any moment.
 from __future__ import annotations
 
 import contextlib
-import gzip
 import json
 import logging
 import os
 import re
 import sqlite3
 import time
-import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Literal
+
+from isal import igzip
+from isal.igzip_lib import IsalError
 
 from hexwrap_server.errors import CodecError, DamagedError, FolderInUseError, StorageError
 from hexwrap_server.input.requests import Exploration, Outcome, Wanted
@@ -420,10 +421,9 @@ def _divided(
 def _is_packed(data: bytes) -> bool:
     """Whether gzip data is complete and its checksum right."""
     try:
-        gzip.decompress(data)
-    except (OSError, EOFError, zlib.error):
+        return bool(igzip.decompress(data))  # type: ignore[no-untyped-call]
+    except (OSError, EOFError, IsalError):  # type: ignore[misc]
         return False
-    return True
 
 
 def _locked(path: Path) -> sqlite3.Connection:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import cache, partial
+from functools import cache, lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -146,21 +145,15 @@ def stages(caching: CacheSettings) -> StageCache:
     return StageCache(Path(caching.folder) if caching.folder else None, caching.memory_bytes)
 
 
-_SOLUTIONS: OrderedDict[str, pipeline.Solution] = OrderedDict()
-
-
+@lru_cache(KEPT_SOLUTIONS)
 def solution_at(path: str) -> pipeline.Solution:
     """A finished solution. Raises GoneError, StorageError."""
-    if path not in _SOLUTIONS:
-        try:
-            _SOLUTIONS[path] = codec.decode(Path(path).read_bytes())
-        except (FileNotFoundError, CodecError):
-            with contextlib.suppress(OSError):
-                Path(path).unlink()  # so that the job is run again when it is sent again
-            raise GoneError from None
-        except OSError as error:
-            raise StorageError.of(error) from error
-        while len(_SOLUTIONS) > KEPT_SOLUTIONS:
-            _SOLUTIONS.popitem(last=False)
-    _SOLUTIONS.move_to_end(path)
-    return _SOLUTIONS[path]
+    try:
+        solution: pipeline.Solution = codec.decode(Path(path).read_bytes())
+    except (FileNotFoundError, CodecError):
+        with contextlib.suppress(OSError):
+            Path(path).unlink()  # so that the job is run again when it is sent again
+        raise GoneError from None
+    except OSError as error:
+        raise StorageError.of(error) from error
+    return solution

@@ -156,9 +156,16 @@ class WorkerProcess:
                 with contextlib.suppress(OSError):  # no file handle is free to look
                     used = process.memory_info().rss / 2**20
                 if time.monotonic() > deadline:
-                    self._reason = _too_long(seconds)
+                    self._reason = TimeLimitError(
+                        f"The job was stopped after {seconds:g} s, the limit of this server; make the mesh "
+                        "or the pattern coarser, or start the server with a larger --job-seconds."
+                    )
                 elif used > mib:
-                    self._reason = _too_much(used, mib)
+                    self._reason = MemoryLimitError(
+                        f"The job was stopped at {used:.0f} MiB of memory, the limit of this server is "
+                        f"{mib:g} MiB; make the mesh or the pattern coarser, or start the server with a "
+                        "larger --job-mib."
+                    )
                 if self._reason:
                     self.stop()
                     return
@@ -186,20 +193,6 @@ class WorkerProcess:
             "not affected. Send the job again; if it happens again, make the mesh or the pattern coarser.",
             data={"exit_status": code},
         )
-
-
-def _too_long(seconds: float) -> WorkError:
-    return TimeLimitError(
-        f"The job was stopped after {seconds:g} s, the limit of this server; make the mesh or the pattern "
-        "coarser, or start the server with a larger --job-seconds."
-    )
-
-
-def _too_much(used: float, mib: float) -> WorkError:
-    return MemoryLimitError(
-        f"The job was stopped at {used:.0f} MiB of memory, the limit of this server is {mib:g} MiB; make the "
-        "mesh or the pattern coarser, or start the server with a larger --job-mib."
-    )
 
 
 def main() -> None:
