@@ -90,7 +90,8 @@ class Settings:
                 try:
                     values[item.name] = _kind(item)(text)
                 except ValueError:
-                    raise ValueError(f"{variable(item)} must be {_word(item)}, not '{text}'.") from None
+                    word = "a whole number" if _kind(item) is int else "a number"
+                    raise ValueError(f"{variable(item)} must be {word}, not '{text}'.") from None
         settings = cls(**values)
         settings.check()
         return settings
@@ -168,7 +169,3 @@ def readme_table() -> str:
 
 def _kind(item: Field[Any]) -> type[int] | type[float] | type[str]:
     return {"int": int, "float": float, "str": str}[str(item.type)]
-
-
-def _word(item: Field[Any]) -> str:
-    return {int: "a whole number", float: "a number", str: "text"}[_kind(item)]

@@ -98,15 +98,15 @@ def make_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"hexwrap {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    quiet = Parser(add_help=False)
+    quiet, reading = Parser(add_help=False), Parser(add_help=False)
     quiet.add_argument("-q", "--quiet", action="store_true", help="print nothing but errors")
+    reading.add_argument("input", metavar="INPUT", help=INPUT)
     serve = commands.add_parser("serve", help="start the service on this machine")
     add_arguments(serve)
     serve.set_defaults(command=_serve)
     solve = commands.add_parser(
-        "solve", help="panelize a surface and write files, without the service", parents=[quiet]
+        "solve", help="panelize a surface and write files, without the service", parents=[quiet, reading]
     )
-    solve.add_argument("input", metavar="INPUT", help=INPUT)
     _add_outputs(solve, f"file to write, any number of times; the ending picks what: {', '.join(kinds())}")
     solve.add_argument(
         "--sheet", type=float, nargs=2, metavar=("WIDTH", "HEIGHT"), help="size of the sheets of flat.dxf"
@@ -121,9 +121,10 @@ def make_parser() -> argparse.ArgumentParser:
     add_request_options(solve)
     solve.set_defaults(command=_solve)
     explore = commands.add_parser(
-        "explore", help="try many choices for a surface and write the front of the best", parents=[quiet]
+        "explore",
+        help="try many choices for a surface and write the front of the best",
+        parents=[quiet, reading],
     )
-    explore.add_argument("input", metavar="INPUT", help=INPUT)
     wanted = "file to write, any number of times: a table (.csv), a picture (.png) or everything (.json)"
     _add_outputs(explore, wanted)
     add_explore_options(explore)

@@ -88,7 +88,7 @@ async def post_job(request: Request) -> Response:
 @router.post("/v1/explore", status_code=202)
 async def post_explore(request: Request) -> Response:
     """Have variants of a surface looked at, and the promising ones solved."""
-    return await _taken(request, await _read(request, "exploration"))
+    return await _taken(request, await _read(request, explore=True))
 
 
 @router.get("/v1/jobs")
@@ -245,11 +245,11 @@ async def get_file(
     return Response(data, 200, headers, files[name])
 
 
-async def _read(request: Request, kind: str = "request") -> ParsedRequest:
+async def _read(request: Request, explore: bool = False) -> ParsedRequest:
     service = service_of(request)
     async with sent_body(request) as body:
         parsed: ParsedRequest = await service.read(
-            f"hexwrap_server.jobs.reading:read_{kind}", body, str(service.store.surfaces)
+            "hexwrap_server.jobs.reading:read_request", body, str(service.store.surfaces), explore
         )
     return parsed
 

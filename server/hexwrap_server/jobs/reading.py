@@ -40,16 +40,14 @@ from hexwrap_solver import domain
 from hexwrap_solver.conformal.types import ConformalMap
 
 
-def read_request(report: Report, body: Body, settings: Settings, folder: str) -> ParsedRequest:
-    """JSON → request. folder: where its surface is kept. Raises FormError, HttpError, StorageError."""
+def read_request(
+    report: Report, body: Body, settings: Settings, folder: str, explore: bool = False
+) -> ParsedRequest:
+    """JSON → request, or what to explore. folder: where its surface is kept. Raises FormError, HttpError,
+    StorageError."""
     document = loads(body.plain(settings.max_body_mib))
-    return kept(parse_request(document, settings.max_vertices, settings.max_panels), folder)
-
-
-def read_exploration(report: Report, body: Body, settings: Settings, folder: str) -> ParsedRequest:
-    """JSON → what to explore. As ``read_request``."""
-    document = loads(body.plain(settings.max_body_mib))
-    return kept(parse_exploration(document, settings.max_vertices, settings.max_panels), folder)
+    parse = parse_exploration if explore else parse_request
+    return kept(parse(document, settings.max_vertices, settings.max_panels), folder)
 
 
 def kept(request: Request[Wanted] | Request[Exploration], folder: str) -> ParsedRequest:

@@ -138,11 +138,9 @@ def _caption(solution: Solution) -> str:
 
 def _apex(cmap: ConformalMap) -> Floats:
     """(1, 2) where it is near enough to be shown, else (0, 2)."""
-    if cmap.kind == "net":
+    if cmap.kind == "net" or cmap.deck.apex is None:
         return np.zeros((0, 2))
     apex, uv = cmap.deck.apex, cmap.uv
-    if apex is None:
-        return np.zeros((0, 2))
     size = abs(complex(np.ptp(uv.real), np.ptp(uv.imag)))
     near = np.abs(uv - apex).min() < APEX_REACH * size
     return plane(np.array([apex] if near else [], dtype=complex))

@@ -11,6 +11,7 @@ import uuid
 import numpy as np
 
 from hexwrap_server.output.blocks import Blocks, Shape, colours_of
+from hexwrap_server.output.layers import size_name
 from hexwrap_server.output.meta import Meta, panels_of
 from hexwrap_server.output.step import Lines, guid, listed, real, reals, text
 from hexwrap_server.output.text import one_line
@@ -220,8 +221,7 @@ def _plates(
         if kinds[i] >= 0:
             shape, kind = model.mapped(types[kinds[i]][1]), "$"
         else:
-            name = "no-size" if sizes[i] < 0 else f"size-{sizes[i]:02d}"
-            shape = model.geometry(blocks.shape(i), name, colours_of(panels)[sizes[i]])
+            shape = model.geometry(blocks.shape(i), size_name(sizes[i]), colours_of(panels)[sizes[i]])
             kind = ".CURTAIN_PANEL."
         plate = model.plate(label, (origins[i], axes[i][0], axes[i][2]), shape, kind)
         values = {"Label": f"IFCLABEL({text(label)})", "Ring": f"IFCINTEGER({rings[face]})"}

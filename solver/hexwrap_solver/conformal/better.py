@@ -1,8 +1,8 @@
 """Better places for listed corners: where the map bends by itself, and a corner costs no scale.
 
 The map's u is nearly linear in the boundary angles (Springborn, Schröder, Pinkall 2008, section 5): with the
-Hessian at the solution, a corner moved from v to w adds κ(Gδ_w − Gδ_v). What that promises is told only once
-the map with the corner moved has been found as well.
+Hessian of the last step that had its own, a corner moved from v to w adds κ(Gδ_w − Gδ_v). What that promises
+is told only once the map with the corner moved has been found as well.
 """
 
 from __future__ import annotations
@@ -13,15 +13,17 @@ import numpy as np
 
 from hexwrap_solver.arrays import Floats, Ints
 from hexwrap_solver.conformal.energy import Energy
-from hexwrap_solver.conformal.fixed import minimise
-from hexwrap_solver.conformal.types import Targets
+from hexwrap_solver.conformal.fixed import Minimum, minimise
 from hexwrap_solver.linalg.factor import Factorisation
 from hexwrap_solver.surface.types import Surface
 from hexwrap_solver.tolerances import ANGLE
 from hexwrap_solver.words import place
 
-#: Places that are tried for each corner, at most, and corners that are looked at.
-TRIED, CORNERS = 24, 12
+#: Places that are tried for each corner, at most, and corners that are looked at: at first every COARSE-th
+#: place, then those beside the best of these.
+TRIED, CORNERS, COARSE = 24, 12, 3
+#: Responses that are solved for together, for the sake of memory.
+TOGETHER = 48
 #: Scales are foreseen at about so many vertices.
 SAMPLE = 4000
 #: Of the area, this part is left out at either end when scales are compared: next to a corner they have none.
@@ -30,11 +32,12 @@ TAIL = 0.01
 NEEDLESS, WORTH = 1.5, 1.3
 
 
-def corner_notes(surface: Surface, targets: Targets, u: Floats) -> tuple[str, ...]:
+def corner_notes(surface: Surface, energy: Energy, minimum: Minimum) -> tuple[str, ...]:
     """A sentence about the corner that makes scales differ needlessly most, if there is one.
 
-    surface, targets, u: of a map with prescribed boundary angles, all free.
+    energy, minimum: of a map with prescribed boundary angles, all free.
     """
+    targets, u = energy.targets, minimum.u
     area = _vertex_areas(surface)
     ratio = _ratio(u, area)
     corners = [
@@ -44,24 +47,36 @@ def corner_notes(surface: Surface, targets: Targets, u: Floats) -> tuple[str, ..
     ]
     if ratio < NEEDLESS or not 0 < len(corners) <= CORNERS or (targets.shared >= 0).any():
         return ()
-    energy = Energy(surface, targets)
-    factor = Factorisation(energy.points, energy.rows, energy.columns)
-    factor.factorise(*energy.hessian(energy.corners(u)))
+    if not minimum.factorisations:
+        minimum.factorisation.factorise(*energy.hessian(minimum.corners))
     taken = np.array([v for v, _, _ in corners])
-    best: tuple[float, int, int] | None = None
-    few = slice(None, None, max(1, len(u) // SAMPLE))
-    for v, loop, i in corners:
-        places = _between(loop, i, taken)
-        response = _response(energy, factor, np.append(places, v))
-        moved = u[few, None] + (np.pi - targets.angle[v]) * (response[few, :-1] - response[few, -1:])
-        ratios = np.array([_ratio(column, area[few]) for column in moved.T])
-        k = int(np.argmin(ratios)) if len(ratios) else 0
-        # at the end of the stretch it would rather meet its neighbour: no place of its own is better
-        if 0 < k < len(ratios) - 1 and (best is None or ratios[k] < best[0]):
-            best = (float(ratios[k]), v, int(places[k]))
-    if best is None or best[0] * WORTH > ratio:
+    places = [_between(loop, i, taken) for _, loop, i in corners]
+    few = np.arange(0, len(u), max(1, len(u) // SAMPLE))
+
+    def foreseen(tried: list[tuple[int, Ints]]) -> tuple[float, int, int]:
+        """The least ratio, and with which corner at which of its places, (k,) numbers of them."""
+        where = np.concatenate([np.append(places[c][at], taken[c]) for c, at in tried])
+        rows = _responses(energy, minimum.factorisation, where, few)
+        best, before = (np.inf, 0, 0), 0
+        for c, at in tried:
+            own = rows[before : before + len(at)] - rows[before + len(at)]
+            before += len(at) + 1
+            moved = u[few] + (np.pi - targets.angle[taken[c]]) * own
+            found = [(_ratio(row, area[few]), c, k) for row, k in zip(moved, at.tolist(), strict=True)]
+            # at the end of the stretch it would rather meet its neighbour: no place of its own is better
+            least = min(found, default=best)
+            if 0 < least[2] < len(places[c]) - 1:
+                best = min(best, least)
+        return best
+
+    every = [np.unique([*range(0, len(at), COARSE), max(len(at) - 1, 0)])[: len(at)] for at in places]
+    best = foreseen(list(enumerate(every)))
+    if np.isfinite(best[0]):
+        _, c, k = best
+        best = foreseen([(c, np.arange(max(k - COARSE, 0), min(k + COARSE, len(places[c]) - 1) + 1))])
+    if best[0] * WORTH > ratio:
         return ()
-    _, v, w = best
+    v, w = int(taken[best[1]]), int(places[best[1]][best[2]])
     angle = targets.angle.copy()
     angle[v], angle[w] = angle[w], angle[v]
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
@@ -93,14 +108,16 @@ def _between(loop: Ints, i: int, taken: Ints) -> Ints:
     return np.asarray(loop[(i + steps[steps != 0]) % count])
 
 
-def _response(energy: Energy, factor: Factorisation, vertices: Ints) -> Floats:
-    """(n, k) what u becomes more by one unit of curvature at each of the vertices."""
-    right = np.zeros((energy.n_dof, len(vertices)))
-    dof = energy.dof[vertices]
-    inside = np.flatnonzero(dof >= 0)
-    right[dof[inside], inside] = 1.0
-    solved = factor.solve(right)
-    return np.asarray(np.concatenate([np.zeros((1, len(vertices))), solved])[energy.dof + 1])
+def _responses(energy: Energy, factor: Factorisation, vertices: Ints, few: Ints) -> Floats:
+    """(k, m) what u becomes more at the m ``few`` by one unit of curvature at each of the vertices."""
+    at, parts = energy.dof[few], []
+    for some in np.split(vertices, range(TOGETHER, len(vertices), TOGETHER)):
+        right = np.zeros((energy.n_dof, len(some)))
+        dof = energy.dof[some]
+        inside = np.flatnonzero(dof >= 0)
+        right[dof[inside], inside] = 1.0
+        parts.append(np.where(at >= 0, factor.solve(right)[at].T, 0.0))
+    return np.concatenate(parts)
 
 
 def _vertex_areas(surface: Surface) -> Floats:

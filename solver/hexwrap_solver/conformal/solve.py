@@ -65,10 +65,11 @@ def conformal_map(
     found = _isometric(surface, condition, angles, cones, progress)
     if found is None:
         targets = boundary.targets(surface, [a for a in angles if a is not None], cones)
-        found = map_to(surface, targets, cones, None, progress)
-        found = on_area(found)
+        plain = _plain(surface, targets, None, progress)
+        found = on_area(map_to(surface, targets, cones, None, progress, plain=plain))
         if found.surface is surface and not found.flips and not len(cones):
-            found = replace(found, notes=(*found.notes, *corner_notes(surface, targets, found.log_scale)))
+            noted = corner_notes(surface, plain.energy, plain.minimum)
+            found = replace(found, notes=(*found.notes, *noted))
     if condition.mode == "angles" and not condition.angles:
         found = replace(found, notes=(NO_ANGLES, *found.notes))
     return found
@@ -236,12 +237,14 @@ def map_to(
     start: Floats | None = None,
     progress: Progress = no_progress,
     flips: bool = False,
+    plain: _Plain | None = None,
 ) -> ConformalMap:
     """The map of given targets, which hold the cones' angles: on the triangles as they are where that works;
     with flips where it does not, where triangles turn over in the layout (be it by rounding), or from the
-    beginning. start: (n,) u to start from. With free u its scale is arbitrary. Raises ConvergenceError."""
+    beginning. start: (n,) u to start from. plain: what is known on the triangles as they are. With free u its
+    scale is arbitrary. Raises ConvergenceError."""
     if not flips:
-        plain = _plain(surface, targets, start, progress)
+        plain = plain or _plain(surface, targets, start, progress)
         if plain.holds:
             found = _finish(plain, cones)
             if positively_oriented(found.corners()).all() and faithful(found):
