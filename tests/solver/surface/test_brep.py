@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -94,6 +95,11 @@ SETTINGS = {
 }
 
 
+@cache
+def meshed(name: str, how: str = "as it comes") -> BrepMesh:
+    return mesh_brep(SHAPES[name][0], SETTINGS[how])
+
+
 def euler(mesh: BrepMesh) -> int:
     _, first = edge_groups(mesh.faces, len(mesh.vertices))
     return len(mesh.vertices) - (len(first) - 1) + len(mesh.faces)
@@ -116,7 +122,7 @@ def distances(brep: Brep, mesh: BrepMesh, weights: Floats) -> Floats:
 def test_sewn_without_cracks_oriented_and_within_sizes(name: str, how: str) -> None:
     brep, characteristic, loops = SHAPES[name]
     settings = SETTINGS[how]
-    mesh = mesh_brep(brep, settings)
+    mesh = meshed(name, how)
     _, first = edge_groups(mesh.faces, len(mesh.vertices))
     assert np.diff(first).max() <= 2
     twin = twins(mesh.faces, len(mesh.vertices))
@@ -138,8 +144,7 @@ def test_sewn_without_cracks_oriented_and_within_sizes(name: str, how: str) -> N
 
 @pytest.mark.parametrize("name", SHAPES)
 def test_triangles_are_well_shaped_and_look_outwards(name: str) -> None:
-    brep, _, _ = SHAPES[name]
-    mesh = mesh_brep(brep)
+    mesh = meshed(name)
     a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
     normal = np.cross(b - a, c - a)
     long = np.sort(edge_lengths(mesh.vertices, mesh.faces), axis=1)
@@ -169,7 +174,7 @@ def test_the_order_of_faces_and_edges_changes_only_names(name: str) -> None:
         edges=tuple(brep.edges[i] for i in order),
         faces=tuple(faces[i] for i in rng.permutation(len(faces))),
     )
-    one, two = mesh_brep(brep), mesh_brep(shuffled)
+    one, two = meshed(name), mesh_brep(shuffled)
     key = [
         np.sort(np.round(m.vertices[m.faces].mean(axis=1), 6).view("f8,f8,f8").ravel()) for m in (one, two)
     ]
@@ -185,7 +190,7 @@ def test_creases_are_the_edges_at_which_faces_meet_at_an_angle() -> None:
     assert np.all(on == 2)
     length = np.linalg.norm(np.diff(mesh.vertices[mesh.creases], axis=1), axis=2).sum()
     assert length == pytest.approx(4 * sum(size))
-    assert len(mesh_brep(SHAPES["tower"][0]).creases) == 0
+    assert len(meshed("tower").creases) == 0
 
 
 def test_kinks_of_degree_one_are_creases_and_keep_their_corners() -> None:
