@@ -8,7 +8,7 @@ field of the header (RFC 1952, 2.3.1.1).
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import orjson
@@ -27,7 +27,7 @@ _END = b"\x03\x00"
 class Packed:
     """Text as raw deflate, up to a whole byte. size, checksum: bytes and CRC-32 of the text."""
 
-    data: bytes
+    data: bytes | memoryview
     size: int
     checksum: int
 
@@ -38,13 +38,9 @@ class Packed:
         return cls(data, len(text), isal_zlib.crc32(text))
 
     @classmethod
-    def joined(cls, pieces: Iterable[Packed]) -> Packed:
+    def joined(cls, pieces: Sequence[Packed]) -> Packed:
         """Their texts one after the other."""
-        pieces, size, checksum = list(pieces), 0, 0
-        for piece in pieces:
-            checksum = isal_zlib.crc32_combine(checksum, piece.checksum, piece.size)
-            size += piece.size
-        return cls(b"".join(piece.data for piece in pieces), size, checksum)
+        return cls(b"".join(piece.data for piece in pieces), *_sum(pieces))
 
 
 def packed_part(name: str, value: bytes) -> Packed:
@@ -59,11 +55,13 @@ def document(parts: Mapping[str, Packed]) -> bytes:
     pieces = [begin]
     for part in parts.values():
         pieces += [part, comma]
-    whole = Packed.joined([*(pieces[:-1] if parts else pieces), end])
+    pieces = [*(pieces[:-1] if parts else pieces), end]
     listed = orjson.dumps([len(begin.data), len(comma.data), table])
     field = _FIELD + struct.pack("<H", len(listed)) + listed
-    tail = struct.pack("<II", whole.checksum, whole.size & 0xFFFFFFFF)
-    return b"".join([_HEAD, struct.pack("<H", len(field)), field, whole.data, _END, tail])
+    size, checksum = _sum(pieces)
+    tail = struct.pack("<II", checksum, size & 0xFFFFFFFF)
+    data = (piece.data for piece in pieces)
+    return b"".join([_HEAD, struct.pack("<H", len(field)), field, *data, _END, tail])
 
 
 def picked(packed: bytes, names: Iterable[str]) -> bytes | None:
@@ -72,10 +70,19 @@ def picked(packed: bytes, names: Iterable[str]) -> bytes | None:
         return None
     (length,) = struct.unpack_from("<H", packed, 14)
     begin, comma, table = orjson.loads(packed[16 : 16 + length])
-    at, found = 16 + length + begin, {}
+    at, found, view = 16 + length + begin, {}, memoryview(packed)
     for name, count, size, checksum in table:
-        found[name] = Packed(packed[at : at + count], size, checksum)
+        found[name] = Packed(view[at : at + count], size, checksum)
         at += count + comma
     if not found.keys() >= set(names):
         return None
     return document({name: found[name] for name in names})
+
+
+def _sum(pieces: Iterable[Packed]) -> tuple[int, int]:
+    """Bytes and CRC-32 of their texts one after the other."""
+    size = checksum = 0
+    for piece in pieces:
+        checksum = isal_zlib.crc32_combine(checksum, piece.checksum, piece.size)
+        size += piece.size
+    return size, checksum

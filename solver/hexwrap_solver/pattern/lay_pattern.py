@@ -16,7 +16,7 @@ from hexwrap_solver.domain.interpolate import surface_weights
 from hexwrap_solver.domain.lift import points_at
 from hexwrap_solver.domain.locate import barycentric
 from hexwrap_solver.errors import PatternError
-from hexwrap_solver.geometry import dot
+from hexwrap_solver.geometry import cross, dot, lengths
 from hexwrap_solver.pattern.along import feature_notes, on_features
 from hexwrap_solver.pattern.lattice import LATTICES, Lattice
 from hexwrap_solver.pattern.lay.cells import (
@@ -264,11 +264,10 @@ def _finish(
     vertices, normals = _on_input_surface(cmap, triangle, on_surface)
     outward = faces_outward(cut.cells.corner, vertices, normals)
     folded = int(np.count_nonzero(~outward))
-    keep, narrow = _usable(cut.cells, outward, placement.narrows or cut.seams is not None)
+    keep, narrow, (corner, point) = _usable(cut.cells, outward, placement.narrows or cut.seams is not None)
     if not keep.any():
         raise _too_coarse(cmap, settings, placement)
     cells, whole = cut.cells.part(keep), cut.whole[keep]
-    corner, point = manifold_corners(cells)
     triangle, place, weights = triangle[point], place[point], weights[point]
     on_surface, vertices, normals = on_surface[point], vertices[point], normals[point]
     uv = (weights * cmap.corners()[triangle]).sum(axis=1)
@@ -354,30 +353,33 @@ def faces_outward(corner: Ragged, points: Floats, normals: Floats) -> Bools:
     """(c,) cells that run counter-clockwise seen from outside. Where the surface folds back within one, it
     may have no side that looks there. points, normals: (p, 3)."""
     at = corner.values.astype(np.int64)
-    first = points[at[corner.offsets[:-1]]][corner.row]
-    area = np.cross(points[at] - first, points[at[corner.next()]] - first)
-    area, side = (np.add.reduceat(x, corner.offsets[:-1], axis=0) for x in (area, normals[at]))
+    first = points.take(at[corner.offsets[:-1]], axis=0).take(corner.row, axis=0)
+    spoke = points.take(at, axis=0) - first
+    area = cross(spoke, spoke.take(corner.next(), axis=0))
+    normal = normals.take(at, axis=0)
+    area, side = (np.add.reduceat(x, corner.offsets[:-1], axis=0) for x in (area, normal))
     return np.asarray(dot(area, side) > 0)
 
 
-def _usable(cells: Cells, outward: Bools, narrows: bool) -> tuple[Bools, int]:
+def _usable(cells: Cells, outward: Bools, narrows: bool) -> tuple[Bools, int, tuple[Ints, Ints]]:
     """(c,) the largest part of the outward cells (c,) without those that no mesh of shared vertices can tell
-    apart, and how many these are. narrows: towards one end fewer go around, and those left out may be the few
-    there; none are usable otherwise."""
+    apart, how many these are, and the ``manifold_corners`` of the part. narrows: towards one end fewer go
+    around, and those left out may be the few there; none are usable otherwise."""
     keep = outward.copy()
-    narrow = 0
+    narrow, corners = 0, (np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64))
     while keep.any():
         members = np.flatnonzero(keep)
         part = cells.part(keep)
         keep[members] = largest_part(part)
         members, part = np.flatnonzero(keep), cells.part(keep)
-        awkward = awkward_cells(Ragged(manifold_corners(part)[0], part.corner.offsets), part.twin)
+        corners = manifold_corners(part)
+        awkward = awkward_cells(Ragged(corners[0], part.corner.offsets), part.twin)
         if not awkward.any():
             break
         keep[members[awkward]] = False
         keep &= narrows
         narrow += int(awkward.sum())
-    return keep, narrow
+    return keep, narrow, corners
 
 
 def _trim_notes(cut: Trimmed, narrow: int, folded: int, apart: int) -> list[str]:
@@ -423,12 +425,13 @@ def _on_input_surface(cmap: ConformalMap, triangle: Ints, weights: Floats) -> tu
 
 def mean_edge(vertices: Floats, faces: Ragged) -> float:
     """Mean edge length of the cells, each weighted with its area (the mean over the surface)."""
-    corner = faces.values
-    tail, head = vertices[corner], vertices[corner[faces.next()]]
-    length = np.add.reduceat(np.linalg.norm(head - tail, axis=1), faces.offsets[:-1]) / faces.lengths
-    beside = vertices[corner[faces.offsets[:-1]]][faces.row]  # far off, areas about the origin lose digits
-    vector = np.add.reduceat(np.cross(tail - beside, head - beside), faces.offsets[:-1])
-    area = np.linalg.norm(vector, axis=1)
+    corner = faces.values.astype(np.int64)
+    tail, following = vertices.take(corner, axis=0), faces.next()
+    edge = lengths(tail.take(following, axis=0) - tail)
+    length = np.add.reduceat(edge, faces.offsets[:-1]) / faces.lengths
+    # far off, areas about the origin lose digits
+    spoke = tail - tail.take(faces.offsets[:-1], axis=0).take(faces.row, axis=0)
+    area = lengths(np.add.reduceat(cross(spoke, spoke.take(following, axis=0)), faces.offsets[:-1]))
     return float(length @ area / area.sum())
 
 

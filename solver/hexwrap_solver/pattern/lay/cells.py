@@ -86,7 +86,8 @@ def whole_cells(lattice: Lattice, edges: PatternEdges) -> WholeCells:
     a disk with boundary loops inside that no edge of the pattern meets; see ``enclosed_loops``. By how much
     it turns altogether tells the index of what it encloses: (order − k)/order of a full turn.
     """
-    start = np.flatnonzero(edges.head.ravel() >= 0)
+    heads, gluings, backs = edges.head.ravel(), edges.gluing.ravel(), edges.back.ravel()
+    start = np.flatnonzero(heads >= 0)
     node, slot = start // edges.width, start % edges.width
     products = np.zeros((1, 4), dtype=np.int64)  # of the gluings met: few walks meet any
     product = np.zeros(len(start), dtype=np.int64)  # which of them each walk has met, 0: none
@@ -104,20 +105,20 @@ def whole_cells(lattice: Lattice, edges: PatternEdges) -> WholeCells:
 
     for _ in range(lattice.sides + lattice.sides // lattice.order * MOST_EXTRA):
         visits.append((walk, node, slot, product))
-        gluing, back = edges.gluing[node, slot], edges.back[node, slot]
-        node = edges.head[node, slot]
+        at = edges.number(node, slot)
+        gluing, back, node = gluings.take(at), backs.take(at), heads.take(at)
         glued = np.flatnonzero(gluing)
         meet(glued, edges.isometries[gluing[glued]])
         slot, inner, passed = edges.clockwise(node, back % edges.width)
-        seam = np.flatnonzero(passed & (edges.around[node] != lattice.directions))
+        seam = np.flatnonzero(passed & (edges.around.take(node) != lattice.directions))
         meet(seam, edges.seam[node[seam]])
         turned = turned + lattice.directions // 2 - inner
         number = edges.number(node, slot)
         at_first = number == first
-        closed[walk[at_first]] = products[product[at_first], 3] == 0
+        closed[walk[at_first]] = products[:, 3].take(product[at_first]) == 0
         total[walk[at_first]] = turned[at_first]
         # Each cell once, from its lowest side on; a walk that comes to a lower one is another's, or none.
-        going = (edges.head[node, slot] >= 0) & (number > first)
+        going = (heads.take(number) >= 0) & (number > first)
         walk, first, node, slot, product, turned = (
             x[going] for x in (walk, first, node, slot, product, turned)
         )
@@ -177,11 +178,19 @@ def awkward_cells(corner: Ragged, twin: Ints) -> Bools:
     """(c,) cells that shared vertices cannot tell apart: those that come to a vertex twice, and those with
     one of several edges that join the same two vertices. Where very few cells go around, all are.
     """
-    n = int(corner.values.max()) + 1
-    _, visit, visits = np.unique(corner.row * n + corner.values, return_inverse=True, return_counts=True)
-    following = corner.values[corner.next()]
-    pairs = np.minimum(corner.values, following) * n + np.maximum(corner.values, following)
+    values = corner.values.astype(np.int64)
+    n, following = int(values.max()) + 1, values.take(corner.next())
+    at, pairs = corner.row * n + values, np.minimum(values, following) * n + np.maximum(values, following)
+    if _different(at) == len(at) and 2 * _different(pairs) == len(twin) + np.count_nonzero(twin < 0):
+        return np.zeros(corner.n_rows, dtype=bool)  # as nearly always, and seen in a quarter of the time
+    _, visit, visits = np.unique(at, return_inverse=True, return_counts=True)
     _, pair, sides = np.unique(pairs, return_inverse=True, return_counts=True)
     own = np.where(twin >= 0, 2, 1)  # sides of the one edge that should join them
     awkward = (visits[visit] > 1) | (sides[pair] > own)
     return np.bincount(corner.row[awkward], minlength=corner.n_rows) > 0
+
+
+def _different(values: Ints) -> int:
+    """How many different ones there are."""
+    ordered = np.sort(values)
+    return len(values[:1]) + int(np.count_nonzero(ordered[1:] != ordered[:-1]))

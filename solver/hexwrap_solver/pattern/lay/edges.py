@@ -67,8 +67,9 @@ class PatternEdges:
     def clockwise(self, node: Ints, slot: Ints) -> tuple[Ints, Ints, Bools]:
         """The slot clockwise from each; by how many directions; and whether the seam lies between."""
         passed = slot == 0
-        following = np.where(passed, self.degree[node], slot) - 1
-        turned = self.way[node, slot] - self.way[node, following] + np.where(passed, self.around[node], 0)
+        following = np.where(passed, self.degree.take(node), slot) - 1
+        ways, around = self.way.ravel(), np.where(passed, self.around.take(node), 0)
+        turned = ways.take(self.number(node, slot)) - ways.take(self.number(node, following)) + around
         return following, turned, passed
 
     def slot_before(self, node: Ints, heading: Floats) -> Ints:

@@ -96,16 +96,18 @@ def azimuth(cmap: ConformalMap, centers: Floats) -> Floats:
 
 def rows_from(neighbours: Ragged, first: Bools) -> Ints:
     """(c,) number of steps from cell to cell across edges to the nearest of the first cells, −1: none."""
-    row = np.where(first, 0, -1)
+    row, seen = np.where(first, 0, -1), np.zeros(len(first), dtype=np.int64)
     frontier = np.flatnonzero(first)
     level = 0
     while len(frontier):
         level += 1
         starts, lengths = neighbours.offsets[frontier], neighbours.lengths[frontier]
         entry = np.repeat(starts - np.cumsum(lengths) + lengths, lengths) + np.arange(lengths.sum())
-        reached = np.unique(neighbours.values[entry].astype(np.int64))
-        frontier = reached[(reached >= 0) & (row[reached] < 0)]
-        row[frontier] = level
+        reached = neighbours.values.take(entry).astype(np.int64)
+        reached = reached[(reached >= 0) & (row.take(reached) < 0)]
+        row[reached] = level
+        seen[reached] = np.arange(len(reached))  # the last one that comes to a cell stands for all
+        frontier = reached[seen.take(reached) == np.arange(len(reached))]
     return row
 
 

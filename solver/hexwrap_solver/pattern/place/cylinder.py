@@ -35,7 +35,7 @@ def place_on_cylinder(
     loops: straight ones, or nearly, on each of which a lattice line shall lie.
     """
     t, anchor = cmap.deck.translation, anchor_vertex(cmap)
-    target = Target.of(cmap, lattice, settings, t / abs(t))
+    target = Target.of(cmap, lattice, settings)
     place, height = _unrolled(cmap, anchor, loops)
     rows, straight = rows_along(lattice, target.angle, settings.boundary), is_straight(lattice, target.angle)
     edges = edges_around(cmap, settings, target.edge)

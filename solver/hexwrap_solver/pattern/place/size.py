@@ -12,6 +12,7 @@ from hexwrap_solver.pattern.lattice import Isometry, Lattice
 from hexwrap_solver.pattern.place.placement import is_disk, main_loops
 from hexwrap_solver.pattern.place.sense import too_many
 from hexwrap_solver.pattern.types import Kind, PatternSettings
+from hexwrap_solver.surface.topology import next_half_edge
 from hexwrap_solver.tolerances import RELATIVE, TINY
 
 #: Where neither a number nor a length is asked for: this many cells around, but fewer where that would make
@@ -107,12 +108,12 @@ def _edge_of_rows(cmap: ConformalMap, lattice: Lattice, angle: float) -> float:
 def _edge_of_bare(cmap: ConformalMap, lattice: Lattice, settings: PatternSettings) -> float:
     """Edge length in the domain at which whole cells leave ``DEFAULT_BARE`` of the surface bare: middles stay
     as far from the loops as cells reach, and half a row from ends that are lines of the pattern."""
-    surface, strip = cmap.surface, 0.0
+    surface, strip, in_domain = cmap.surface, 0.0, _boundary_lengths(cmap)
     for i, loop in enumerate(surface.loops):
         on_line = cmap.kind == "cylinder" and i < 2 and settings.align != "none"
         reach = HALF_ROW.get(lattice.kind, 0.0) if on_line else lattice.sides / (2 * np.pi)
         along = np.linalg.norm(surface.vertices[np.roll(loop, -1)] - surface.vertices[loop], axis=1)
-        strip += reach * float(along @ np.exp(-cmap.log_scale[loop]))
+        strip += reach * float((along**2 / np.maximum(in_domain[loop], TINY)).sum())
     return DEFAULT_BARE * float(surface.areas.sum()) / strip if strip else np.inf
 
 
@@ -148,11 +149,17 @@ def _unit_area(lattice: Lattice) -> float:
 
 def _lengths_of_loops(cmap: ConformalMap) -> list[float]:
     """Of the loops that matter, in the domain."""
-    faces, corners = cmap.surface.faces, cmap.corners()
-    n = len(cmap.surface.vertices)
-    key = faces * n + np.roll(faces, -1, axis=1)
-    length = abs(np.roll(corners, -1, axis=1) - corners)
-    return [float(length[np.isin(key, loop * n + np.roll(loop, -1))].sum()) for loop in main_loops(cmap)]
+    length = _boundary_lengths(cmap)
+    return [float(length[loop].sum()) for loop in main_loops(cmap)]
+
+
+def _boundary_lengths(cmap: ConformalMap) -> Floats:
+    """(n,) length in the domain of the boundary edge that starts at each vertex, 0 where none does."""
+    surface, corners = cmap.surface, cmap.corners().ravel()
+    rim = np.flatnonzero(surface.twin < 0)
+    length = np.zeros(len(surface.vertices))
+    length[surface.faces.ravel()[rim]] = abs(corners[next_half_edge(rim)] - corners[rim])
+    return length
 
 
 def edges_around(cmap: ConformalMap, settings: PatternSettings, edge: float) -> float:

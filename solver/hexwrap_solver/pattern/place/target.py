@@ -27,13 +27,10 @@ class Target:
     width: float
 
     @classmethod
-    def of(
-        cls, cmap: ConformalMap, lattice: Lattice, settings: PatternSettings, along: complex | None = None
-    ) -> Target:
-        """along: unit direction of the boundary where that is known."""
+    def of(cls, cmap: ConformalMap, lattice: Lattice, settings: PatternSettings) -> Target:
         angle = edge_angle(lattice, settings)
         edge, width = wanted_edge(cmap, lattice, settings, angle), width_per_cell(lattice, angle)
-        along = boundary_direction(cmap, lattice) if along is None else along
+        along = boundary_direction(cmap, lattice)
         factor = complex(lattice.edge / edge * np.exp(-1j * angle) * lattice.forward / along)
         return cls(lattice, factor, angle, edge, width * lattice.edge)
 
@@ -51,9 +48,12 @@ class Target:
 def boundary_direction(cmap: ConformalMap, lattice: Lattice) -> complex:
     """Unit direction along the boundary, meaningful up to the rotations of the pattern, which g respects.
 
-    The mean of (boundary edge)^fold over the boundary; where that cancels (round boundaries, none), the
-    direction around the apex, or the middle, at the anchor; on nets that are glued, of the boundary there.
+    That of g on cylinders; else the mean of (boundary edge)^fold over the boundary; where that cancels (round
+    boundaries, none), the direction around the apex, or the middle, at the anchor; on nets that are glued, of
+    the boundary there.
     """
+    if cmap.kind == "cylinder" and cmap.deck.translation:
+        return cmap.deck.translation / abs(cmap.deck.translation)
     corners, faces = cmap.corners(), cmap.surface.faces
     on_ends = np.zeros(len(cmap.surface.vertices), dtype=bool)
     on_ends[np.concatenate([np.zeros(0, dtype=np.int64), *main_loops(cmap)])] = True
