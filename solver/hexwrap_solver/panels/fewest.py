@@ -43,25 +43,26 @@ class Joints:
 @dataclass(frozen=True)
 class Fewest:
     """length: (r,). over: (k,) joints wider than allowed even where every panel has its own length; width:
-    (k,) the joints with own lengths."""
+    (k,) the joints with own lengths. bound: (k,) greatest width that was kept."""
 
     length: Floats
     over: Bools
     width: Floats
+    bound: Floats
 
 
 def fewest_lengths(limit: Floats, joints: Joints, max_gap: float, kind: Ints) -> Fewest:
     """limit: (r,) greatest length of each panel, which its class may not exceed. max_gap: greatest width of a
     joint, in the unit of the limits. kind: (r,) panels of different kinds share no class. Joints that are
-    wider even at the limits count as no wider than that."""
+    wider even at the limits become no wider than the widest of them is there."""
     own = joints.width(limit)
     allowed = np.full(len(own), max_gap * (1 + SLACK))
     over = own > allowed
-    bound = np.where(over, np.inf, allowed)
+    bound = np.where(over, (1 + SLACK) * own[over].max(initial=0.0), allowed)
     length = _stab_fairly(limit, joints, own, bound, kind)
     for one in np.unique(kind):
         length = _merge_classes(limit, length, joints, bound, kind == one)
-    return Fewest(length, over, own)
+    return Fewest(length, over, own, bound)
 
 
 def _stab_fairly(limit: Floats, joints: Joints, own: Floats, bound: Floats, kind: Ints) -> Floats:
@@ -70,7 +71,7 @@ def _stab_fairly(limit: Floats, joints: Joints, own: Floats, bound: Floats, kind
     How a joint widens is linear in the lengths only where the edges are parallel. Where the measured widths
     still exceed the bound, the room that is given away there shrinks, at last to nothing.
     """
-    room = np.where(np.isfinite(bound), bound - own, np.inf)
+    room = bound - own
     share = np.ones(len(own))
     length = limit
     for _ in range(ROUNDS):

@@ -10,7 +10,7 @@ import numpy as np
 from hexwrap_solver.arrays import Floats, Ints, Ragged
 from hexwrap_solver.errors import PanelsError
 from hexwrap_solver.panels.facing import widths
-from hexwrap_solver.panels.fewest import SLACK, Fewest, Joints, fewest_lengths
+from hexwrap_solver.panels.fewest import Fewest, Joints, fewest_lengths
 from hexwrap_solver.panels.regular import outline_areas
 from hexwrap_solver.panels.sizes import (
     ALIKE,
@@ -203,7 +203,7 @@ def _fewest(fitted: FittedPanels, limit: Floats, settings: PanelSettings) -> tup
     joints = _joints(fitted)
     found = fewest_lengths(_by_kind(fitted, limit, leveled), joints, settings.max_gap, kind)
     said = _wide_note(fitted, found, settings.max_gap)
-    length, bound = found.length, np.where(found.over, np.inf, settings.max_gap * (1 + SLACK))
+    length, bound = found.length, found.bound
     few = _classes(kind, length)
     for classes in range(1, min(few, TRADE_OFF_CLASSES) + 1):
         covering = _chosen(fitted, limit, classes, settings)
