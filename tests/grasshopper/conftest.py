@@ -31,7 +31,7 @@ QUICK_JAVA = {
     "PYTHONDONTWRITEBYTECODE": "1",
 }
 
-Runner = Callable[[str, dict[str, str]], None]
+Runner = Callable[[list[str], dict[str, str]], None]
 
 
 @pytest.fixture(scope="session")
@@ -172,7 +172,7 @@ def is_ready(port: int) -> bool:
 
 @pytest.fixture(params=["cpython", "jython"])
 def run_scenarios(request: pytest.FixtureRequest, unpacked: Path) -> Runner:
-    """Runs a file of scenarios in another interpreter; its failures are this test's.
+    """Runs files of scenarios in another interpreter; their failures are this test's.
 
     Each runs the form that its Rhino has: IronPython's rules for Rhino 7, Python.NET's for Rhino 8.
     """
@@ -194,9 +194,9 @@ def run_scenarios(request: pytest.FixtureRequest, unpacked: Path) -> Runner:
         "PYTHONPATH": forked.paths(),
     }
 
-    def run(name: str, environment: dict[str, str]) -> None:
+    def run(names: list[str], environment: dict[str, str]) -> None:
         done = subprocess.run(
-            [*command, str(HEADLESS / f"{name}.py")],
+            [*command, str(HEADLESS / "scenarios.py"), *names],
             env=os.environ | QUICK_JAVA | settings | environment,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,

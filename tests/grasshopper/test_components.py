@@ -8,31 +8,26 @@ from pathlib import Path
 
 import pytest
 
-Runner = Callable[[str, dict[str, str]], None]
-
-
-def test_settings(run_scenarios: Runner) -> None:
-    run_scenarios("scenarios_settings", {})
+Runner = Callable[[list[str], dict[str, str]], None]
 
 
 @pytest.mark.parametrize(
-    "run_scenarios", ["jython", pytest.param("cpython", marks=pytest.mark.long)], indirect=True
+    ("run_scenarios", "names"),
+    [
+        ("cpython", ["settings"]),
+        ("jython", ["settings", "solve", "trouble"]),
+        pytest.param("cpython", ["solve", "trouble"], marks=pytest.mark.long),
+    ],
+    indirect=["run_scenarios"],
+    ids=["settings-cpython", "all-jython", "rest-cpython"],
 )
-def test_against_a_live_server(run_scenarios: Runner, server_port: int) -> None:
-    run_scenarios("scenarios_solve", {"HEXWRAP_PORT": str(server_port)})
+def test_against_a_live_server(run_scenarios: Runner, names: list[str], server_port: int) -> None:
+    run_scenarios([f"scenarios_{name}" for name in names], {"HEXWRAP_PORT": str(server_port)})
 
 
 @pytest.mark.parametrize(
     "run_scenarios", ["cpython", pytest.param("jython", marks=pytest.mark.long)], indirect=True
 )
 def test_examples_as_wired(run_scenarios: Runner, server_port: int, sample_meshes: Path) -> None:
-    run_scenarios(
-        "scenarios_examples", {"HEXWRAP_PORT": str(server_port), "HEXWRAP_MESHES": str(sample_meshes)}
-    )
-
-
-@pytest.mark.parametrize(
-    "run_scenarios", ["jython", pytest.param("cpython", marks=pytest.mark.long)], indirect=True
-)
-def test_servers_in_trouble(run_scenarios: Runner, server_port: int) -> None:
-    run_scenarios("scenarios_trouble", {"HEXWRAP_PORT": str(server_port)})
+    settings = {"HEXWRAP_PORT": str(server_port), "HEXWRAP_MESHES": str(sample_meshes)}
+    run_scenarios(["scenarios_examples"], settings)

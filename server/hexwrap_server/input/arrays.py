@@ -8,38 +8,29 @@ from typing import Any
 
 import numpy as np
 
+from hexwrap_server.errors import FormError
 from hexwrap_solver.arrays import Floats, Ragged
 from hexwrap_solver.errors import HexwrapError
 from hexwrap_solver.surface.errors import IndexRangeError, NonFiniteError, PolygonSizeError
 
 
-class Fault(ValueError):
-    """What is wrong, and where (JSON pointer). kind: the solver's error for the same fault, if it has one."""
-
-    def __init__(self, pointer: str, detail: str, kind: type[HexwrapError] | None = None) -> None:
-        super().__init__(detail)
-        self.pointer = pointer
-        self.detail = detail
-        self.kind = kind
-
-
 def table(rows: object, pointer: str, width: int, most: int) -> Floats:
-    """(n, width) finite numbers. Raises Fault."""
+    """(n, width) finite numbers. Raises FormError."""
     flat = list(chain.from_iterable(_rows(rows, pointer, (width,), most)))
     return _numbers(flat, lambda i: f"{pointer}/{i // width}/{i % width}").reshape(-1, width)
 
 
 def numbers(row: object, pointer: str, most: int) -> Floats:
-    """(n,) finite numbers. Raises Fault."""
+    """(n,) finite numbers. Raises FormError."""
     if not isinstance(row, list):
-        raise Fault(pointer, f"must be a list of numbers, not {_kind(row)}")
+        raise FormError.at(pointer, f"must be a list of numbers, not {_kind(row)}")
     if len(row) > most:
-        raise Fault(pointer, f"{len(row)} numbers, at most {most} are taken")
+        raise FormError.at(pointer, f"{len(row)} numbers, at most {most} are taken")
     return _numbers(row, lambda i: f"{pointer}/{i}")
 
 
 def faces(rows: object, pointer: str, n_vertices: int, most: int) -> Ragged:
-    """Rows of three or four indices in 0 … n_vertices − 1. Raises Fault."""
+    """Rows of three or four indices in 0 … n_vertices − 1. Raises FormError."""
     listed = _rows(rows, pointer, (3, 4), most, PolygonSizeError)
     offsets = np.cumsum([0, *map(len, listed)])
     flat = list(chain.from_iterable(listed))
@@ -57,7 +48,7 @@ def faces(rows: object, pointer: str, n_vertices: int, most: int) -> Ragged:
     if len(wrong):
         i = int(wrong[0])
         what = f"vertex {flat[i]} of a mesh of {n_vertices} vertices (0 to {n_vertices - 1})"
-        raise Fault(place(i), what, IndexRangeError)
+        raise FormError.at(place(i), what, IndexRangeError)
     return Ragged(index, offsets)
 
 
@@ -67,31 +58,33 @@ def _numbers(flat: list[Any], place: Callable[[int], str]) -> Floats:
     values = np.fromiter(flat, dtype=float, count=len(flat))
     wrong = np.flatnonzero(~np.isfinite(values))
     if len(wrong):
-        raise Fault(place(int(wrong[0])), "must be a finite number", NonFiniteError)
+        raise FormError.at(place(int(wrong[0])), "must be a finite number", NonFiniteError)
     return values
 
 
 def _are(flat: list[Any], kinds: set[type], what: str, place: Callable[[int], str]) -> None:
-    """Raises Fault where one of the values is of another kind."""
+    """Raises FormError where one of the values is of another kind."""
     if not set(map(type, flat)) <= kinds:
         i = next(i for i, x in enumerate(flat) if type(x) not in kinds)
-        raise Fault(place(i), f"must be {what}, not {_kind(flat[i])}")
+        raise FormError.at(place(i), f"must be {what}, not {_kind(flat[i])}")
 
 
 def _rows(
     rows: object, pointer: str, widths: tuple[int, ...], most: int, kind: type[HexwrapError] | None = None
 ) -> list[list[Any]]:
     if not isinstance(rows, list):
-        raise Fault(pointer, f"must be a list, not {_kind(rows)}")
+        raise FormError.at(pointer, f"must be a list, not {_kind(rows)}")
     if len(rows) > most:
-        raise Fault(pointer, f"{len(rows)} entries, this server takes at most {most}")
+        raise FormError.at(pointer, f"{len(rows)} entries, this server takes at most {most}")
     wanted = " or ".join(map(str, widths))
     if not set(map(type, rows)) <= {list}:
         i = next(i for i, row in enumerate(rows) if type(row) is not list)
-        raise Fault(f"{pointer}/{i}", f"must be a list of {wanted} numbers, not {_kind(rows[i])}")
+        raise FormError.at(f"{pointer}/{i}", f"must be a list of {wanted} numbers, not {_kind(rows[i])}")
     if not set(map(len, rows)) <= set(widths):
         i = next(i for i, row in enumerate(rows) if len(row) not in widths)
-        raise Fault(f"{pointer}/{i}", f"must be a list of {wanted} numbers, not of {len(rows[i])}", kind)
+        raise FormError.at(
+            f"{pointer}/{i}", f"must be a list of {wanted} numbers, not of {len(rows[i])}", kind
+        )
     return rows
 
 

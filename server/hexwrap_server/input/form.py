@@ -8,9 +8,9 @@ field is a fault; what the model has accepted becomes the dataclass again.
 from __future__ import annotations
 
 import types
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import MISSING, Field, dataclass, fields, is_dataclass, replace
-from functools import cache
+from functools import cache, partial
 from math import inf, nextafter
 from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
@@ -84,7 +84,7 @@ class Leaf:
     def entry(self) -> tuple[str | None, str, str]:
         """Of the entries of such a list: the field that numbers their place, if any; the one that gives it by
         a point or a line of points; and the one that says what is wanted there."""
-        hints = get_type_hints(self._row, include_extras=True)
+        hints = _hints(self._row)
         names = [f.name for f in fields(self._row) if f.default is None and int in _parts(hints[f.name])]
         number, points = next(iter(names), None), "line" if "line" in hints else "point"
         return number, points, next(name for name in hints if name not in (number, points))
@@ -111,6 +111,10 @@ def document(settings: Any) -> dict[str, Any]:
     """A JSON object that reads as the same settings."""
     written: dict[str, Any] = _document(settings, 1.0, False)
     return written
+
+
+#: The types of a dataclass's fields. Not to be written to.
+_hints: Callable[[type], dict[str, Any]] = cache(partial(get_type_hints, include_extras=True))
 
 
 @cache
@@ -166,7 +170,7 @@ def values(settings: Any, root: tuple[str | int, ...] = ()) -> Iterator[tuple[st
 
 def is_nullable(kind: type, name: str) -> bool:
     """Whether a field may be null."""
-    return type(None) in _parts(get_type_hints(kind, include_extras=True)[name])
+    return type(None) in _parts(_hints(kind)[name])
 
 
 def setting_of(annotation: Any) -> Setting:
@@ -176,7 +180,7 @@ def setting_of(annotation: Any) -> Setting:
 
 def _settings(kind: type) -> list[tuple[Field[Any], Any, Setting]]:
     """Field, annotation and setting of all that a request may set."""
-    hints = get_type_hints(kind, include_extras=True)
+    hints = _hints(kind)
     found = [(f, hints[f.name], setting_of(hints[f.name])) for f in fields(kind)]
     return [one for one in found if not one[2].limit]
 

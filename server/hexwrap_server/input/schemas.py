@@ -12,7 +12,7 @@ from typing import Annotated, Any, Generic, TypeVar
 import numpy as np
 
 from hexwrap_server.errors import FormError
-from hexwrap_server.input.arrays import Fault, faces, numbers, table
+from hexwrap_server.input.arrays import faces, numbers, table
 from hexwrap_server.input.faults import escaped
 from hexwrap_server.input.form import Body, ExploreBody, read, values
 from hexwrap_server.input.requests import Exploration, SentSurface, Wanted
@@ -98,10 +98,7 @@ def parse_points(body: object, dimension: int, most: int) -> np.ndarray[Any, np.
     _known(body, ("points",), "")
     if "points" not in body:
         raise FormError.at("/points", "'points' is missing")
-    try:
-        return table(body["points"], "/points", dimension, most)
-    except Fault as fault:
-        raise FormError.at(fault.pointer, fault.detail, fault.kind) from None
+    return table(body["points"], "/points", dimension, most)
 
 
 def _divided(
@@ -134,23 +131,19 @@ def _sent(arrays: dict[str, Any], max_vertices: int, root: str) -> SentSurface:
     for name in ("vertices", "faces"):
         if name not in arrays:
             raise FormError.at(f"{root}/{name}", f"'{name}' is missing")
-    try:
-        return SentSurface(mesh=_mesh(arrays, max_vertices))
-    except Fault as fault:
-        raise FormError.at(root + fault.pointer, fault.detail, fault.kind) from None
+    return SentSurface(mesh=_mesh(arrays, max_vertices, root))
 
 
-def _mesh(surface: dict[str, Any], max_vertices: int) -> SentMesh:
-    vertices = table(surface["vertices"], "/vertices", 3, max_vertices)
-    corners = faces(surface["faces"], "/faces", len(vertices), 4 * max_vertices)
+def _mesh(surface: dict[str, Any], max_vertices: int, root: str) -> SentMesh:
+    vertices = table(surface["vertices"], f"{root}/vertices", 3, max_vertices)
+    corners = faces(surface["faces"], f"{root}/faces", len(vertices), 4 * max_vertices)
     normals = surface.get("normals")
     if normals is None:
         return SentMesh(vertices, corners)
-    directions = table(normals, "/normals", 3, max_vertices)
+    directions = table(normals, f"{root}/normals", 3, max_vertices)
     if len(directions) != len(vertices):
-        raise Fault(
-            "/normals", f"{len(directions)} normals for {len(vertices)} vertices; send one per vertex"
-        )
+        detail = f"{len(directions)} normals for {len(vertices)} vertices; send one per vertex"
+        raise FormError.at(f"{root}/normals", detail)
     return SentMesh(vertices, corners, directions)
 
 
@@ -163,24 +156,21 @@ def _nurbs(nurbs: object, root: str) -> NurbsSurface:
         if not isinstance(nurbs.get(name), list):
             raise FormError.at(f"{root}/{name}", f"'{name}' must be a list")
     knots, net = nurbs["knots"], nurbs["control_points"]
-    try:
-        if len(knots) != 2:
-            raise Fault("/knots", f"must be two lists of numbers, one per direction, not {len(knots)}")
-        u, v = (numbers(row, f"/knots/{i}", 10_000) for i, row in enumerate(knots))
-        points = _net(net)
-    except Fault as fault:
-        raise FormError.at(root + fault.pointer, fault.detail, fault.kind) from None
-    return NurbsSurface(form.degree, (u, v), points, form.closed)
+    if len(knots) != 2:
+        detail = f"must be two lists of numbers, one per direction, not {len(knots)}"
+        raise FormError.at(f"{root}/knots", detail)
+    u, v = (numbers(row, f"{root}/knots/{i}", 10_000) for i, row in enumerate(knots))
+    return NurbsSurface(form.degree, (u, v), _net(net, f"{root}/control_points"), form.closed)
 
 
-def _net(rows: list[Any]) -> np.ndarray[Any, np.dtype[np.float64]]:
+def _net(rows: list[Any], root: str) -> np.ndarray[Any, np.dtype[np.float64]]:
     if not rows or not isinstance(rows[0], list) or not rows[0] or not isinstance(rows[0][0], list):
-        raise Fault("/control_points", "must be rows of points [x, y, z] or [x, y, z, weight]")
+        raise FormError.at(root, "must be rows of points [x, y, z] or [x, y, z, weight]")
     width = 4 if len(rows[0][0]) == 4 else 3
-    lines = [table(row, f"/control_points/{i}", width, 100_000) for i, row in enumerate(rows)]
+    lines = [table(row, f"{root}/{i}", width, 100_000) for i, row in enumerate(rows)]
     for i, line in enumerate(lines):
         if len(line) != len(lines[0]):
-            raise Fault(f"/control_points/{i}", f"has {len(line)} points, the first row {len(lines[0])}")
+            raise FormError.at(f"{root}/{i}", f"has {len(line)} points, the first row {len(lines[0])}")
     net = np.stack(lines)
     return net if width == 4 else np.concatenate([net, np.ones((*net.shape[:2], 1))], axis=2)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hexwrap_solver.arrays import Floats, Ints, Ragged
-from hexwrap_solver.geometry import dot
+from hexwrap_solver.geometry import cross, dot
 from hexwrap_solver.panels.polygons import edge_vectors, row_maxima, row_minima
 
 #: Figures (relative to the mean edge, or radians) that differ by less are the same.
@@ -44,7 +44,7 @@ def _letters(polygons: Ragged, angle: Floats) -> Ints:
     length = np.sqrt(dot(edge, edge))
     unit = float(length.mean()) if len(length) else 1.0
     ahead = edge.take(following, axis=0)
-    twist = dot(np.cross(edge, ahead), ahead.take(following, axis=0)) / unit**3
+    twist = dot(cross(edge, ahead), ahead.take(following, axis=0)) / unit**3
     merged = [_merge(figure, polygons) for figure in (length / unit, angle, twist)]
     return _joined(np.stack(merged, axis=1))
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexwrap_solver.arrays import Floats
-from hexwrap_solver.geometry import dot, normalize
+from hexwrap_solver.geometry import cross, dot, normalize
 from hexwrap_solver.pattern.halfedges import HalfEdges
 from hexwrap_solver.pattern.types import Pattern
 
@@ -38,8 +38,9 @@ def separating_planes(
     no neighbour the plane contains the cell's own normal, and the panel may reach the edge.
     """
     inner = edges.twin >= 0
-    mean = normal[edges.cell] + np.where(inner[:, None], normal[edges.across], 0.0)
-    a, b = pattern.vertices[edges.start], pattern.vertices[edges.end]
-    direction = normalize(np.cross(b - a, mean))
+    mean = normal.take(edges.cell, axis=0)
+    mean += np.where(inner[:, None], normal.take(edges.across, axis=0, mode="wrap"), 0.0)
+    a, b = (pattern.vertices.take(end, axis=0) for end in (edges.start, edges.end))
+    direction = normalize(cross(b - a, mean))
     middle = dot(direction, (a + b) / 2)
     return Separation(direction, middle - np.where(inner, np.asarray(joint) / 2, 0.0))
