@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -337,7 +338,9 @@ def test_repairs_are_told(tube: Path, tmp_path: Path, capsys: pytest.CaptureFixt
     lines[-1] = " ".join([turned[0], *turned[:0:-1]])
     tube.write_text("\n".join(lines))
     assert main(["solve", str(tube), "--around", "12", "-o", str(tmp_path / "x.obj")]) == 0
-    assert "• 1 face was turned over" in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert "• 1 face was turned over" in told
+    assert re.search(r"at most \S+ at R\d+-P\d+\)", told)  # where the widest joint is
 
 
 def test_explore_writes_the_front(tube: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

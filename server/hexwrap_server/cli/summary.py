@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
+import numpy as np
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
@@ -100,7 +101,7 @@ def _quality(result: dict[str, Any]) -> Rows:
     ):
         yield words, _small(found[key]["max"])
     gap = found["gap"]["tangential"]
-    yield "gap", f"{_length(gap['mean'])} (at most {_length(gap['max'])})"
+    yield "gap", f"{_length(gap['mean'])} (at most {_length(gap['max'])}{_at_widest(result['panels'])})"
     if found["gap"]["over"] is not None:
         yield "wider than wanted", f"{found['gap']['over']} panels"
     yield "off the surface", f"at most {_length(found['surface_distance']['max'])}"
@@ -112,6 +113,12 @@ def _quality(result: dict[str, Any]) -> Rows:
         )
         if found["kink"]["max"] is not None:
             yield "kinks", f"at most {angle(found['kink']['max'])}"
+
+
+def _at_widest(panels: dict[str, Any]) -> str:
+    """Beside which panel the widest joint is."""
+    gap = np.asarray([] if panels["gap_tangential"] is None else panels["gap_tangential"], dtype=float)
+    return f" at {panels['label'][int(np.nanargmax(gap))]}" if np.isfinite(gap).any() else ""
 
 
 def _trade_off(curve: dict[str, Any]) -> Table:
