@@ -435,21 +435,28 @@ def test_a_domain_that_overlaps_itself_is_drawn_apart(solution: Solution, monkey
     middle = np.median(corners.imag)
     below = np.where(corners.imag.mean(axis=1) > middle, -1j * middle, 0)  # the upper half over the lower one
     folded = replace(solution.map, domain=Net.of_corners(corners + below[:, None], surface.twin))
-    twofold = replace(solution, map=folded)
+    twofold = replace(solution, map=folded, pattern=replace(solution.pattern, sheet=None))
     assert b"drawn in 2 pieces" in write("domain.svg", twofold, ODD)
     assert b"pieces" not in write("domain.svg", solution, ODD)
     lines = read_dxf(write("domain.dxf", twofold, ODD)).modelspace()
     ends = [np.array(lines.query(f'LWPOLYLINE[layer=="loop-{n}"]').first.get_points("xy")) for n in (0, 1)]
     assert abs(ends[0].mean(axis=0) - ends[1].mean(axis=0)).max() > middle
-    told = json.loads(result_json(twofold))["map"]["apart"]
-    assert len(told["face"]) == len(surface.faces)
-    assert len(told["shift"]) == 2
-    assert len(told["cell"]) == len(labels_of(solution))
-    assert json.loads(result_json(solution))["map"]["apart"] is None
+    told = json.loads(result_json(twofold))
+    assert told["map"]["apart"] is None  # clients need not know: the net that they get does not overlap
+    places = np.array(told["map"]["corners"])
+    turned = (corners + below[:, None] - places @ [1, 1j]).T
+    assert np.allclose(turned, turned[0])  # each face is moved as a whole
+    laid = solution.pattern
+    moved = (places @ [1, 1j] - twofold.map.corners())[:, 0]
+    uv, cell = np.array(told["pattern"]["uv"]) @ [1, 1j], np.array(told["pattern"]["corners"][0]) @ [1, 1j]
+    assert np.allclose(uv - laid.uv, moved[laid.triangle])
+    own = moved[laid.triangle[laid.faces.values[0]]]
+    assert np.allclose(cell - laid.corners[: len(cell)], own)
     monkeypatch.setattr(reading, "solution_at", lambda path: twofold)
     points = surface.vertices[surface.faces].mean(axis=1)
     flat = carried("flatten", points)["uv"]
     assert np.allclose(carried("lift", flat)["points"], points, atol=1e-9)
+    assert np.allclose(carried("lift", places.mean(axis=1))["points"], points, atol=1e-9)
 
 
 def carried(what: str, points: Any) -> dict[str, Any]:

@@ -45,14 +45,11 @@ def domain(token, url):
 
 
 def net(mesh, unrolled, pattern):
-    """The same of a domain that is no cylinder or cone: triangles in the plane, glued across the cut; in pieces
-    beside each other where they overlap."""
-    apart = unrolled.get("apart")
+    """The same of a domain that is no cylinder or cone: triangles in the plane, glued across the cut."""
     sides = {}
-    for face, corners in enumerate(mesh["faces"]):
-        places = [z + moved(apart, "face", face) for z in to_complex(unrolled["corners"][face])]
+    for corners, places in zip(mesh["faces"], unrolled["corners"]):
         for k in range(3):
-            sides[corners[k - 1], corners[k]] = places[k - 1], places[k]
+            sides[corners[k - 1], corners[k]] = complex(*places[k - 1]), complex(*places[k])
     size = max(abs(end) for side in sides.values() for end in side) or 1.0
     banks = []
     for edge, (start, end) in sorted(sides.items()):
@@ -77,10 +74,8 @@ def net(mesh, unrolled, pattern):
                 degrees.append(math.degrees(angle))
     branches = {}
     if pattern:
-        for i, cell in enumerate(pattern["corners"]):
-            places = [z + moved(apart, "cell", i) for z in to_complex(cell)]
-            corners = closed_polyline([[z.real, z.imag] for z in places])
-            branches.setdefault(pattern["ring"][i], []).append(corners)
+        for ring, cell in zip(pattern["ring"], pattern["corners"]):
+            branches.setdefault(ring, []).append(closed_polyline(cell))
     text = "net with %d loop%s" % (len(mesh["loops"]), "" if len(mesh["loops"]) == 1 else "s")
     if unrolled["cones"]:
         text += ", singularities: %d" % len(unrolled["cones"])
@@ -92,15 +87,6 @@ def net(mesh, unrolled, pattern):
         "pattern": tree_of(branches) if pattern else None,
         "summary": text,
     }
-
-
-def to_complex(places):
-    return [complex(*place) for place in places]
-
-
-def moved(apart, what, i):
-    """How far a face or a cell stands from its place, because the domain overlaps itself."""
-    return complex(*apart["shift"][apart[what][i]]) if apart else 0.0
 
 
 def flat_curve(numbers):

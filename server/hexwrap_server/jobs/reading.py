@@ -33,11 +33,10 @@ from hexwrap_server.jobs.disk import keep_file, surface_file
 from hexwrap_server.jobs.work import solution_at, stages, take_in
 from hexwrap_server.jobs.worker import Report
 from hexwrap_server.output import wire
-from hexwrap_server.output.unrolled import drawn
+from hexwrap_server.output.unrolled import in_pieces
 from hexwrap_server.problems import body_is_the_surface
 from hexwrap_server.settings import Settings
 from hexwrap_solver import domain
-from hexwrap_solver.conformal.types import ConformalMap
 
 
 def read_request(
@@ -104,21 +103,15 @@ def lift(report: Report, body: Body, settings: Settings, path: str) -> bytes:
     Raises FormError, HttpError, GoneError.
     """
     at = parse_points(loads(body.plain(settings.max_body_mib)), 2, settings.max_points)
-    lifted = domain.lift(_unrolled(path), at[:, 0] + 1j * at[:, 1])
+    lifted = domain.lift(in_pieces(solution_at(path)).map, at[:, 0] + 1j * at[:, 1])
     return wire.dump({"points": lifted.points, "normals": lifted.normals, "inside": lifted.inside})
 
 
 def flatten(report: Report, body: Body, settings: Settings, path: str) -> bytes:
     """Points near the surface → JSON answer of the flatten route. As ``lift``."""
     at = parse_points(loads(body.plain(settings.max_body_mib)), 3, settings.max_points)
-    flat = domain.flatten(_unrolled(path), at)
+    flat = domain.flatten(in_pieces(solution_at(path)).map, at)
     return wire.dump({"uv": flat.uv, "distance": flat.distance})
-
-
-def _unrolled(path: str) -> ConformalMap:
-    """The map of the solution; a net that overlaps itself as it is drawn, so that each place is one point."""
-    cmap = solution_at(path).map
-    return drawn(cmap)[0] if cmap.kind == "net" else cmap
 
 
 def _file(body: Body, settings: Settings, content_type: str, name: str) -> FromFile:

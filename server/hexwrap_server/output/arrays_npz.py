@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexwrap_server.output.meta import Meta
-from hexwrap_server.output.unrolled import plane
+from hexwrap_server.output.unrolled import in_pieces, plane
 from hexwrap_server.output.wire import fields
 from hexwrap_solver.arrays import Ragged
 from hexwrap_solver.conformal.net import Net
@@ -27,6 +27,7 @@ def result_npz(solution: Solution, meta: Meta) -> bytes:
     Rows of different lengths are two arrays: ``….values`` and ``….offsets``; row i is
     ``values[offsets[i]:offsets[i + 1]]``. Per-panel figures of the quality stand under ``quality``.
     """
+    solution = in_pieces(solution)
     unit = solution.map.surface.unit or ""
     arrays = {"name": np.array(meta.name), "unit": np.array(unit), **_map(solution.map)}
     if solution.pattern is not None:

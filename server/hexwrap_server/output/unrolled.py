@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from hexwrap_solver.arrays import Complexes, Floats, Ints, Ragged
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.domain.apart import Apart, apart
 from hexwrap_solver.pattern.types import Pattern
+from hexwrap_solver.pipeline import Solution
 
 #: Two places are one where they are nearer than this part of the domain's size.
 SAME = 1e-6
@@ -79,11 +80,27 @@ def drawn(cmap: ConformalMap) -> tuple[ConformalMap, Apart | None]:
     return (cmap if pieces is None else pieces.moved(cmap)), pieces
 
 
+def in_pieces(solution: Solution) -> Solution:
+    """The solution as clients see it: a net that overlaps itself is one of pieces beside each other, where
+    each place is one point of the surface. Cylinders and cones are told by their uv, on any sheet."""
+    cmap, laid = solution.map, solution.pattern
+    pieces = apart(cmap) if cmap.kind == "net" else None
+    if pieces is None:
+        return solution
+    if laid is not None:
+        uv = laid.uv + pieces.shift[pieces.piece[laid.triangle]]
+        laid = replace(laid, uv=uv, corners=moved_corners(laid, pieces))
+    return replace(solution, map=pieces.moved(cmap), pattern=laid)
+
+
+def moved_corners(pattern: Pattern, pieces: Apart) -> Complexes:
+    """(·,) corners of the cells, each cell whole and beside its first corner."""
+    return np.asarray(pattern.corners + pieces.shift[piece_of_cells(pattern, pieces)][pattern.faces.row])
+
+
 def cells(pattern: Pattern, pieces: Apart | None = None) -> Ragged:
-    """(·, 2) outlines of the cells, each whole and beside its first corner."""
-    corners = pattern.corners
-    if pieces is not None:
-        corners = corners + pieces.shift[piece_of_cells(pattern, pieces)][pattern.faces.row]
+    """(·, 2) outlines of the cells."""
+    corners = pattern.corners if pieces is None else moved_corners(pattern, pieces)
     return Ragged(plane(corners), pattern.faces.offsets)
 
 

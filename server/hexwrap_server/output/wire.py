@@ -10,7 +10,7 @@ import numpy as np
 import orjson
 
 from hexwrap_server.output.colours import class_colours
-from hexwrap_server.output.unrolled import piece_of_cells, plane
+from hexwrap_server.output.unrolled import in_pieces, piece_of_cells, plane
 from hexwrap_solver.arrays import Bools, Floats, Ragged
 from hexwrap_solver.conformal.net import Net
 from hexwrap_solver.conformal.types import ConformalMap
@@ -33,7 +33,7 @@ def result_json(
     """The Result as JSON. include: the parts wanted; with CORNERS among them, ``map`` has ``corners``."""
     wanted = {*include, "map"} if CORNERS in include else include
     document = {name: part(solution, name, timings or {}) for name in PARTS if name in wanted}
-    if CORNERS in include:
+    if CORNERS in include and solution.map.kind != "net":
         document["map"]["corners"] = solution.map.corners()
     return dump(document)
 
@@ -48,9 +48,10 @@ def part(solution: Solution, name: str, timings: dict[str, float]) -> Any:
         case "unit":
             return solution.map.surface.unit
         case "map":
-            return conformal(solution.map) | {"apart": drawn_apart(solution)}
+            return conformal(in_pieces(solution).map) | {"apart": drawn_apart(solution)}
         case "pattern":
-            return solution.pattern and pattern(solution.pattern)
+            laid = in_pieces(solution).pattern
+            return laid and pattern(laid)
         case "panels":
             return solution.panels and placed(solution) | sized(solution)
         case "sizes":
@@ -112,8 +113,9 @@ def conformal(cmap: ConformalMap) -> dict[str, Any]:
 
 
 def drawn_apart(solution: Solution) -> dict[str, Any] | None:
-    """Of a domain that overlaps itself, the pieces to draw faces and cells in, and the shift of each."""
-    pieces, laid = apart(solution.map), solution.pattern
+    """Of a cylinder or cone that overlaps itself, the pieces to draw faces and cells in, and the shift of
+    each. The places on a net are those in its pieces."""
+    pieces, laid = None if solution.map.kind == "net" else apart(solution.map), solution.pattern
     if pieces is None:
         return None
     cell = None if laid is None else piece_of_cells(laid, pieces)
