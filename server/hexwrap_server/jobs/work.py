@@ -20,6 +20,7 @@ from hexwrap_server.jobs.disk import read_whole, write_whole
 from hexwrap_server.jobs.worker import Report
 from hexwrap_server.output import wire
 from hexwrap_server.output.packed import LEVEL, Packed, document, packed_part
+from hexwrap_server.output.unrolled import moved_to, pieces_of_net
 from hexwrap_server.output.writers import Meta, write
 from hexwrap_solver import pipeline
 from hexwrap_solver.surface import surface_from_mesh, with_openings
@@ -61,7 +62,8 @@ def outcome_of(order: Order, result: bytes, kept: Sequence[bytes | memoryview]) 
 def packed_result(solution: pipeline.Solution, runner: CachingRunner) -> bytes:
     """The whole Result, see ``output.packed``."""
 
-    panels = solution.panels
+    pieces = runner.remembered("pieces", ("map",), lambda: pieces_of_net(solution.map))
+    solution, panels = moved_to(pieces, solution), solution.panels
 
     def made(name: str) -> Packed:
         if name == "panels" and panels is not None:

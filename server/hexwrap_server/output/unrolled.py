@@ -83,14 +83,23 @@ def drawn(cmap: ConformalMap) -> tuple[ConformalMap, Apart | None]:
 def in_pieces(solution: Solution) -> Solution:
     """The solution as clients see it: a net that overlaps itself is one of pieces beside each other, where
     each place is one point of the surface. Cylinders and cones are told by their uv, on any sheet."""
-    cmap, laid = solution.map, solution.pattern
-    pieces = apart(cmap) if cmap.kind == "net" else None
+    return moved_to(pieces_of_net(solution.map), solution)
+
+
+def pieces_of_net(cmap: ConformalMap) -> Apart | None:
+    """Those of a net; None of cylinders and cones, too."""
+    return apart(cmap) if cmap.kind == "net" else None
+
+
+def moved_to(pieces: Apart | None, solution: Solution) -> Solution:
+    """The solution, its net being in these pieces."""
+    laid = solution.pattern
     if pieces is None:
         return solution
     if laid is not None:
         uv = laid.uv + pieces.shift[pieces.piece[laid.triangle]]
         laid = replace(laid, uv=uv, corners=moved_corners(laid, pieces))
-    return replace(solution, map=pieces.moved(cmap), pattern=laid)
+    return replace(solution, map=pieces.moved(solution.map), pattern=laid)
 
 
 def moved_corners(pattern: Pattern, pieces: Apart) -> Complexes:

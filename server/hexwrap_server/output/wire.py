@@ -31,15 +31,17 @@ def result_json(
     solution: Solution, timings: dict[str, float] | None = None, include: Sequence[str] = PARTS
 ) -> bytes:
     """The Result as JSON. include: the parts wanted; with CORNERS among them, ``map`` has ``corners``."""
+    solution = in_pieces(solution)
     wanted = {*include, "map"} if CORNERS in include else include
     document = {name: part(solution, name, timings or {}) for name in PARTS if name in wanted}
-    if CORNERS in include and solution.map.kind != "net":
+    if CORNERS in include:
         document["map"]["corners"] = solution.map.corners()
     return dump(document)
 
 
 def part(solution: Solution, name: str, timings: dict[str, float]) -> Any:
-    """One part of the Result as a structure that ``dump`` takes."""
+    """One part of the Result as a structure that ``dump`` takes. A net is given as it is, see
+    ``unrolled.in_pieces``."""
     match name:
         case "mesh":
             names = "vertices faces input_vertex vertex_of_input loops repairs"
@@ -48,10 +50,9 @@ def part(solution: Solution, name: str, timings: dict[str, float]) -> Any:
         case "unit":
             return solution.map.surface.unit
         case "map":
-            return conformal(in_pieces(solution).map) | {"apart": drawn_apart(solution)}
+            return conformal(solution.map) | {"apart": drawn_apart(solution)}
         case "pattern":
-            laid = in_pieces(solution).pattern
-            return laid and pattern(laid)
+            return solution.pattern and pattern(solution.pattern)
         case "panels":
             return solution.panels and placed(solution) | sized(solution)
         case "sizes":
