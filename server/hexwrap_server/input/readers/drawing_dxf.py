@@ -90,7 +90,7 @@ def _resolved(entities: Iterable[Any], drawing: Drawing, seen: Iterator[int], de
     """Entities other than block references, at any depth; multilines as the lines they show. seen: counts
     them."""
     for entity in entities:
-        if next(seen) == MOST_OBJECTS:
+        if next(seen) >= MOST_OBJECTS:
             raise too_many()
         kind = entity.dxftype()
         if kind == "INSERT":
@@ -99,6 +99,8 @@ def _resolved(entities: Iterable[Any], drawing: Drawing, seen: Iterator[int], de
                 drawing.left_out["external reference" if block is None or depth < DEEPEST else kind] += 1
                 continue
             for one in entity.multi_insert() if entity.mcount > 1 else [entity]:
+                if next(seen) >= MOST_OBJECTS:  # a grid of blocks, which may be empty
+                    raise too_many()
                 yield from _resolved(one.virtual_entities(), drawing, seen, depth + 1)
         elif kind == "MLINE":
             yield from entity.virtual_entities()
