@@ -29,7 +29,7 @@ from hexwrap_server.jobs.work import solution_at
 from hexwrap_server.jobs.worker import Report
 from hexwrap_server.output import wire
 from hexwrap_server.output.blocks import frames
-from hexwrap_server.output.unrolled import cells
+from hexwrap_server.output.unrolled import cells, in_pieces
 from hexwrap_server.settings import Settings
 from hexwrap_solver.pipeline import Solution
 from hexwrap_solver.surface.types import SentMesh, SurfaceSettings
@@ -150,8 +150,9 @@ def _answer(values: list[dict[str, Any]]) -> dict[str, Any]:
 
 def _flat_cells(solution: Solution) -> list[list[list[float]]]:
     """Closed outlines of the cells in the unrolled domain, each in one piece, at z = 0."""
-    assert solution.pattern is not None
-    return [[[x, y, 0.0] for x, y in _closed(outline)] for outline in cells(solution.pattern).to_lists()]
+    laid = in_pieces(solution).pattern
+    assert laid is not None
+    return [[[x, y, 0.0] for x, y in _closed(outline)] for outline in cells(laid).to_lists()]
 
 
 def _closed(points: list[Any]) -> list[Any]:
