@@ -50,12 +50,13 @@ class StageCache:
         self.folder = folder
         self.memory_bytes = memory_bytes
         self._kept: OrderedDict[str, tuple[Any, int]] = OrderedDict()
+        self._bytes = 0
+        self._used: set[str] = set()  # since the last weighing
 
     def get(self, key: str) -> tuple[Any, str] | None:
         """The stage and where it was found (``memory`` or ``disk``), or None."""
         if key in self._kept:
-            self._kept.move_to_end(key)
-            return self._kept[key][0], "memory"
+            return self._again(key), "memory"
         value = self._read(key)
         if value is None:
             return None
@@ -65,8 +66,7 @@ class StageCache:
     def remembered(self, key: str, make: Callable[[], T]) -> T:
         """What was made under that key before, if it is still in memory; it is not worth a file."""
         if key in self._kept:
-            self._kept.move_to_end(key)
-            known: T = self._kept[key][0]
+            known: T = self._again(key)
             return known
         value = make()
         self._keep(key, value)
@@ -82,19 +82,33 @@ class StageCache:
             log.warning("a stage could not be written to the cache: %s", error)
 
     def weigh(self) -> None:
-        """Count what is kept anew: stages keep what later ones derived from them."""
-        for key, (value, _) in self._kept.items():
-            self._kept[key] = (value, size_of(value))
+        """Count what was used since the last time anew: stages keep what later ones derived from them."""
+        for key in self._used:
+            self._count(key, self._kept[key][0])
+        self._used.clear()
         self._make_room()
+
+    def _again(self, key: str) -> Any:
+        self._used.add(key)
+        self._kept.move_to_end(key)
+        return self._kept[key][0]
 
     def _keep(self, key: str, value: Any) -> None:
-        self._kept.pop(key, None)
-        self._kept[key] = (value, size_of(value))
+        self._used.add(key)
+        self._count(key, value)
+        self._kept.move_to_end(key)
         self._make_room()
 
+    def _count(self, key: str, value: Any) -> None:
+        size = size_of(value)
+        self._bytes += size - (self._kept[key][1] if key in self._kept else 0)
+        self._kept[key] = (value, size)
+
     def _make_room(self) -> None:
-        while self._kept and sum(size for _, size in self._kept.values()) > self.memory_bytes:
-            self._kept.popitem(last=False)
+        while self._kept and self._bytes > self.memory_bytes:
+            key, (_, size) = self._kept.popitem(last=False)
+            self._bytes -= size
+            self._used.discard(key)
 
     def _read(self, key: str) -> Any:
         if self.folder is None:

@@ -13,7 +13,9 @@ their limit, relative losses count beside the area, as far as a bounded share of
 from __future__ import annotations
 
 from bisect import bisect_right
+from collections import OrderedDict
 from dataclasses import dataclass
+from threading import Lock
 from typing import Literal
 
 import numpy as np
@@ -39,6 +41,10 @@ PRICE = 0.02
 #: Relative losses beside the area, tried in this order; and the limit, relative to the median, below which
 #: they count no more than there, for the sums to keep their digits.
 RELATIVE, COUNTS_FROM = (0.1, 0.2, 0.4, 0.8, 1.6, 3.2), 0.01
+
+#: So many choices of the programmes (8 bytes each) are remembered, of those used last: another number of
+#: classes over the same limits needs no more than the layers that are not there yet.
+REMEMBERED = 1 << 21
 
 
 @dataclass(frozen=True)
@@ -78,25 +84,62 @@ def partition_by_area(length: Floats, classes: int, weight: Floats | None = None
     difference quotients finds in linear time; a layer costs O(n). Lines with i > j need no exclusion: their
     value at j never exceeds V_{k−1}(j). Equal limits are one line.
     """
+    key = (length.tobytes(), None if weight is None else weight.tobytes())
+    with _REMEMBERING:
+        known = _remembered.pop(key, None)
+    layers = _more_layers(known or _Layers(), classes, length, weight)
+    with _REMEMBERING:
+        _remembered[key] = layers
+        while sum(one.size for one in _remembered.values()) > REMEMBERED:
+            _remembered.popitem(last=False)
+    return Partition(list(layers.start[:classes]), np.array(layers.loss[:classes]))
+
+
+@dataclass(frozen=True)
+class _Layers:
+    """Of the programme for 1, 2, … classes over m different limits.
+
+    choice: (m + 1,) each, where the last class of the best for the first j limits begins. value: (m + 1,) V
+    of the last layer. start, loss: as in ``Partition``.
+    """
+
+    choice: tuple[Ints, ...] = ()
+    value: Floats | None = None
+    start: tuple[Ints, ...] = ()
+    loss: tuple[float, ...] = ()
+
+    @property
+    def size(self) -> int:
+        return sum(map(len, self.choice))
+
+
+_remembered: OrderedDict[tuple[bytes, bytes | None], _Layers] = OrderedDict()
+_REMEMBERING = Lock()
+
+
+def _more_layers(known: _Layers, classes: int, length: Floats, weight: Floats | None) -> _Layers:
+    """With those up to this many classes, as far as there are different limits."""
+    if len(known.choice) >= classes:
+        return known
     square, first = np.unique(length**2, return_index=True)
     m = len(square)
     counted = np.arange(len(length) + 1.0) if weight is None else np.append(0.0, np.cumsum(weight))
     begin = counted[np.append(first, len(length))]
     total = float(np.sum(length**2 if weight is None else weight * length**2))
-    value = np.zeros(1)
-    choice: list[Ints] = []
-    loss: list[float] = []
-    for k in range(1, min(classes, m) + 1):
-        if k == 1:
-            chosen = np.zeros(m + 1, dtype=np.int64)
+    choice, start, loss, value = list(known.choice), list(known.start), list(known.loss), known.value
+    for k in range(len(choice) + 1, min(classes, m) + 1):
+        if value is None:
+            chosen, before = np.zeros(m + 1, dtype=np.int64), np.zeros(m + 1)
         else:
             chosen = _upper_envelope(square, value[:-1] - begin[:-1] * square, begin)
-        before = value[chosen] if k > 1 else np.zeros(m + 1)
+            before = value[chosen]
         value = before + (begin - begin[chosen]) * square[np.minimum(chosen, m - 1)]
         value[0] = 0.0
         choice.append(chosen)
+        start.append(first[_trace(choice, k, m)])
+        start[-1].flags.writeable = False  # what is remembered is shared
         loss.append(max(total - float(value[-1]), 0.0))
-    return Partition([first[_trace(choice, k, m)] for k in range(1, len(choice) + 1)], np.array(loss))
+    return _Layers(tuple(choice), value, tuple(start), tuple(loss))
 
 
 def _upper_envelope(slope: Floats, intercept: Floats, at: Floats) -> Ints:

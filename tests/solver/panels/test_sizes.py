@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from hexwrap_solver.panels import sizes
 from hexwrap_solver.panels.sizes import (
     ALIKE,
     ALIKE_AREA,
@@ -45,6 +46,7 @@ def greatest_loss(length, chosen):
     return float((length - chosen).max())
 
 
+@settings(deadline=None)
 @given(limits | tied, st.integers(1, 5))
 def test_area_partition_is_optimal(length, classes):
     made = partition_by_area(length, classes)
@@ -54,6 +56,27 @@ def test_area_partition_is_optimal(length, classes):
         assert len(start) <= k
         assert lost_area(length, chosen) == pytest.approx(best, abs=1e-11)
         assert made.loss[k - 1] == pytest.approx(best, abs=1e-11)
+
+
+@settings(deadline=None)
+@given(limits | tied, st.lists(st.integers(1, 9), min_size=1, max_size=4), st.booleans())
+def test_what_is_remembered_of_the_partition_changes_nothing(length, asked, weighted):
+    weight = 1 / length if weighted else None
+    for classes in asked:
+        made = partition_by_area(length, classes, weight)
+    sizes._remembered.clear()
+    fresh = partition_by_area(length, asked[-1], weight)
+    assert made.loss.tobytes() == fresh.loss.tobytes()
+    assert [start.tolist() for start in made.start] == [start.tolist() for start in fresh.start]
+
+
+def test_no_more_is_remembered_of_partitions_than_a_bound(monkeypatch):
+    monkeypatch.setattr(sizes, "REMEMBERED", 5000)
+    for seed in range(20):
+        partition_by_area(np.sort(np.random.default_rng(seed).uniform(1, 2, 200)), 8)
+        assert sum(layers.size for layers in sizes._remembered.values()) <= 5000
+    partition_by_area(np.linspace(1, 2, 6000), 8)
+    assert not sizes._remembered
 
 
 @given(limits | tied, st.integers(1, 5), st.integers(0, 10**6))
