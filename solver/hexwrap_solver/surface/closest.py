@@ -139,8 +139,25 @@ class TriangleTree:
 
         points: (k, 3), finite. row: (k,) row of each. near: (k,) a triangle believed to be near each point.
         The distance of the one to which the way from there leads bounds the point's own from above, so that
-        most points need not be searched for. twin: of half-edges, as ``Triangles.twin``.
+        most points need not be searched for. twin: of half-edges, as ``Triangles.twin``. Rows that are as the
+        last time keep what was found then.
         """
+        last: tuple[Floats, Ints, Ints, Floats] | None = self.__dict__.get("_last")
+        if last is None or len(last[3]) != rows or not np.array_equal(last[1], row):
+            greatest = self._farthest(points, row, rows, near, twin)
+        else:
+            changed = np.zeros(rows, dtype=bool)
+            changed[row[(points != last[0]).any(axis=1) | (near != last[2])]] = True
+            some, place = np.flatnonzero(changed.take(row)), np.cumsum(changed) - 1
+            greatest = last[3].copy()
+            greatest[changed] = self._farthest(
+                points[some], place.take(row[some]), int(changed.sum()), near[some], twin
+            )
+        # as a cached property would be
+        self.__dict__["_last"] = tuple(one.copy() for one in (points, row, near, greatest))
+        return greatest
+
+    def _farthest(self, points: Floats, row: Ints, rows: int, near: Ints, twin: Ints) -> Floats:
         near, bound = self._walked(points, near, twin)
         greatest = np.full(rows, -1.0)
         np.maximum.at(greatest, row, bound)

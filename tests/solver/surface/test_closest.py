@@ -68,6 +68,14 @@ def test_farthest_is_the_same_to_the_bit_whatever_the_tree_remembers():
             tree.farthest(points, row, 50, near, mesh.twin), fresh.farthest(points, row, 50, near, mesh.twin)
         )
     assert len(tree._beside.leaf) > len(fresh._beside.leaf) > 0
+    for changed in (0, 1, 2, 20, 50):
+        some = np.isin(row, rng.permutation(50)[:changed])
+        points, near = points.copy(), near.copy()
+        points[some] += rng.normal(scale=0.002, size=(int(some.sum()), 3))
+        near[rng.integers(0, 300, changed)] = rng.integers(0, len(mesh.faces), changed)
+        fresh = TriangleTree.build(mesh.vertices, mesh.faces)
+        wanted = fresh.farthest(points, row, 50, near, mesh.twin)
+        assert np.array_equal(tree.farthest(points, row, 50, near, mesh.twin), wanted)
 
 
 def test_nearest_in_a_triangle_is_no_farther_than_any_sample():
