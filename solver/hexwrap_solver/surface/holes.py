@@ -21,6 +21,8 @@ from hexwrap_solver.surface.topology import half_edges, vertex_normals
 from hexwrap_solver.surface.types import Openings, Surface
 from hexwrap_solver.tolerances import TINY
 
+#: Sides of an outline on a circle are at least this part of its mean side.
+SHORTEST = 0.01
 #: Vertices inside keep this many edge lengths away from the loop.
 CLEARANCE = 0.6
 #: A hole gets at most this many vertices for each one of its loop: a loop of very short edges around a large
@@ -131,8 +133,10 @@ def _flattened(points: Floats, outlines: Ragged) -> Complexes:
 
 
 def _rounded(points: Floats, outlines: Ragged) -> Complexes:
-    """(k,) the points (k, 3) of outlines, each on a circle, by length."""
+    """(k,) the points (k, 3) of outlines, each on a circle, by length; none of them all but in one place."""
     length = np.linalg.norm(points[outlines.next()] - points, axis=1)
+    mean = _sums(length, outlines) / outlines.lengths
+    length = np.maximum(length, SHORTEST * mean[outlines.row])
     total = _sums(length, outlines)
     before = np.cumsum(length) - length
     along = (before - before[outlines.offsets[:-1]][outlines.row]) / total[outlines.row]
