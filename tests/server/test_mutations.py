@@ -204,8 +204,8 @@ def test_mutated_meshes_get_an_answer(client: httpx.Client, data: Path) -> None:
 def test_meshes_that_failed_once_get_an_answer(client: httpx.Client) -> None:
     """A step of the energy that overflows; a problem with a number of more than 64 bits; a line of the
     pattern that meets a vertex of the boundary with more than a full turn around it; an opening with a side
-    of a hundred-millionth of the others."""
-    attack(client, [565, 610, 931, 5999])
+    of a hundred-millionth of the others; openings that are filled each by itself, but not together."""
+    attack(client, [565, 610, 931, 5999, 9930])
 
 
 @pytest.mark.long

@@ -72,11 +72,7 @@ def _filled(surface: Surface, outlines: Ragged) -> tuple[Complexes, Ints]:
     unfit = ~shapely.is_valid(_polygons(flat, outlines))  # any disk will do, since the fill is bent anyway
     found = _triangulated(np.where(unfit[outlines.row], round_, flat), outlines)
     if found is None:
-        unfit |= [
-            _triangulated(flat[outlines.row == i], _only(outlines, i)) is None for i in range(len(unfit))
-        ]
-        found = _triangulated(np.where(unfit[outlines.row], round_, flat), outlines)
-        assert found is not None, "a circle does not touch itself"
+        found = _one_by_one(np.where(unfit[outlines.row], round_, flat), round_, outlines)
     z, fills, owner = found
     spoilt = np.zeros(outlines.n_rows, dtype=bool)
     spoilt[owner[fills[_repeats(surface, outlines, fills)]]] = True
@@ -89,6 +85,23 @@ def _filled(surface: Surface, outlines: Ragged) -> tuple[Complexes, Ints]:
     z[rim] = round_[rim]
     fills = (np.cumsum(keep) - 1)[fills[~spoilt[owner[fills[:, 0]]]]]
     return np.append(z[keep], np.zeros(int(spoilt.sum()))), np.concatenate([fills, around])
+
+
+def _one_by_one(z: Complexes, round_: Complexes, outlines: Ragged) -> tuple[Complexes, Ints, Ints]:
+    """As ``_triangulated``, each outline (k,) by itself, and on its circle where it all but touches
+    itself."""
+    k, rims, inner, fills, owner = len(z), [], [], [], [outlines.row]
+    for i, start in enumerate(outlines.offsets[:-1].tolist()):
+        own, only = slice(start, outlines.offsets[i + 1]), _only(outlines, i)
+        found = _triangulated(z[own], only) or _triangulated(round_[own], only)
+        assert found is not None, "a circle does not touch itself"
+        n = len(outlines[i])
+        rims.append(found[0][:n])
+        fills.append(np.where(found[1] < n, found[1] + start, found[1] + (k - n)))
+        inner.append(found[0][n:])
+        owner.append(np.full(len(inner[-1]), i))
+        k += len(inner[-1])
+    return np.concatenate([*rims, *inner]), np.concatenate(fills), np.concatenate(owner)
 
 
 def _repeats(surface: Surface, outlines: Ragged, fills: Ints) -> Ints:
