@@ -121,6 +121,15 @@ def test_old_and_superfluous_results_are_forgotten(tmp_path: Path) -> None:
     store.close()
 
 
+def test_a_surface_deleted_meanwhile_is_not_listed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    store = Store(tmp_path)
+    keep_file(store.surface_path("a" * 64), b"surface")
+    listed = [store.surface_path("b" * 64), *store.surfaces.glob("*.surface")]
+    monkeypatch.setattr(Path, "glob", lambda folder, pattern: iter(listed))
+    assert set(store.surface_files()) == {"a" * 64}
+    store.close()
+
+
 def edit(store: Store, statement: str, *values: object) -> None:
     """As another program would."""
     with contextlib.closing(sqlite3.connect(store.folder / "hexwrap.sqlite3", isolation_level=None)) as db:

@@ -349,8 +349,12 @@ class Store:
 
     def surface_files(self) -> dict[str, os.stat_result]:
         """The kept surfaces by id. Looks at many files. Raises StorageError."""
+        found = {}
         try:
-            return {path.stem: path.stat() for path in self.surfaces.glob("*.surface")}
+            for path in self.surfaces.glob("*.surface"):
+                with contextlib.suppress(FileNotFoundError):  # deleted meanwhile
+                    found[path.stem] = path.stat()
+            return found
         except OSError as error:
             raise StorageError.of(error) from error
 
