@@ -62,7 +62,8 @@ class FormError(HexwrapError):
             return
         pointer, detail = faults[0]
         more = f" ({len(faults) - 1} more faults are listed in 'errors'.)" if len(faults) > 1 else ""
-        super().__init__(f"{pointer or 'The body'}: {detail.rstrip('.')}.{more}")
+        end = "" if detail.endswith("?") else "."
+        super().__init__(f"{pointer or 'The body'}: {detail.rstrip('.')}{end}{more}")
         self.faults = list(faults[:MOST_LISTED])
 
     @classmethod

@@ -56,6 +56,10 @@ class HexwrapError(Exception):
     def __reduce__(self) -> tuple[object, ...]:  # the default loses keyword arguments between processes
         return _rebuild, (type(self), self.detail, self.__dict__)
 
+    def reworded(self, detail: str) -> HexwrapError:
+        """The same of the same place."""
+        return _rebuild(type(self), detail, self.__dict__ | {"detail": detail})
+
 
 def _rebuild(kind: type[HexwrapError], detail: str, state: dict[str, object]) -> HexwrapError:
     error = kind.__new__(kind, detail)  # other arguments of its constructor are in state

@@ -12,9 +12,10 @@ from hexwrap_solver.arrays import Complexes, Floats, Ints
 Summed = TypeVar("Summed", Ints, Floats, Complexes)
 
 
-def dot(a: Floats, b: Floats) -> Floats:
+def dot(a: Floats, b: Summed) -> Summed:
     """(…,) products of vectors (…, d)."""
-    return np.asarray(np.einsum("...d,...d->...", a, b))
+    product = a * b  # sums over a short last axis are slow
+    return np.asarray(sum((product[..., i] for i in range(1, product.shape[-1])), start=product[..., 0]))
 
 
 def lengths(vectors: Floats) -> Floats:
@@ -23,11 +24,24 @@ def lengths(vectors: Floats) -> Floats:
 
 
 def cross(a: Floats, b: Floats) -> Floats:
-    """(n, 3) vector products of vectors (n, 3); NumPy's own, of any shapes, takes half as long again."""
-    (x, y, z), (u, v, w) = a.T, b.T
+    """(n, 3) vector products of vectors (n, 3), in less than half the time of NumPy's own, of any shapes."""
+    (x, y, z), (u, v, w) = np.ascontiguousarray(a.T), np.ascontiguousarray(b.T)
     product = np.empty((len(a), 3))
-    product[:, 0], product[:, 1], product[:, 2] = y * w - z * v, z * u - x * w, x * v - y * u
+    np.subtract(y * w, z * v, out=product[:, 0])
+    np.subtract(z * u, x * w, out=product[:, 1])
+    np.subtract(x * v, y * u, out=product[:, 2])
     return product
+
+
+def dot_first(a: Floats, b: Floats) -> Floats:
+    """(…,) products of vectors (3, …), coordinates first: NumPy runs along the vectors then."""
+    return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+
+
+def cross_first(a: Floats, b: Floats) -> Floats:
+    """(3, …) vector products of vectors (3, …), coordinates first."""
+    (x, y, z), (u, v, w) = a, b
+    return np.stack([y * w - z * v, z * u - x * w, x * v - y * u])
 
 
 def normalize(vectors: Floats) -> Floats:
@@ -46,6 +60,13 @@ def cross_2d(a: Floats, b: Floats) -> Floats:
     return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
 
 
+def weighted(values: Floats, which: Ints, weights: Floats) -> Floats:
+    """(k, d) Σ weights · values[which], of values (n, d); which, weights: (k, c)."""
+    k, c = which.shape
+    table = csr_array((weights.ravel(), which.ravel(), np.arange(k + 1) * c), shape=(k, len(values)))
+    return np.asarray(table @ values)
+
+
 def quarter_turn(a: Floats) -> Floats:
     """(…, 2) vectors turned to the left by 90°."""
     return np.stack([-a[..., 1], a[..., 0]], axis=-1)
@@ -53,10 +74,13 @@ def quarter_turn(a: Floats) -> Floats:
 
 def plane_axes(normal: Floats) -> Floats:
     """(n, 2, 3) orthonormal, right-handed with the unit normals (n, 3)."""
-    least = np.zeros_like(normal)
-    least[np.arange(len(normal)), np.abs(normal).argmin(axis=1)] = 1.0
-    x = normalize(cross(normal, least))
-    return np.stack([x, cross(normal, x)], axis=1)
+    upright = np.ascontiguousarray(normal.T)
+    least = np.zeros_like(upright)
+    least[np.abs(upright).argmin(axis=0), np.arange(len(normal))] = 1.0
+    x = cross_first(upright, least)
+    length = np.sqrt(dot_first(x, x))
+    x /= np.where(length > 0, length, 1.0)
+    return np.ascontiguousarray(np.stack([x, cross_first(upright, x)]).transpose(2, 0, 1))
 
 
 def face_normals(vertices: Floats, faces: Ints) -> Floats:
@@ -66,6 +90,17 @@ def face_normals(vertices: Floats, faces: Ints) -> Floats:
     return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx]).T
 
 
+def plane_areas(corners: Complexes) -> Floats:
+    """(m,) areas of triangles (m, 3) in the plane, of either orientation."""
+    p, q, r = corners.T
+    return np.asarray(abs(((q - p).conj() * (r - p)).imag) / 2)
+
+
+def outline_area(corner: Complexes) -> float:
+    """Of a polygon (k,) in the plane, counted positive where it is counter-clockwise."""
+    return float((corner.conj() * np.roll(corner, -1)).imag.sum()) / 2
+
+
 def face_areas(vertices: Floats, faces: Ints) -> Floats:
     """(m,) areas of triangles."""
     normal = face_normals(vertices, faces)
@@ -73,13 +108,36 @@ def face_areas(vertices: Floats, faces: Ints) -> Floats:
 
 
 def stable_order(key: Ints, n: int) -> Ints:
-    """Stable argsort of integers 0 … n − 1 in linear time: NumPy counts short integers, and a sparse matrix
-    is transposed by counting."""
+    """Stable argsort of integers 0 … n − 1, faster than NumPy's of long ones: it counts short ones; a key
+    and its place in one integer are quick to sort; and a sparse matrix is transposed by counting."""
+    k = len(key)
     if n <= 2**16:
         return np.argsort(key.astype(np.uint16), kind="stable")
-    k = len(key)
+    if n * k < 2**62:
+        return np.sort(key * k + np.arange(k)) % k
     matrix = csr_array((np.ones(k, dtype=np.int8), key, np.arange(k + 1)), shape=(k, n))
     return np.asarray(matrix.tocsc().indices, dtype=np.int64)
+
+
+def orbits(following: Ints) -> tuple[Ints, int]:
+    """(n,) number of the cycle or path of each element, in the order of their lowest elements, and how many
+    there are. following: (n,) the next element, −1 at the end of a path; none follows two."""
+    n = len(following)
+    at, lowest = np.where(following >= 0, following, np.arange(n)), np.arange(n)
+    ends = following < 0
+    for _ in range(n.bit_length() + 1):  # lowest from each one to where it points, twice as far every time
+        reached = lowest.take(at)
+        open_ones = (reached != lowest) & ~ends.take(at)
+        lowest = np.minimum(lowest, reached)
+        if not open_ones.any():
+            break
+        at = at.take(at)
+    on_path = np.flatnonzero(ends.take(at))
+    of_path = np.full(n, n)
+    np.minimum.at(of_path, at[on_path], lowest[on_path])
+    lowest[on_path] = of_path[at[on_path]]
+    first = lowest == np.arange(n)
+    return (np.cumsum(first) - 1).take(lowest), int(np.count_nonzero(first))
 
 
 def sums_to_root(values: Summed, up: Ints, root: int) -> Summed:

@@ -15,6 +15,18 @@ from hexwrap_solver.arrays import Progress, no_progress
 from hexwrap_solver.conformal import conformal_map
 from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap
 from hexwrap_solver.explore import best_boundary_map
+from hexwrap_solver.explore.offers import (
+    BARE,
+    Offer,
+    OtherKey,
+    Trimmed,
+    isometric_bounds,
+    isometric_map,
+    isometric_offer,
+    outlook_offer,
+    plain_is_better,
+    trim_offer,
+)
 from hexwrap_solver.explore.worth import or_plain
 from hexwrap_solver.panels import fit_panels, make_components, measure, quantize, support
 from hexwrap_solver.panels.fit import FitKey
@@ -23,7 +35,7 @@ from hexwrap_solver.panels.types import Components, ComponentSettings, Panels, P
 from hexwrap_solver.pattern import lay_pattern
 from hexwrap_solver.pattern.types import Pattern, PatternSettings
 from hexwrap_solver.setting import Setting
-from hexwrap_solver.singularities.outlook import ProspectKey, outlook, outlook_note, prospects, worth_a_look
+from hexwrap_solver.singularities.outlook import ProspectKey, outlook, prospects, seats, worth_a_look
 from hexwrap_solver.singularities.solve import SIZES, closed_map, needs_singularities, seated
 from hexwrap_solver.singularities.types import Choices, SingularitySettings
 from hexwrap_solver.surface.curvature import saddle_share
@@ -135,7 +147,7 @@ def _solve(
         wanted = panels.components or (ComponentSettings() if settings.support else None)
     quality = run("quality", None, lambda progress: measure(cmap, laid, made, progress, facing))
     quality = replace(quality, notes=note + quality.notes)  # not in the stage, which any request may share
-    quality = _with_choices(quality, cmap, laid, made, panels, choices, run)
+    quality = _with_choices(quality, cmap, laid, made, replace(settings, pattern=pattern), choices, run)
     parts, frame = None, None
     if made is not None and wanted is not None:
         parts = run("components", wanted, lambda progress: make_components(made, wanted))
@@ -177,24 +189,49 @@ def _with_choices(
     cmap: ConformalMap,
     laid: Pattern,
     made: Panels | None,
-    settings: PanelSettings | None,
+    settings: SolveSettings,
     choices: Choices | None,
     run: StageRunner,
 ) -> Quality:
-    """With what other numbers of singularities would leave open, and a note where they would bring much."""
-    left = 1 - quality.coverage
-    if made is None or settings is None or made.mode == "watertight" or not isinstance(settings.sizes, int):
-        return replace(quality, singularities=choices)
-    if choices is not None:
-        return replace(quality, singularities=choices.with_measured(left))
-    if not worth_a_look(cmap, laid, settings.sizes, left):
-        return quality
-    key = ProspectKey.of(cmap.surface, laid)
-    found = run("outlook", key, lambda progress: prospects(cmap.surface, key), after="map")
-    choices = outlook(found, laid, settings.sizes, left)
-    if choices is None:
-        return quality
-    return replace(quality, singularities=choices, notes=(*quality.notes, *outlook_note(laid, choices)))
+    """With what other numbers of singularities would leave open, and one note on the choice that would bring
+    most, where one would bring much."""
+    panels, pattern, left = settings.panels, settings.pattern, 1 - quality.coverage
+    assert pattern is not None
+    offers: list[Offer] = []
+    pointed = quality.bare
+    if pointed >= BARE and pattern.boundary == "whole":
+        trimmed = run("trimmed", pattern, lambda progress: Trimmed.of(cmap, pattern, progress), after="map")
+        pointed = 0.0
+        if trimmed is not None:
+            offers, pointed = trim_offer(trimmed, quality.bare), trimmed.bare
+    if made is not None and panels is not None and made.mode == "split" and isinstance(panels.sizes, int):
+        if choices is not None:
+            choices = choices.with_measured(left)
+        elif worth_a_look(cmap, laid, panels.sizes, left):
+            key = ProspectKey.of(cmap.surface, laid)
+            known = run("seats", laid.kind, lambda progress: seats(cmap.surface, laid.kind), after="map")
+            found = run("outlook", key, lambda progress: prospects(known, cmap.surface, key), after="map")
+            choices = outlook(found, laid, panels.sizes, left)
+            if choices is not None:
+                offers += outlook_offer(found, laid, panels.sizes, left, pointed)
+            if settings.boundary.mode == "straight" and plain_is_better(found, laid, panels.sizes, left):
+                other = OtherKey.of(settings.boundary, pattern, laid)
+                isometric = run(
+                    "other map",
+                    other.boundary,
+                    lambda progress: isometric_map(cmap.surface, other.boundary, progress),
+                    after="map",
+                )
+                bounds = run(
+                    "other boundary",
+                    other,
+                    lambda progress: isometric_bounds(isometric, other.pattern),
+                    after="map",
+                )
+                offers += isometric_offer(bounds, panels.sizes, left)
+    best = max(offers, key=lambda offer: offer.saved, default=None)
+    notes = quality.notes if best is None or laid.proposes else (*quality.notes, best.note)
+    return replace(quality, singularities=choices, notes=notes)
 
 
 def _map(surface: Surface, settings: SolveSettings, run: StageRunner) -> tuple[ConformalMap, Choices | None]:

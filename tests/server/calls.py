@@ -74,6 +74,14 @@ def sleep(report: Report, seconds: float, mark: str = "") -> str:
     return "slept"
 
 
+def wait_for(report: Report, gate: str) -> str:
+    """Until there is a file; says that it waits."""
+    report("waiting", 0.5, gate)
+    while not Path(gate).exists():
+        time.sleep(0.01)
+    return "waited"
+
+
 def crunch(report: Report, n: int, mark: str) -> None:
     """Inside of one numpy call for a long time."""
     Path(mark).touch()

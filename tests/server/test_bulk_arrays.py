@@ -186,6 +186,12 @@ def test_other_broken_texts_are_no_json(text: bytes) -> None:
         loads(text)
 
 
+def test_a_setting_that_no_float_is_is_no_json_either_but_named() -> None:
+    with pytest.raises(NotJsonError) as caught:
+        loads(b'{"name": "x", "limits": {"sizes": 2, "max_gap": NaN}}')
+    assert [fault["pointer"] for fault in problem(caught.value)["errors"]] == ["/limits/max_gap"]
+
+
 def test_a_byte_order_mark_is_passed_over() -> None:
     assert loads(b'\xef\xbb\xbf{"points": []}') == {"points": []}
 

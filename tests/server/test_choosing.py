@@ -17,13 +17,14 @@ from hexwrap_server.input.object_words import listed
 from hexwrap_server.input.readers.found import Found
 from hexwrap_server.input.readers.rhino_brep import control_net
 from hexwrap_server.input.surface_files import read_file, sent_surface
+from hexwrap_server.input.surface_files import read_surface as read_chosen
 from hexwrap_server.jobs.work import take_in
 from hexwrap_solver.surface import NurbsSurface, SentMesh, surface_from_mesh
 from hexwrap_solver.surface.brep import Brep
 from hexwrap_solver.surface.errors import FlatSurfaceError, NonFiniteError
 from hexwrap_solver.surface.types import SurfaceSettings
 from tests.server.live import Live, running
-from tests.server.test_reading import obj, rhino_mesh
+from tests.server.test_reading import WRITERS, obj, rhino_mesh, stl
 from tests.solver.surface.shapes import mesh, triangles, tube
 
 CASES = Path(__file__).parents[3] / "shared" / "cases" / "rhino"
@@ -373,11 +374,11 @@ def test_meshes_are_not_joined_with_surfaces_and_it_is_said() -> None:
         Model().add(cylinder(radius=2.0), "a").add(ring(96, 4), "b").choose()
 
 
-@pytest.mark.parametrize("gap", [0.004, -0.004])
+@pytest.mark.parametrize("gap", [0.004, -0.004, 0.05])
 def test_a_slit_is_told_whether_it_gapes_or_overlaps(gap: float) -> None:
     """Edges that cover each other are no two sides of a seam: joined, they would make a Möbius band."""
     chosen = Model().add(ring(24, 0, 2 * np.pi + gap / 2)).choose()
-    assert "Edges of the surface come within 0.004 of each other" in chosen.notes[0]
+    assert f"Edges of the surface come within {abs(gap):g} of each other" in chosen.notes[0]
     assert isinstance(chosen.geometry, SentMesh)
     assert len(surface_from_mesh(chosen.geometry).loops) == 1
 
@@ -584,11 +585,15 @@ def test_materials_are_objects_where_nothing_else_is_and_old_names_are_read() ->
     assert [found.name for found in content.objects] == ["Glas", "D\u00e4mmung"]
 
 
-def test_files_that_begin_like_others_are_told_so() -> None:
+def test_files_with_the_ending_of_another_are_told_so() -> None:
     data = Model().add(mesh_at()).bytes()
     for name in ("a.obj", "a.ply", "a.stl"):
-        with pytest.raises(UnreadableFileError, match=r"begins like a \.3dm file: give it the ending \.3dm"):
+        with pytest.raises(UnreadableFileError, match=r"\.3dm file: it is one, so give it the ending \.3dm"):
             read_file(data, name)
+    with pytest.raises(UnreadableFileError, match=r"\.obj file: it is one, so give it the ending \.obj"):
+        read_file(obj(VERTICES, QUADS.tolist()), "a.stl")
+    with pytest.raises(UnreadableFileError, match=r"\.html file: it is a web page"):
+        read_file(b"<!DOCTYPE html><title>404</title>", "a.3dm")
     with pytest.raises(UnreadableFileError, match="is empty"):
         read_file(b"", "a.3dm")
     with pytest.raises(FileTypeError, match="unpack it first"):
@@ -602,6 +607,10 @@ def test_closed_masses_that_touch_are_to_be_united() -> None:
         floors.add(rhino3dm.Brep.CreateFromBox(rhino3dm.Box(box)), f"floor {k}")
     with pytest.raises(SeveralObjectsError, match="BooleanUnion"):
         floors.choose()
+    large = rhino3dm.BoundingBox(0, 0, 9, 4, 4, 30)
+    taken = floors.add(rhino3dm.Brep.CreateFromBox(rhino3dm.Box(large)), "shaft").choose()
+    assert names(taken) == ["shaft"]
+    assert any("BooleanUnion" in note for note in taken.notes)
 
 
 # Clients
@@ -688,3 +697,49 @@ def test_rhino3dm_meshes_a_subd_as_it_is_called() -> None:
     """Its arguments have changed between versions; SubDs themselves cannot be made without Rhino."""
     mesh = control_net(rhino3dm.SubD())
     assert mesh is None or len(mesh.Faces) == 0
+
+
+def ifc(schema: str) -> bytes:
+    return (
+        f"ISO-10303-21;\nHEADER;\nFILE_NAME('a','',(''),(''),'','','');\nFILE_SCHEMA(('{schema}'));".encode()
+    )
+
+
+@pytest.mark.parametrize(
+    ("data", "told"),
+    [
+        (ifc("IFC4"), r"\.ifc file: export the surface alone from the program that made the model"),
+        (ifc("AUTOMOTIVE_DESIGN"), r"\.step file: open or import it in Rhino"),
+        (b"999\r\nmade by hand\r\n  0\r\nSECTION\r\n  2\r\nENTITIES\r\n", r"\.dxf file: curves and points"),
+    ],
+)
+def test_files_of_another_kind_are_sent_where_they_are_read(data: bytes, told: str) -> None:
+    with pytest.raises(UnreadableFileError, match=told):
+        read_file(data, "a.obj")
+
+
+@pytest.mark.parametrize(
+    "comment", [b"999\nx\n", b"999\n999\n", b"999 \n", b"999\n\n", b"ISO-10303-21;FILE_SCHEMA( ("]
+)
+def test_what_a_file_is_is_told_in_a_time_that_its_size_bounds(comment: bytes) -> None:
+    """A beginning that could be taken apart in many ways would be tried in all of them."""
+    with pytest.raises(UnreadableFileError):
+        read_file(comment * 2000, "a.obj")
+
+
+@pytest.mark.parametrize("ending", [".obj", ".stl"])
+def test_a_slit_is_told_in_files_without_a_tolerance(ending: str) -> None:
+    vertices, quads = tube(9, 24)
+    whole = WRITERS[ending](vertices, quads.tolist())
+    seam = vertices[::24] + np.array([0, 2e-5, 0])  # wider than what is welded
+    slit = np.where((quads % 24 == 0) & (quads[:, :1] % 24 == 23), 9 * 24 + quads // 24, quads)
+    cut = WRITERS[ending](np.concatenate([vertices, seam]), slit.tolist())
+    assert read_chosen(whole, "a" + ending).notes == ()
+    assert any("come within 2e-05 of each other" in note for note in read_chosen(cut, "a" + ending).notes)
+
+
+def test_coordinates_too_coarse_for_the_model_are_told() -> None:
+    vertices, quads = tube()
+    near, far = (read_chosen(stl(vertices + x, quads.tolist()), "a.stl").notes for x in (1e2, 5e5))
+    assert near == ()
+    assert "single precision, exact to 0.031 only, beside a size of" in far[0]

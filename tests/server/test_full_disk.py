@@ -147,7 +147,7 @@ def test_jobs_end_and_requests_are_refused_when_the_database_breaks(
     done = client.post("/v1/jobs", json=request()).json()["id"]
     finished(client, done)
     engine.gate = tmp_path / "gate"
-    id = client.post("/v1/jobs", json=request(pattern={"around": 8})).json()["id"]
+    id = client.post("/v1/jobs", json=request(surface=tube(12, 7))).json()["id"]
     until_at(client, id)
     disk.is_broken = True
     engine.gate.touch()

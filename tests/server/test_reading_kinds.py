@@ -19,7 +19,9 @@ import pytest
 from hexwrap_server.errors import UnreadableFileError
 from hexwrap_server.input.choose import choose
 from hexwrap_server.input.surface_files import read_file
+from hexwrap_solver.errors import SurfaceError
 from hexwrap_solver.surface import SentMesh, surface_from_mesh
+from hexwrap_solver.surface.errors import IndexRangeError
 from tests.server.test_reading import obj, off, ply, read_surface
 from tests.solver.surface.shapes import triangles, tube
 
@@ -149,6 +151,28 @@ def test_off_rows_over_several_lines_and_several_rows_in_one() -> None:
         check(f"OFF\n{counts}\n{body}".encode(), "a.off")
 
 
+def test_off_that_counts_from_one_and_writes_edges_as_faces() -> None:
+    counts, lines = off_body([[v + 1 for v in face] for face in MIXED])
+    counts = counts.replace(str(len(MIXED)), str(len(MIXED) + 2), 1)
+    check("\n".join(["OFF", counts, *lines, "2 1 2", "2 3 2"]).encode(), "a.off")
+    notes = read_file("\n".join(["OFF", counts, *lines, "2 1 2", "2 3 2"]).encode(), "a.off").notes
+    assert "count vertices from 1" in notes[0]
+    assert notes[1] == "Faces with fewer than three corners were left out, 2 in all."
+
+
+def test_off_with_an_edge_and_a_vertex_that_is_not_there() -> None:
+    text = b"OFF\n4 3 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 9\n2 0 1\n"
+    with pytest.raises(SurfaceError, match="corners"):
+        read_file(text, "a.off")
+
+
+@pytest.mark.parametrize("name", ["a.off", "a.ply"])
+def test_a_face_at_no_vertex_is_named(name: str) -> None:
+    data = (off if name == "a.off" else ply)(VERTICES, [*MIXED, [0, 1, len(VERTICES) + 3]])
+    with pytest.raises(IndexRangeError, match=f"Face {len(MIXED)} points at vertex {len(VERTICES) + 3}, but"):
+        read_file(data, name)
+
+
 def test_off_with_colours_normals_and_a_fourth_coordinate() -> None:
     counts, lines = off_body()
     n = len(VERTICES)
@@ -173,7 +197,7 @@ def test_off_with_colours_normals_and_a_fourth_coordinate() -> None:
         ("nOFF\n4\n1 1 1\n", "dimension"),
         ("OFF\n3 1 0\n0 0 0\n1 0 0\n1 1 0\n-3 0 1 2\n", "number of its entries"),
         ("OFF\n3 1 0\n0 0 0\n1 0 0\n1 1 a\n3 0 1 2\n", "'a'"),
-        ("<html>", "neither"),
+        ("solid", "neither"),
     ],
 )
 def test_off_that_is_refused(text: str, word: str) -> None:

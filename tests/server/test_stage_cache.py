@@ -199,11 +199,28 @@ def test_a_change_answers_to_the_byte_as_if_nothing_were_remembered() -> None:
         run = CachingRunner(cache, lambda stage, fraction, what: None)
         solution = run_stages(request.surface, wanted, run)
         run.timings.clear()
-        return encode(solution), packed_result(solution, run)
+        return encode(solution), b"".join(packed_result(solution, run))
 
-    for around, sizes in ((20, 5), (24, 5), (20, 7)):
+    for around, sizes in ((40, 5), (24, 5), (20, 5), (20, 7)):  # from 40 to 20 other singularities are near
         answer = solved(kept, around, sizes)
     assert answer == solved(StageCache(None, 0), 20, 7)
+
+
+def test_another_number_of_sizes_changes_nothing_but_panels() -> None:
+    """Not even what else could be proposed is looked for anew."""
+    request = parse_request(samples.load("isometric"), 10**6, 10**6)
+    assert isinstance(request.surface, SentSurface)
+    assert isinstance(request.wanted, Wanted)
+    kept, found = StageCache(None, 10**8), []
+    for sizes in (3, 4):
+        wanted = replace(
+            request.wanted, boundary=BoundaryCondition("straight"), panels=PanelSettings(sizes=sizes)
+        )
+        run = CachingRunner(kept, lambda stage, fraction, what: None)
+        run_stages(request.surface, wanted, run)
+        found.append(run.found)
+    assert found[0]["other boundary"] == "computed"
+    assert {stage for stage, where in found[1].items() if where == "computed"} == {"panels", "quality"}
 
 
 def test_progress_never_goes_back() -> None:

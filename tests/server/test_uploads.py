@@ -233,7 +233,7 @@ def test_pointers_lead_into_the_body_as_it_was_sent(
 
 
 def test_of_a_file_the_whole_is_at_fault(client: Live) -> None:
-    data = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 -1 0\nv 0 0 1\nf 1 2 3\nf 2 1 4\nf 1 2 5\n"
+    data = b"v 0 0 0\nv 1 0 0\nv 0 2 0\nv 0 -1 1\nv 0 -1 -1\nf 1 2 3\nf 2 1 4\nf 1 2 5\n"  # three alike
     answer = client.post("/v1/surfaces", params={"name": "fin.obj"}, content=data)
     assert answer.status_code == 422
     assert [error["pointer"] for error in answer.json()["errors"]] == [""]

@@ -51,7 +51,7 @@ def chromium() -> str | None:
 
 
 try:
-    from playwright.sync_api import Page, sync_playwright
+    from playwright.sync_api import Page, Route, sync_playwright
 except ImportError:  # the browser tests are the only ones that need it
     sync_playwright = None
 
@@ -155,6 +155,16 @@ TURNED_TO = """([x, y, z]) => {
 }"""
 
 
+#: Moves a slider over several places at once.
+MOVED = """([name, places]) => {
+    const slider = document.querySelector(`input[type=range][name="${name}"]`);
+    for (const place of places) {
+        slider.value = place;
+        slider.dispatchEvent(new Event("input", { bubbles: true }));
+    }
+}"""
+
+
 def shown(page: Page, before: str | None = None, timeout: int = MOMENT) -> str:
     """Waits until another result than ``before`` is on the screen; its job."""
     page.wait_for_function(
@@ -165,6 +175,12 @@ def shown(page: Page, before: str | None = None, timeout: int = MOMENT) -> str:
 
 #: Read in the page: the views and what they show.
 INSIDE = "const { space, domain, state } = window.hexwrapViewer;"
+
+#: What is drawn of the surface, of the domain and of the cells in it, of the panels.
+PARTS = "[space.mesh, domain.marks.children[0], domain.layer.fills.geometry, space.layer.fills.geometry]"
+#: Which of them are those that were there when this was asked before.
+KEPT = f"""() => {{ {INSIDE} const parts = {PARTS}, kept = parts.map((part, i) => part === window.parts?.[i]);
+    window.parts = parts; return kept }}"""
 
 
 def on_screen(page: Page, what: str, i: int) -> tuple[float, float]:
@@ -210,12 +226,12 @@ def torus(around: int = 12, across: int = 8) -> str:
     return "\n".join(lines)
 
 
-def tube(n: int = 24, rows: int = 9) -> str:
-    """A bulged tube as OBJ text, quads, two open ends."""
+def tube(n: int = 24, rows: int = 9, bulge: float = 0.7) -> str:
+    """A bulged tube, or one with a waist, as OBJ text, quads, two open ends."""
     t = np.arange(n) * 2 * np.pi / n
     lines = []
     for r in range(rows):
-        radius = 2 + 0.7 * np.sin(np.pi * r / (rows - 1))
+        radius = 2 + bulge * np.sin(np.pi * r / (rows - 1))
         lines += [f"v {radius * np.cos(a):.9f} {radius * np.sin(a):.9f} {r * 0.6:.9f}" for a in t]
     for r in range(rows - 1):
         for i in range(n):
@@ -295,12 +311,24 @@ def test_choosing_a_number_of_sizes_on_the_curve_recomputes(browser, server: Ser
     with opened(browser, server) as page:
         page.select_option("#sample", "tower")
         before = shown(page)
+        page.evaluate(KEPT)
+        asked: list[str] = []
+        page.on("request", lambda r: asked.append(r.url.partition("?include=")[2]))
         page.locator("#curve .spot[data-k='5']").focus()
         page.keyboard.press("Enter")
         job = shown(page, before)
+        assert [parts for parts in asked if parts] == ["panels,sizes,quality,support,timings"]
         result = fetched(server, f"/v1/jobs/{job}/result?include=sizes")
         assert len(result["sizes"]) == 5
         assert page.locator("#histogram rect").count() == 5
+        assert page.evaluate(KEPT) == [True, True, True, False]
+        asked.clear()
+        page.evaluate(MOVED, ["pattern.around", [20, 22, 24]])
+        job = shown(page, job)
+        assert [parts for parts in asked if parts] == ["pattern,panels,sizes,quality,support,timings"]
+        assert fetched(server, f"/v1/jobs/{job}/request")["pattern"]["around"] == 24
+        assert page.evaluate(f"() => {{ {INSIDE} return state.result.pattern.around }}") == 24
+        assert page.evaluate(KEPT) == [True, True, False, False]
         assert page.complaints == []
 
 
@@ -308,14 +336,19 @@ def test_a_variant_is_taken_from_the_front(browser, server: Server) -> None:
     vary = {"around": [12, 12], "singularities": [0], "sizes": [1, 6]}
     body = {"name": "front", "surface": obj_surface(tube()), "vary": vary, "variants": 4}
     job = httpx.post(f"{server.url}/v1/explore", json=body, timeout=PATIENCE, trust_env=False).json()
-    until(lambda: fetched(server, f"/v1/jobs/{job['id']}")["status"] == "done", "the exploration")
-    found = fetched(server, f"/v1/jobs/{job['id']}/result")
     with opened(browser, server) as page:
+        # It runs when it is opened; then the server is gone for a while, and what comes after is followed.
+        page.route(f"**/v1/jobs/{job['id']}", lambda route: route.fulfill(json=job), times=1)
+        page.route(
+            f"**/v1/jobs/{job['id']}/events", lambda route: route.fulfill(body=": cut off\n\n"), times=1
+        )
         page.locator(f"#jobs [data-job='{job['id']}']").click()
+        page.locator("svg.front .best").wait_for()
+        found = fetched(server, f"/v1/jobs/{job['id']}/result")
         spots = page.locator("svg.front .variant")
-        spots.first.wait_for()
         measured = [i for i, one in enumerate(found["variants"]) if one["measured"]]
         assert sorted(int(spot.get_attribute("data-variant")) for spot in spots.all()) == measured
+        assert page.locator("svg.front .foreseen").count() == len(found["variants"]) - len(measured)
         slider = page.locator("[data-limit='types']")
         slider.focus()
         page.keyboard.press("Home")  # the fewest types: all others fade
@@ -396,6 +429,7 @@ def test_features_are_removed_by_a_click_and_drawn(browser, server: Server) -> N
         page.mouse.click(*pixel(page, ends[0]))
         with page.expect_request("**/v1/jobs") as sent:
             page.mouse.dblclick(*pixel(page, ends[1]))
+        assert "vertices" not in sent.value.post_data_json["surface"]  # they were sent once
         asked = sent.value.post_data_json["surface"]["features"]
         np.testing.assert_allclose(asked["lines"], [ends], atol=1e-3)
         assert asked["without"] == [left_out]
@@ -415,6 +449,22 @@ def test_a_dropped_file_is_solved(browser, server: Server, tmp_path: Path) -> No
         job = shown(page)
         answer = fetched(server, f"/v1/jobs/{job}")
         assert (answer["status"], answer["name"]) == ("done", "tube")
+        assert page.complaints == []
+
+
+def test_a_file_that_is_dropped_before_the_settings_are_there_is_solved(
+    browser, server: Server, tmp_path: Path
+) -> None:
+    path = tmp_path / "early.obj"
+    path.write_text(tube())
+    with opened(browser, server) as page:
+        held: list[Route] = []
+        page.route("**/v1/settings", lambda route: held.append(route))
+        page.reload()
+        page.set_input_files("#file", str(path))
+        page.wait_for_timeout(50)
+        held[0].continue_()
+        assert fetched(server, f"/v1/jobs/{shown(page)}")["name"] == "early"
         assert page.complaints == []
 
 
@@ -596,6 +646,59 @@ def test_the_page_outlives_a_restart_of_the_server(browser, server: Server) -> N
         page.fill("[name='panels.sizes']", "4")
         job = shown(page, before)
         assert len(fetched(server, f"/v1/jobs/{job}/result?include=sizes")["sizes"]) == 4
+
+
+def test_what_is_shown_is_the_result_also_where_the_kind_of_panels_chooses_the_cells(
+    browser, server: Server
+) -> None:
+    """Watertight hexagons follow no saddle: another pattern is laid for them, on another map."""
+    waist = {"surface": obj_surface(tube(bulge=-0.7)), "pattern": {"kind": "auto", "around": 12}}
+    with opened(browser, server) as page:
+        page.route("**/v1/samples/waist", lambda route: route.fulfill(json=waist))
+        page.select_option("#sample", "waist")
+        job = shown(page)
+        for mode, kind in (("watertight", "trihexagonal"), ("split", "hex")):
+            page.select_option("[name='panels.mode']", mode)
+            job = shown(page, job)
+            on_page = page.evaluate(f"() => {{ {INSIDE} return state.result }}")
+            result = fetched(server, f"/v1/jobs/{job}/result?include={','.join(on_page)}")
+            assert on_page == result
+            assert result["pattern"]["kind"] == kind
+            assert page.locator("#histogram").is_visible() == (mode == "split")
+        assert page.complaints == []
+
+
+@pytest.mark.parametrize("way", ["mesh", "file"])
+def test_a_surface_that_is_kept_no_more_is_sent_again(
+    browser, server: Server, tmp_path: Path, way: str
+) -> None:
+    def forget() -> set[str]:
+        kept = list(server.data.glob("surfaces/*.surface"))
+        for path in kept:
+            path.unlink()
+        return {path.name for path in kept}
+
+    path = tmp_path / "old.obj"
+    path.write_text(tube())
+    with opened(browser, server) as page:
+        if way == "mesh":
+            page.route(
+                "**/v1/samples/tower", lambda route: route.fulfill(json={"surface": obj_surface(tube())})
+            )
+            page.select_option("#sample", "tower")
+        else:
+            page.set_input_files("#file", str(path))
+        before = shown(page)
+        assert forget()
+        page.fill("[name='panels.sizes']", "7")
+        job = shown(page, before)
+        assert fetched(server, f"/v1/jobs/{job}/request")["panels"]["sizes"] == 7
+        (kept,) = forget()
+        page.click("#copy-curl")
+        page.wait_for_function("() => document.getElementById('copied').textContent !== ''")
+        assert forget() == {kept}
+        (refused,) = page.complaints
+        assert "422" in refused
 
 
 def test_a_failed_job_is_never_shown_on_another_surface(browser, server: Server) -> None:

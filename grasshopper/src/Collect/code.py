@@ -44,7 +44,15 @@ def collect(token, url):
         "shapes": [joined([panels["polygons"][k] for k in rows]) for _, rows in groups],
         "shape_colours": [size_colour(sizes, size) for size, _ in groups],
         "report": report(result),
+        "widest": [closed_polyline(panels["polygons"][k]) for k in widest(panels, result["quality"])],
     }
+
+
+def widest(panels, quality):
+    """The panels at joints wider than asked for, or else the one at the widest; the widest first."""
+    gaps = panels["gap_tangential"] or []
+    known = [k for k in range(len(gaps)) if gaps[k] is not None]
+    return sorted(known, key=lambda k: (-gaps[k], k))[: max(quality["gap"]["over"] or 0, 1)]
 
 
 def places(pattern, cells):
@@ -117,11 +125,13 @@ def report(result):
     for row in result["sizes"]:
         lines.append("size %d: edge %.6g, %d panels" % (row["size"], row["edge_length"], row["count"]))
     gap = quality["gap"]["tangential"]
+    at = "".join(" at " + panels["label"][k] for k in widest(panels, quality)[:1])
     for text, value in [
         ("covered: %.2f %%", percent(quality["coverage"])),
         ("overlaps: %d", quality["overlaps"]),
         ("gap, mean: %.4g", gap["mean"]),
-        ("gap, greatest: %.4g", gap["max"]),
+        ("gap, greatest: %.4g" + at, gap["max"]),
+        ("panels at wider gaps than MaxGap: %d", quality["gap"]["over"]),
         ("planarity, worst: %.2g of the edge", quality["planarity"]["max"]),
         ("convex: %.1f %%", percent(quality.get("convex"))),
         ("distance to the surface, greatest: %.4g", quality["surface_distance"]["max"]),
@@ -139,7 +149,7 @@ def percent(fraction):
 
 RESULTS = [
     "panels", "labels", "sizes", "colours", "planes", "outlines", "planarity",
-    "gaps", "convex", "neighbours", "index", "shapes", "shape_colours", "report",
+    "gaps", "convex", "neighbours", "index", "shapes", "shape_colours", "report", "widest",
 ]  # fmt: skip
 
 
@@ -149,4 +159,4 @@ def solve():
 
 component = ghenv.Component
 Panels, Labels, Sizes, Colours, Planes, Outlines, Planarity, \
-    Gaps, Convex, Neighbours, Index, Shapes, ShapeColours, Report = solved(component, solve, len(RESULTS))
+    Gaps, Convex, Neighbours, Index, Shapes, ShapeColours, Report, Widest = solved(component, solve, len(RESULTS))

@@ -44,6 +44,7 @@ def panel_settings():
             "joint": not_negative(Joint, "Joint"),
             "increment": not_negative(Increment, "Increment"),
             "method": choice(Method, METHODS, "Method"),
+            "max_gap": not_negative(MaxGap, "MaxGap"),
             "components": components(),
         }
     )
@@ -51,6 +52,8 @@ def panel_settings():
         if int(Sizes) < 0:
             raise Refusal("Sizes must be 1 or more, or 0 for one size per panel.")
         chosen["sizes"] = int(Sizes) or None
+    elif MaxGap is not None:
+        chosen["sizes"] = "fewest"
     return chosen
 
 

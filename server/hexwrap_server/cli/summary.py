@@ -100,12 +100,14 @@ def _quality(result: dict[str, Any]) -> Rows:
         ("angle_deviation", "angles"),
     ):
         yield words, _small(found[key]["max"])
-    gap = found["gap"]["tangential"]
-    yield "gap", f"{_length(gap['mean'])} (at most {_length(gap['max'])}{_at_widest(result['panels'])})"
-    if found["gap"]["over"] is not None:
-        yield "wider than wanted", f"{found['gap']['over']} panels"
+    watertight = result["panels"]["mode"] == "watertight"
+    if not watertight:  # which has no joints
+        gap = found["gap"]["tangential"]
+        yield "gap", f"{_length(gap['mean'])} (at most {_length(gap['max'])}{_at_widest(result['panels'])})"
+        if found["gap"]["over"] is not None:
+            yield "wider than wanted", f"{found['gap']['over']} panels"
     yield "off the surface", f"at most {_length(found['surface_distance']['max'])}"
-    if result["panels"]["mode"] == "watertight":
+    if watertight:
         yield "moved", f"at most {_length(found['movement'])}"
         yield (
             "convex",

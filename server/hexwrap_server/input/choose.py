@@ -33,8 +33,9 @@ from hexwrap_server.input.object_words import (
     spoilt,
     strays,
 )
-from hexwrap_server.input.parts import COARSEST, Part, brep_where_needed, parts_of
+from hexwrap_server.input.parts import COARSEST, Part, brep_where_needed, parts_of, size_of
 from hexwrap_server.input.readers.found import LINKED, FileContent, Found, Geometry
+from hexwrap_solver.arrays import Floats
 from hexwrap_solver.surface.closest import TriangleTree
 from hexwrap_solver.surface.weld import TOLERANCE
 from hexwrap_solver.words import place
@@ -49,14 +50,16 @@ NO_TUBE, GROUND, PLANE = 1 / 20, 1 / 400, 1e-6
 ALIKE = 0.01
 #: A part thinner than this part of its size is flat; ground is lower than this.
 FLAT, LOW = 1e-4, 0.1
-#: Edges that nearly meet are reported up to this many times the tolerance, those of one part up to so many
-#: times, if they are further apart along the boundary by a factor.
-NEARLY, SLIT, ALONG = 100.0, 20.0, 6.0
+#: Edges that nearly meet are reported up to this many times the tolerance, those of one part if they are
+#: further apart along the boundary by a factor.
+NEARLY, ALONG = 100.0, 6.0
 #: A mesh and a surface meet that have so many points in common; a slit is looked for at so many places.
 MEETING, PLACES = 3, 100
 #: Said where closed masses touch; among more parts than these none are looked for.
 UNITE = "Closed masses that touch become one with Rhino's BooleanUnion (meshes: MeshBooleanUnion)."
 MOST_MASSES = 50
+#: Rhino's command for gaps between edges of meshes.
+MATCH = "MatchMeshEdge"
 #: At most this many such places are reported.
 SHOWN = 5
 #: Of more objects than these, only the largest are looked at.
@@ -79,8 +82,9 @@ def choose(
     meant = named(content, object, layer)
     odd = (*content.notes, *odd_unit(content, unit))
     unit = unit or content.unit
-    if content.is_whole and content.mesh is not None:
-        return Chosen(content.mesh, tuple(meant), odd)
+    if content.whole is not None and content.mesh is not None:
+        slits = _slits(content.whole.boundary, size_of(content.mesh.vertices), None, MATCH)
+        return Chosen(content.mesh, tuple(meant), (*slits, *coarse_numbers(content.mesh, None), *odd))
     meant = sorted(meant, key=lambda item: -max(item.size))[:MOST]
     found = parts_of(content, meant)
     if not found.parts:
@@ -110,7 +114,9 @@ def choose(
     notes += apart_from([other.box for other in found.parts if other is not part and _shares(other, part)])
     notes += strays([piece for members, piece in found.strays if members & set(part.members)])
     notes += list(apart.values())[:SHOWN]
-    notes += _slits(part, content.tolerance, _commands([part], meant))
+    if any(_touch(part, other, content.tolerance) for other in fitting[:MOST_MASSES] if other is not part):
+        notes.append(UNITE)
+    notes += _slits(part.boundary, size_of(part.box), content.tolerance, _commands([part], meant))
     notes += coarse_numbers(geometry, content.tolerance)
     notes += [*copies(len(found.copies)), *spoilt(found.spoilt, meant, content), *others(content, used), *odd]
     return Chosen(geometry, tuple(used), tuple(notes))
@@ -269,23 +275,24 @@ def _nearly(
     return notes
 
 
-def _slits(part: Part, tolerance: float | None, commands: str) -> list[str]:
-    """About edges of a part that nearly meet each other, and not only along the boundary."""
-    size = float(np.linalg.norm(np.ptp(part.box, axis=0)))
-    if tolerance is None or not len(part.boundary) or SLIT * tolerance > LOW * size:
+def _slits(boundary: Floats, size: float, tolerance: float | None, commands: str) -> list[str]:
+    """About edges of a part that nearly meet each other, and not only along the boundary (k, 2, 3)."""
+    whose = "gaps that are welded, up to" if tolerance is None else "the file's tolerance of"
+    tolerance = tolerance or TOLERANCE * size
+    if not len(boundary) or NEARLY * tolerance > LOW * size:
         return []
-    points = part.boundary.reshape(-1, 3)
+    points = boundary.reshape(-1, 3)
     tree, n = cKDTree(points), len(points)
     same = tree.query_pairs(tolerance, output_type="ndarray")
     _, name = connected_components(coo_array((np.ones(len(same)), same.T), shape=(n, n)), directed=False)
-    near = tree.query_pairs(SLIT * tolerance, output_type="ndarray")
+    near = tree.query_pairs(NEARLY * tolerance, output_type="ndarray")
     near = near[name[near[:, 0]] != name[near[:, 1]]]
     near = near[:: 1 + len(near) // PLACES]
     if not len(near):
         return []
     length = np.linalg.norm(points[::2] - points[1::2], axis=1)
     along = coo_array((length, (name[::2], name[1::2])), shape=(n, n)).tocsr()
-    reach = ALONG * SLIT * tolerance
+    reach = ALONG * NEARLY * tolerance
     way = dijkstra(along, directed=False, indices=name[near[:, 0]], limit=reach)
     near = near[np.isinf(way[np.arange(len(near)), name[near[:, 1]]])]
     if len(near) < 2:
@@ -294,8 +301,8 @@ def _slits(part: Part, tolerance: float | None, commands: str) -> list[str]:
     k = int(apart.argmin())
     at = place(points[near[k, 0]])
     return [
-        f"Edges of the surface come within {apart[k]:.3g} of each other at {at}, more than the file's "
-        f"tolerance of {tolerance:g}, and were left open: close the gap with Rhino's {commands}."
+        f"Edges of the surface come within {apart[k]:.3g} of each other at {at}, more than {whose} "
+        f"{tolerance:g}, and were left open: close the gap with Rhino's {commands}."
     ]
 
 
@@ -311,7 +318,7 @@ def _is_mesh(part: Part, meant: Sequence[Found]) -> bool:
 
 def _commands(parts: Sequence[Part], meant: Sequence[Found]) -> str:
     """What closes gaps between them in Rhino."""
-    return "MatchMeshEdge" if any(_is_mesh(part, meant) for part in parts) else "MatchSrf or JoinEdge"
+    return MATCH if any(_is_mesh(part, meant) for part in parts) else "MatchSrf or JoinEdge"
 
 
 def several(

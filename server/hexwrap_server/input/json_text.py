@@ -25,26 +25,28 @@ def loads(text: bytes) -> object:
     try:
         return orjson.loads(text)
     except orjson.JSONDecodeError as error:
-        place = _not_finite(text)
-        if place is not None:
-            raise FormError.at(place, "must be a finite number", NonFiniteError) from None
-        raise NotJsonError(
-            f"The body is not JSON: {error.msg} at line {error.lineno}, column {error.colno}."
-        ) from None
+        steps = _not_finite(text)
+        if steps is None:
+            raise NotJsonError(
+                f"The body is not JSON: {error.msg} at line {error.lineno}, column {error.colno}."
+            ) from None
+        place, detail = pointer(tuple(steps)), "must be a finite number"
+        if isinstance(steps[-1], str):
+            raise NotJsonError.at(place, detail) from None
+        raise FormError.at(place, detail, NonFiniteError) from None
     finally:
         gc.enable()
 
 
-def _not_finite(text: bytes) -> str | None:
-    """JSON pointer to the first entry of a list that is NaN, infinite or too large for a float.
+def _not_finite(text: bytes) -> list[str | int] | None:
+    """The steps to the first number that is NaN, infinite or too large for a float.
 
     None where something else is wrong with the text. Slow, and only for texts that were refused.
     """
     try:
-        place = _place_of_infinite(json.loads(text))
+        return _place_of_infinite(json.loads(text)) or None
     except (ValueError, RecursionError):
         return None
-    return None if place is None else pointer(tuple(place))
 
 
 def _place_of_infinite(value: object) -> list[str | int] | None:
@@ -54,7 +56,6 @@ def _place_of_infinite(value: object) -> list[str | int] | None:
         below = _place_of_infinite(inner)
         if below is not None:
             return [step, *below]
-        is_number = isinstance(inner, (int, float)) and isinstance(value, list)
-        if is_number and not abs(inner) <= sys.float_info.max:
+        if isinstance(inner, (int, float)) and not abs(inner) <= sys.float_info.max:
             return [step]
     return None

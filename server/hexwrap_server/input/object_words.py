@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from hexwrap_server.input.parts import COARSEST, size_of
 from hexwrap_server.input.readers.found import FileContent, Found, Geometry
 from hexwrap_solver.arrays import Floats
 from hexwrap_solver.surface import SentMesh
@@ -34,16 +35,21 @@ def joint(joint: Joint, tolerance: float | None, objects: int) -> list[str]:
 
 
 def coarse_numbers(geometry: Geometry, tolerance: float | None) -> list[str]:
-    """Whether a mesh has coordinates of single precision that are coarser than the file's tolerance."""
-    if not isinstance(geometry, SentMesh) or tolerance is None:
+    """Whether a mesh has coordinates of single precision that are coarser than the file's tolerance, or where
+    it has none, than what can be a tolerance at all."""
+    if not isinstance(geometry, SentMesh):
         return []
     single = geometry.vertices.astype(np.float32)
     grain = float(np.spacing(np.abs(single).max(initial=0.0)))
-    if grain <= tolerance or not np.array_equal(single, geometry.vertices):
+    size = size_of(geometry.vertices[geometry.faces.values])
+    if grain <= (tolerance or COARSEST * size) or not np.array_equal(single, geometry.vertices):
         return []
+    than = (
+        f"coarser than the file's tolerance of {tolerance:g}" if tolerance else f"beside a size of {size:.4g}"
+    )
     return [
         f"The mesh is far from the origin and has coordinates of single precision, exact to {grain:.2g} "
-        f"only, coarser than the file's tolerance of {tolerance:g}: move it to the origin, then mesh it."
+        f"only, {than}: move it to the origin, then mesh it."
     ]
 
 

@@ -133,10 +133,8 @@ def _add_meshes(
 ) -> None:
     """owner: (m,) the object of each face. at: (n,) that of each vertex, where objects have their own; a part
     then has those of its own objects alone."""
-    joint = Joint()
-    if tolerance is not None:
-        mesh, source, joint = joined(mesh, min(tolerance, COARSEST * _size(mesh.vertices[mesh.faces.values])))
-        owner = owner[source]
+    mesh, source, joint = joined(mesh, _allowed(tolerance, size_of(mesh.vertices[mesh.faces.values])))
+    owner = owner[source]
     split = [(piece, np.unique(owner[piece.faces]).tolist()) for piece in pieces(mesh)]
     largest: dict[int, float] = {}
     for piece, members in split:  # the largest come first
@@ -176,7 +174,7 @@ def _add_breps(objects: list[tuple[int, NurbsSurface | Brep]], tolerance: float 
     breps = [
         geometry
         if isinstance(geometry, Brep)
-        else brep_of_surface(geometry, _allowed(tolerance, _size(geometry.control_points[..., :3])))
+        else brep_of_surface(geometry, _allowed(tolerance, size_of(geometry.control_points[..., :3])))
         for _, geometry in objects
     ]
     whole = one_brep(breps)
@@ -201,7 +199,7 @@ def _same(geometry: Geometry) -> Geometry:
     return geometry
 
 
-def _size(points: Floats) -> float:
+def size_of(points: Floats) -> float:
     return float(np.linalg.norm(np.ptp(points.reshape(-1, 3), axis=0)))
 
 
@@ -215,7 +213,7 @@ def brep_where_needed(geometry: Geometry, tolerance: float | None) -> tuple[Geom
     whose ends are one seam where they meet within the file's tolerance; and notes for the user."""
     if not isinstance(geometry, NurbsSurface):
         return geometry, []
-    size = _size(geometry.control_points[..., :3])
+    size = size_of(geometry.control_points[..., :3])
     exact, wide = TOLERANCE * size, _allowed(tolerance, size)
     is_tube = sum(closed_within(geometry, exact)) == 1
     brep = brep_of_surface(geometry, exact if is_tube else wide)

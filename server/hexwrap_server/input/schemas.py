@@ -75,7 +75,7 @@ def _parsed(
 def _opened(body: object) -> tuple[dict[str, Any], dict[str, Any], dict[str, object]]:
     """The body, and its surface divided. Raises FormError."""
     if not isinstance(body, dict):
-        raise FormError.at("", 'the body must be a JSON object such as {"surface": …}')
+        raise FormError.at("", 'must be a JSON object such as {"surface": …}')
     if "surface" not in body:
         raise FormError.at("/surface", "'surface' is missing; it is the one field without a default")
     return body, *_divided(body["surface"], "/surface", allow_id=True)
@@ -94,7 +94,7 @@ def parse_surface(surface: object, max_vertices: int) -> SentSurface:
 def parse_points(body: object, dimension: int, most: int) -> np.ndarray[Any, np.dtype[np.float64]]:
     """(n, dimension) of a lift or flatten request. Raises FormError."""
     if not isinstance(body, dict):
-        raise FormError.at("", 'the body must be a JSON object such as {"points": …}')
+        raise FormError.at("", 'must be a JSON object such as {"points": …}')
     _known(body, ("points",), "")
     if "points" not in body:
         raise FormError.at("/points", "'points' is missing")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import PurePath
@@ -26,9 +27,7 @@ from hexwrap_solver.surface.types import MeshSettings, Origin, SurfaceSettings
 T = TypeVar("T")
 
 #: Formats that Rhino reads and we do not.
-IMPORTED = (
-    ".step .stp .igs .iges .sat .x_t .dwg .dgn .skp .fbx .3ds .dae .3mf .amf .wrl .glb .gltf .usd .usdz .ifc"
-)
+IMPORTED = ".step .stp .igs .iges .dwg .dgn .skp .fbx .3ds .3mf .wrl .glb .gltf"
 #: What to do with files that hold something else.
 INSTEAD = {
     **dict.fromkeys(
@@ -43,20 +42,30 @@ INSTEAD = {
     ),
     **dict.fromkeys((".gh", ".ghx"), "bake the definition's surface in Grasshopper and save the Rhino file"),
     **dict.fromkeys((".zip", ".gz", ".7z", ".rar", ".tar"), "unpack it first"),
+    ".ifc": "export the surface alone from the program that made the model, as 3DM, OBJ or STL",
+    ".html": "it is a web page or XML, perhaps the message of a failed download: download the file again",
+    ".lfs": "it only points at the file, which Git LFS keeps: fetch that with git lfs pull",
     ".3dmbak": "rename it so that it ends in .3dm",
     ".json": "it may be a request, which hexwrap solve and POST /v1/jobs take",
 }
 #: How files begin, and what their names end with then.
 BEGINNINGS = {
-    b"3D Geometry File Format": ".3dm",
-    b"ply": ".ply",
-    b"OFF": ".off",
-    b"PK\3\4": ".zip",
-    b"ISO-10303-21": ".step",
-    b"AC10": ".dwg",
-    b"glTF": ".glb",
-    b"Kaydara FBX": ".fbx",
+    rb"3D Geometry File Format": ".3dm",
+    rb"ply": ".ply",
+    rb"OFF": ".off",
+    rb"PK\x03\x04": ".zip",
+    rb"\x1f\x8b": ".gz",
+    rb"<": ".html",
+    rb"version https://git-lfs": ".lfs",
+    rb"ISO-10303-21.*FILE_SCHEMA\s*\(\s*\(\s*'IFC": ".ifc",
+    rb"ISO-10303-21": ".step",
+    rb"(999[^\S\n]*\n[^\n]*\n\s*)*0\s+SECTION": ".dxf",  # comments first: two lines each, in one way only
+    rb"AC10": ".dwg",
+    rb"glTF": ".glb",
+    rb"Kaydara FBX": ".fbx",
 }
+#: Files are told by this many bytes.
+BEGINNING = 8192
 
 
 #: Suffix → reader.
@@ -92,13 +101,21 @@ def _read(data: bytes, suffix: str) -> FileContent:
     try:
         return READERS[suffix](data)
     except UnreadableFileError as error:
-        other = next((end for start, end in BEGINNINGS.items() if data.startswith(start)), suffix)
+        head = data[:BEGINNING].lstrip()
+        other = next((end for start, end in BEGINNINGS.items() if re.match(start, head, re.DOTALL)), "")
+        other = other or next((end for end in READERS if end != suffix and _reads(data, end)), suffix)
         if other in (suffix, ".zip" if suffix == ".npz" else suffix):
             raise
-        instead = f" Of files of that type: {INSTEAD[other]}." if other in INSTEAD else ""
-        raise UnreadableFileError(
-            f"The file begins like a {other} file: give it the ending {other}.{instead}"
-        ) from error
+        what = f"it is one, so give it the ending {other}" if other in READERS else INSTEAD[other]
+        raise UnreadableFileError(f"The file begins like a {other} file: {what}.") from error
+
+
+def _reads(data: bytes, suffix: str) -> bool:
+    try:
+        READERS[suffix](data)
+    except Exception:  # foreign readers fail in every way
+        return False
+    return True
 
 
 def read_surface(data: bytes, filename: str, settings: SurfaceSettings | None = None) -> Chosen:

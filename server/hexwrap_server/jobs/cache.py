@@ -13,6 +13,7 @@ import time
 from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import is_dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -27,6 +28,9 @@ from hexwrap_solver.arrays import Progress
 T = TypeVar("T")
 log = logging.getLogger("hexwrap.cache")
 
+#: A stage that took so many seconds is written at once: its file takes little of that, and another worker may
+#: wait for it. Those of quicker ones are written when the answer is out.
+WORTH_WAITING = 0.1
 #: Share of the whole work that each stage usually takes, for the progress bar.
 SHARES = {
     "surface": 0.1,
@@ -37,7 +41,11 @@ SHARES = {
     "trade-off": 0.02,
     "panels": 0.03,
     "quality": 0.1,
-    "outlook": 0.05,
+    "trimmed": 0.02,
+    "seats": 0.03,
+    "outlook": 0.02,
+    "other map": 0.03,
+    "other boundary": 0.02,
     "components": 0.02,
     "support": 0.03,
 }
@@ -46,9 +54,16 @@ SHARES = {
 class StageCache:
     """Finished stages by key: the recently used ones in memory, more of them in a folder."""
 
-    def __init__(self, folder: Path | None, memory_bytes: int) -> None:
+    def __init__(
+        self,
+        folder: Path | None,
+        memory_bytes: int,
+        later: Callable[[Callable[[], object]], object] = lambda do: do(),
+    ) -> None:
+        """later: takes what can wait until the answer is out."""
         self.folder = folder
         self.memory_bytes = memory_bytes
+        self._later = later
         self._kept: OrderedDict[str, tuple[Any, int]] = OrderedDict()
         self._bytes = 0
         self._used: set[str] = set()  # since the last weighing
@@ -72,17 +87,21 @@ class StageCache:
         self._keep(key, value)
         return value
 
-    def put(self, key: str, value: Any) -> None:
+    def put(self, key: str, value: Any, seconds: float = WORTH_WAITING) -> None:
+        """seconds: that it took."""
         self._keep(key, value)
         if self.folder is None:
             return
-        try:
-            write_whole(self._path(key), pieces(value))
-        except StorageError as error:  # a full disk costs speed, not the job
-            log.warning("a stage could not be written to the cache: %s", error)
+        if seconds < WORTH_WAITING:
+            self._later(partial(self._write, key, value))
+        else:
+            self._write(key, value)
 
     def weigh(self) -> None:
         """Count what was used since the last time anew: stages keep what later ones derived from them."""
+        self._later(self._weigh)
+
+    def _weigh(self) -> None:
         for key in self._used:
             self._count(key, self._kept[key][0])
         self._used.clear()
@@ -124,6 +143,12 @@ class StageCache:
             return None
         return value
 
+    def _write(self, key: str, value: Any) -> None:
+        try:
+            write_whole(self._path(key), pieces(value))
+        except StorageError as error:  # a full disk costs speed, not the job
+            log.warning("a stage could not be written to the cache: %s", error)
+
     def _path(self, key: str) -> Path:
         assert self.folder is not None
         return self.folder / f"{key}.stage"
@@ -154,15 +179,15 @@ class CachingRunner:
         def progress(fraction: float, what: str) -> None:
             self._report(stage, min(done + share * min(max(fraction, 0.0), 1.0), 1.0), what)
 
-        progress(0.0, "")
         key = digest(self._key if after is None else self._keys[after], stage, settings)
         self._keys[stage] = key
         if after is None:
             self._key = key
         hit = self.cache.get(key)
         if hit is None:
+            progress(0.0, "")
             result = compute(progress)
-            self.cache.put(key, result)
+            self.cache.put(key, result, time.perf_counter() - start)
             self.found[stage] = "computed"
         else:
             result, self.found[stage] = hit

@@ -45,7 +45,7 @@ class DaskEngine:
         self._address = scheduler
         self._client: Any = None
         self._listeners: dict[str, Callable[..., None]] = {}
-        self._places: dict[str, str] = {}
+        self._places: dict[str, list[str]] = {}  # machines that a call was given to
         self._machines: dict[str, int] = {}  # threads by address
         self._looking: asyncio.Task[None] | None = None
 
@@ -126,16 +126,14 @@ class DaskEngine:
     async def _answer(self, future: Any, ticket: str) -> Any:
         answer = asyncio.ensure_future(future)
         try:
-            first = ""
             while True:
                 done, _ = await asyncio.wait([answer], timeout=CHECK_INTERVAL)
                 if done:
                     return _content(answer)
-                place = self._places.get(ticket, "")
-                first = first or place
-                if first and (place != first or first not in self._machines):
+                places = self._places.get(ticket, [])
+                if len(places) > 1 or not self._machines.keys() >= set(places):
                     raise WorkerDiedError(
-                        f"The machine that ran the job ({first}) left the cluster; other jobs are not "
+                        f"The machine that ran the job ({places[0]}) left the cluster; other jobs are not "
                         "affected. Send the job again."
                     )
         finally:
@@ -143,7 +141,7 @@ class DaskEngine:
 
     async def _kill(self, future: Any, ticket: str) -> None:
         assert self._client is not None
-        with contextlib.suppress(OSError, RuntimeError, asyncio.CancelledError):
+        with contextlib.suppress(Exception, asyncio.CancelledError):  # in whatever way the cluster went
             async with asyncio.timeout(STOP_SECONDS):
                 await future.cancel(force=True)
                 await self._client.run(_stop, ticket, on_error="ignore")
@@ -173,7 +171,8 @@ class DaskEngine:
         if ticket not in self._listeners:
             return
         if content[0] == "place":
-            self._places[ticket] = content[1]
+            self._places.setdefault(ticket, []).append(content[1])
+            self._machines.setdefault(content[1], 1)  # one that joined since we looked
         else:
             self._listeners[ticket](*content)
 

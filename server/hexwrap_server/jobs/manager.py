@@ -45,6 +45,8 @@ PRUNE_INTERVAL = 600.0
 CATCH_UP_INTERVAL = 2.0
 #: Seconds that a job waits for the database while another program holds it, and between two attempts.
 PATIENCE, BUSY_INTERVAL = 10.0, 0.1
+#: Bytes of a result that a worker has just written up to which it is read without the detour of a thread.
+AT_ONCE = 2**24
 #: Explorations that run at once; they take no worker themselves.
 EXPLORERS = 2
 log = logging.getLogger("hexwrap.jobs")
@@ -276,7 +278,7 @@ class JobManager:
         """Some parts of the Result, packed. Raises GoneError, StorageError."""
         some = picked(await self.result(job), names)
         if some is not None:
-            return some
+            return b"".join(some)
         timings = self._kept(job).timings
         path = str(self.store.solution_path(job.identity))
         return await errand("hexwrap_server.jobs.work:result_parts", path, names, timings)
@@ -346,7 +348,10 @@ class JobManager:
                 lambda: self._change(item, written=True, status="running", stage="", started=now)
             )
             outcome = await (self._explore(item) if item.explores else self._compute(item))
-            packed = await asyncio.to_thread(self.store.keep_outcome, identity, outcome)
+            if outcome.result is None and outcome.size <= AT_ONCE:
+                packed = self.store.keep_outcome(identity, outcome)
+            else:
+                packed = await asyncio.to_thread(self.store.keep_outcome, identity, outcome)
             await _patiently(lambda: self.store.finish_work(identity, outcome))
             self._last = identity, packed
             self._end([_done(job, outcome) for job in item.jobs.values()])

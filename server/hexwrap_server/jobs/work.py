@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache, lru_cache, partial
 from pathlib import Path
@@ -17,9 +17,9 @@ from hexwrap_server.input.requests import CacheSettings, Order, Outcome, SentSur
 from hexwrap_server.jobs import codec
 from hexwrap_server.jobs.cache import CachingRunner, StageCache
 from hexwrap_server.jobs.disk import read_whole, write_whole
-from hexwrap_server.jobs.worker import Report
+from hexwrap_server.jobs.worker import AFTERWARDS, Report
 from hexwrap_server.output import wire
-from hexwrap_server.output.packed import LEVEL, Packed, document, packed_part
+from hexwrap_server.output.packed import LEVEL, Packed, Pieces, document, packed_part
 from hexwrap_server.output.unrolled import moved_to, pieces_of_net
 from hexwrap_server.output.writers import Meta, write
 from hexwrap_solver import pipeline
@@ -48,19 +48,19 @@ def solve(report: Report, order: Order, caching: CacheSettings) -> Outcome:
     return replace(outcome_of(order, result, kept), timings=runner.timings, found=runner.found)
 
 
-def outcome_of(order: Order, result: bytes, kept: Sequence[bytes | memoryview]) -> Outcome:
-    """What is sent back, or put into the files of the order. kept: pieces of the solution. Raises
-    StorageError."""
-    size = len(result) + sum(map(len, kept))
+def outcome_of(order: Order, result: Pieces, kept: Pieces) -> Outcome:
+    """What is sent back, or put into the files of the order. result, kept: pieces of the Result and of the
+    solution. Raises StorageError."""
+    size = sum(map(len, [*result, *kept]))
     if order.files is None:
-        return Outcome(result, b"".join(kept), size)
-    write_whole(Path(order.files[0]), [result])
+        return Outcome(b"".join(result), b"".join(kept), size)
+    write_whole(Path(order.files[0]), result)
     write_whole(Path(order.files[1]), kept)
     return Outcome(None, None, size)
 
 
-def packed_result(solution: pipeline.Solution, runner: CachingRunner) -> bytes:
-    """The whole Result, see ``output.packed``."""
+def packed_result(solution: pipeline.Solution, runner: CachingRunner) -> Pieces:
+    """The whole Result, see ``output.packed``. Only what may be used again is worth compressing."""
 
     pieces = runner.remembered("pieces", ("map",), lambda: pieces_of_net(solution.map))
     solution, panels = moved_to(pieces, solution), solution.panels
@@ -68,7 +68,7 @@ def packed_result(solution: pipeline.Solution, runner: CachingRunner) -> bytes:
     def made(name: str) -> Packed:
         if name == "panels" and panels is not None:
             lies = f"panels {codec.digest(panels.limit, panels.center)}"
-            end = Packed.of(b"," + wire.dump(wire.sized(solution))[1:])
+            end = Packed.stored(b"," + wire.dump(wire.sized(solution))[1:])
             return Packed.joined([runner.remembered(lies, ("fit",), placed), end])
         return packed_part(name, wire.dump(wire.part(solution, name, runner.timings)))
 
@@ -144,7 +144,8 @@ def write_file(
 @cache
 def stages(caching: CacheSettings) -> StageCache:
     """The cache of this process."""
-    return StageCache(Path(caching.folder) if caching.folder else None, caching.memory_bytes)
+    folder = Path(caching.folder) if caching.folder else None
+    return StageCache(folder, caching.memory_bytes, AFTERWARDS.append)
 
 
 @lru_cache(KEPT_SOLUTIONS)

@@ -52,6 +52,9 @@ KEEP_MEMORY = {
 WATCH_INTERVAL = 0.1
 #: Seconds between two progress messages of one job.
 REPORT_INTERVAL = 0.05
+#: What this process does when its answer is out and before it takes the next call: it only makes later calls
+#: quicker, so nobody is to wait for it, and it may be lost.
+AFTERWARDS: list[Callable[[], object]] = []
 log = logging.getLogger("hexwrap.worker")
 
 #: A function's name and its arguments.
@@ -208,6 +211,11 @@ def main() -> None:
     while True:
         function, arguments = calls.get()
         _say(outlet, _answer(function, arguments, _reporter(outlet)))
+        while AFTERWARDS:
+            try:
+                AFTERWARDS.pop(0)()
+            except Exception:
+                log.exception("a fault after the answer")
 
 
 def _say(outlet: IO[bytes], answer: tuple[Any, ...]) -> None:

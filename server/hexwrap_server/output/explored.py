@@ -9,7 +9,7 @@ import orjson
 
 from hexwrap_server.jobs import codec
 from hexwrap_server.output.text import csv_table
-from hexwrap_solver.explore.front import best_of, front_of, within
+from hexwrap_solver.explore.front import best_of, excess, front_of, limited
 from hexwrap_solver.explore.types import Figures, Limits
 
 Json = dict[str, Any]
@@ -34,10 +34,9 @@ def summary(documents: list[Json], limits: Limits, refused: list[str]) -> Json:
     further variants cannot be made."""
     solved = [i for i, one in enumerate(documents) if one["measured"] is not None]
     found = {i: Figures(**documents[i]["measured"]) for i in solved}
-    kept = [i for i in solved if within(found[i], limits, documents[i]["request"]["panels"]["sizes"])]
-    notes = [
-        f"{len(documents)} variants were foreseen from their maps, {len(solved)} of them solved and measured."
-    ]
+    over = {i: beyond(documents[i], limits) for i in solved}
+    kept = [i for i in solved if not over[i]]
+    notes = [f"{_number(len(documents))} foreseen from the map, {len(solved)} of them solved and measured."]
     front = [kept[p] for p in np.flatnonzero(front_of([found[i] for i in kept]))]
     for i in front:
         documents[i]["front"] = True
@@ -45,19 +44,37 @@ def summary(documents: list[Json], limits: Limits, refused: list[str]) -> Json:
     if front:
         best = front[best_of([found[i] for i in front])]
     elif solved:
-        best = min(solved, key=lambda i: _excess(found[i], documents[i], limits))
-        notes.append("No variant that was solved keeps all limits; the best of them exceeds them least.")
+        best = min(solved, key=over.__getitem__)
+        notes.append(_exceeded({i: documents[i] for i in solved}, limits))
     problems = refused + [one["problem"] for one in documents if one["problem"]]
     if problems:
-        notes.append(f"{len(problems)} variants cannot be made. {max(problems, key=problems.count)}")
+        notes.append(f"{_number(len(problems))} cannot be made. {max(problems, key=problems.count)}")
     return {"variants": documents, "front": front, "best": best, "notes": notes}
 
 
-def _excess(found: Figures, document: Json, limits: Limits) -> float:
-    """Relative, of all limits together."""
-    sizes = document["request"]["panels"]["sizes"]
-    pairs = ((sizes, limits.sizes), (found.gap_max, limits.max_gap), (found.panels, limits.panels))
-    return sum(max(has / max(most, 1e-12) - 1, 0.0) for has, most in pairs if has and most is not None)
+def _number(variants: int) -> str:
+    return "1 variant" if variants == 1 else f"{variants} variants"
+
+
+def beyond(document: Json, limits: Limits) -> float:
+    """``excess`` of what was measured, or else of what was foreseen."""
+    return excess(Figures(**(document["measured"] or document["predicted"])), limits, _sizes(document))
+
+
+def _sizes(document: Json) -> int:
+    return int(document["request"]["panels"]["sizes"])
+
+
+def _exceeded(solved: dict[int, Json], limits: Limits) -> str:
+    """Which limits none of these variants keeps, and how near they come."""
+    has = {i: limited(Figures(**one["measured"]), limits, _sizes(one)) for i, one in solved.items()}
+    parts = []
+    for name in dict.fromkeys(name for pairs in has.values() for name in pairs):
+        least, i, most = min((pairs[name][0], i, pairs[name][1]) for i, pairs in has.items() if name in pairs)
+        if least > most:
+            parts.append(f"{name} is to be {most:.4g} at most, and {least:.4g} is the least (no. {i})")
+    said = "; ".join(parts) or "each is kept by some, all by none"
+    return f"No variant that was solved keeps all limits: {said}. The one proposed exceeds them least."
 
 
 def packed(document: Json) -> bytes:

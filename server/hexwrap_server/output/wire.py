@@ -15,7 +15,7 @@ from hexwrap_solver.arrays import Bools, Floats, Ragged
 from hexwrap_solver.conformal.net import Net
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.domain.apart import apart
-from hexwrap_solver.panels.folds import bend_angles, hinges_of
+from hexwrap_solver.panels.folds import bend_angles
 from hexwrap_solver.panels.types import Panels
 from hexwrap_solver.pattern.types import Pattern
 from hexwrap_solver.pipeline import Solution
@@ -85,8 +85,8 @@ def _listed(value: Any) -> Any:
         lengths = value.lengths
         if len(lengths) and np.all(lengths == lengths[0]):
             return value.values.reshape(len(lengths), int(lengths[0]), *value.values.shape[1:])
-        values, offsets = value.values.tolist(), value.offsets.tolist()
-        return [values[a:b] for a, b in pairwise(offsets)]
+        values = np.ascontiguousarray(value.values)
+        return [values[a:b] for a, b in pairwise(value.offsets.tolist())]
     if isinstance(value, complex):
         return [value.real, value.imag]
     if isinstance(value, np.ndarray):
@@ -165,10 +165,12 @@ def sized(solution: Solution) -> dict[str, Any]:
 
 def bent(made: Panels) -> dict[str, Any]:
     """Of each panel the corners between which it is bent, the angle there, and the cell of its other half."""
-    corner = [None if hinge < 0 else [0, hinge] for hinge in hinges_of(made).tolist()]
+    corner: list[list[int] | None] = [None] * made.n_panels
     other = np.full(made.n_panels, -1)
     if made.bends is not None:
         other[made.bends.panel] = made.bends.other
+        for panel, hinge in zip(made.bends.panel.tolist(), made.bends.hinge.tolist(), strict=True):
+            corner[panel] = [0, hinge]
     return {"bend": corner, "bend_angle": bend_angles(made), "other_face": other}
 
 

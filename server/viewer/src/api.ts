@@ -38,9 +38,16 @@ export interface Figures {
   bare: number;
 }
 
+export interface Variant {
+  request: Request;
+  predicted: Figures;
+  measured: Figures | null;
+  front: boolean;
+}
+
 /** What an exploration found. */
 export interface Variants {
-  variants: { request: Request; predicted: Figures; measured: Figures | null; front: boolean }[];
+  variants: Variant[];
   front: number[];
   best: number | null;
   notes: string[];
@@ -78,6 +85,7 @@ export interface SingularityCurve {
 }
 
 export interface Result {
+  unit: string | null;
   mesh: { vertices: Vec3[]; faces: number[][]; input_vertex: number[]; vertex_of_input: number[]; loops: number[][]; repairs: string[]; features: number[][] };
   map: {
     kind: string;
@@ -173,6 +181,28 @@ function askForToken(): boolean {
   return token !== "";
 }
 
+/** Server-sent events until the job is over; a browser's own reader would ask for them without the token. */
+const OVER = ["done", "failed", "cancelled"];
+async function* events(path: string): AsyncGenerator<{ name: string; data: any }> {
+  const reader = (await call(path)).body!.pipeThrough(new TextDecoderStream()).getReader();
+  let text = "";
+  try {
+    while (true) {
+      const { value, done } = await reader.read().catch(() => ({ value: "", done: true }));
+      if (done) throw new UnreachableError("The server stopped; what it has found so far is kept.");
+      const blocks = (text + value).split("\n\n");
+      text = blocks.pop()!;
+      for (const block of blocks) {
+        const found = /^event: (.*)\ndata: (.*)$/.exec(block);
+        if (found) yield { name: found[1], data: JSON.parse(found[2]) };
+        if (found && OVER.includes(found[1])) return;
+      }
+    }
+  } finally {
+    void reader.cancel();
+  }
+}
+
 const json = async <T>(path: string, init?: RequestInit): Promise<T> => (await call(path, init)).json() as Promise<T>;
 
 const post = (body: unknown): RequestInit => ({
@@ -185,12 +215,40 @@ const post = (body: unknown): RequestInit => ({
 export interface FileObject { id: string; name: string; layer: string; kind: string; visible: boolean; size: Vec3; used: boolean }
 export interface Stored { id: string; vertices: number; faces: number; repairs: string[]; unit?: string | null; objects?: FileObject[] }
 
+/** The surface sent last, and how to send it again: the server keeps surfaces for a while only. */
+let latest: { id: string; send: () => Promise<Stored> } | null = null;
+
+async function store(send: () => Promise<Stored>): Promise<Stored> {
+  const stored = await send();
+  latest = { id: stored.id, send };
+  return stored;
+}
+
+/** Sends the surface that goes by this id again, where the page has it; whether it has. */
+async function again({ id }: Request["surface"]): Promise<boolean> {
+  if (latest === null || id !== latest.id) return false;
+  await latest.send();
+  return true;
+}
+
+/** A job; where its surface is kept no more, once again with it. */
+async function start(path: string, body: Request): Promise<Job> {
+  try {
+    return await json<Job>(path, post(body));
+  } catch (error) {
+    const lost = error instanceof ProblemError && error.problem.errors?.some(({ pointer }) => pointer === "/surface/id");
+    if (!lost || !(await again(body.surface))) throw error;
+    return json<Job>(path, post(body));
+  }
+}
+
 export const api = {
   health: () => json<{ status: string; version: string }>("/health"),
   jobs: () => json<{ jobs: Job[] }>("/v1/jobs?limit=50").then((answer) => answer.jobs),
   job: (id: string, wait = 0) => json<Job>(`/v1/jobs/${id}${wait ? `?wait=${wait}` : ""}`),
-  submit: (request: Request) => json<Job>("/v1/jobs", post(request)),
-  explore: (body: Request) => json<Job>("/v1/explore", post(body)),
+  submit: (request: Request) => start("/v1/jobs", request),
+  explore: (body: Request) => start("/v1/explore", body),
+  events: (id: string) => events(`/v1/jobs/${id}/events`),
   variants: (id: string) => json<Variants>(`/v1/jobs/${id}/result`),
   /** The finished work as a file, through the token where there is one. */
   file: (id: string, name: string) => call(`/v1/jobs/${id}/files/${name}`).then((answer) => answer.blob()),
@@ -202,10 +260,13 @@ export const api = {
   settings: () => json<Schema>("/v1/settings"),
   samples: () => json<{ samples: { name: string }[] }>("/v1/samples").then((answer) => answer.samples),
   sample: (name: string) => json<Request>(`/v1/samples/${name}`),
+  /** A surface of a request, to be named by its id from then on. */
+  store: (surface: Request["surface"]) => store(() => json<Stored>("/v1/surfaces", post(surface))),
   /** The file's mesh as it stands, unchecked: to have something to point at when it is refused. */
   preview: (file: File) => json<{ vertices: Vec3[]; faces: number[][] }>("/v1/surfaces/preview", upload(file)),
   /** object: id of the one that is meant, where the file holds several. */
-  surface: (file: File, object?: string) => json<Stored>("/v1/surfaces", upload(file, object)),
+  surface: (file: File, object?: string) => store(() => json<Stored>("/v1/surfaces", upload(file, object))),
+  again,
 };
 
 function upload(file: File, object?: string): RequestInit {

@@ -1,6 +1,6 @@
 // Two small charts: how many panels of each size, and what each number of sizes would leave uncovered.
-import type { Result, SingularityCurve, TradeOff } from "./api";
-import { number } from "./colors";
+import type { SingularityCurve, TradeOff } from "./api";
+import { number, type Types } from "./colors";
 
 const NS = "http://www.w3.org/2000/svg";
 
@@ -16,7 +16,7 @@ const H = 132;
 const PAD = { left: 40, right: 8, top: 10, bottom: 24 };
 
 /** regular: how many come first, in ascending order; those of singularities and pieces of cells follow. */
-export function histogram(sizes: NonNullable<Result["sizes"]>, regular: number): SVGElement {
+export function histogram(sizes: Types[], regular: number): SVGElement {
   const root = svg("svg", { viewBox: `0 0 ${W} ${H}`, role: "img", "aria-label": "Panels per size" });
   const most = Math.max(...sizes.map((s) => s.count), 1);
   const width = (W - PAD.left - PAD.right) / sizes.length;
@@ -25,7 +25,7 @@ export function histogram(sizes: NonNullable<Result["sizes"]>, regular: number):
     const bar = svg("rect", {
       x: PAD.left + i * width + 0.5, y: H - PAD.bottom - h, width: Math.max(width - 1.5, 0.7), height: Math.max(h, 0.8), fill: s.color, rx: 1.5,
     });
-    bar.append(svg("title", {}, `edge ${number(s.edge_length)}: ${s.count} panels`));
+    bar.append(svg("title", {}, `${s.types ? `${s.types} other types` : `edge ${number(s.edge_length)}`}: ${s.count} panels`));
     root.append(bar);
   });
   root.append(
@@ -59,7 +59,7 @@ function curveOf(choices: Choice[], label: string): SVGElement {
   const y = (u: number) => H - PAD.bottom - ((H - PAD.top - PAD.bottom) * u) / top;
   root.append(
     svg("line", { x1: PAD.left, x2: W - PAD.right, y1: H - PAD.bottom, y2: H - PAD.bottom, class: "axis" }),
-    svg("text", { x: PAD.left - 5, y: PAD.top + 8, "text-anchor": "end" }, `${number(100 * top, 2)} %`),
+    svg("text", { x: PAD.left - 5, y: PAD.top + 8, "text-anchor": "end" }, top > 1e-6 ? `${number(100 * top, 2)} %` : ""),
     svg("text", { x: PAD.left - 5, y: H - PAD.bottom, "text-anchor": "end" }, "0"),
     svg("polyline", { points: choices.map((c, i) => `${x(i)},${y(c.uncovered)}`).join(" "), class: "line" }),
   );
@@ -89,7 +89,7 @@ export function tradeOff(curve: TradeOff, choose: (k: number) => void): SVGEleme
   const choices = curve.sizes.map((k, i): Choice => {
     const label = `${k} sizes: ${number(100 * curve.uncovered[i], 3)} % uncovered`;
     return {
-      value: k, uncovered: curve.uncovered[i], current: k === current, marked: k === 1 || k % 10 === 0 || k === current,
+      value: k, uncovered: curve.uncovered[i], current: k === current, marked: k === current || ((k === 1 || k % 10 === 0) && Math.abs(k - current) * 14 > curve.sizes.length),
       label, title: `${label}, worst gap ${number(curve.worst_gap[i])}`, choose: () => choose(k),
     };
   });

@@ -9,13 +9,15 @@ export interface Colouring {
 }
 
 export type Legend =
-  | { kind: "classes"; rows: { color: string; label: string; count: number }[] }
+  | { kind: "classes"; title: string; rows: { color: string; label: string; count: number }[] }
   | { kind: "ramp"; title: string; low: string; high: string }
   | { kind: "none"; text: string };
 
 /** A perceptually even ramp (dark blue over teal to sand), sampled at nine stops. */
 const RAMP = ["#1d2b53", "#1f4e79", "#1f6f78", "#3c8c74", "#6fa56c", "#a5b96b", "#d6c878", "#efdca0", "#fbf1d3"].map(rgb);
 const UNSIZED: [number, number, number] = [176, 176, 170];
+/** Of more types than this many those after the regular ones share a line and a bar. */
+const MOST_ROWS = 24;
 
 export function rgb(hex: string): [number, number, number] {
   const n = parseInt(hex.slice(1), 16);
@@ -121,11 +123,14 @@ export function colour(result: Result, mode: Mode): Colouring {
   if (mode === "size" && result.sizes?.length) {
     const table = new Map(result.sizes.map((s) => [s.size, rgb(s.color)]));
     for (let i = 0; i < n; i++) colors.set(table.get(result.panels!.size[i]) ?? UNSIZED, 3 * i);
-    const lengths = result.sizes.map((s) => s.edge_length);
-    const rows = result.sizes.map((s) => ({ color: s.color, label: number(s.edge_length, digitsApart(lengths)), count: s.count }));
+    const types = collected(result);
+    const lengths = types.filter((s) => !s.types).map((s) => s.edge_length);
+    const rows = types.map((s) => ({
+      color: s.color, label: s.types ? `${s.types} other types` : number(s.edge_length, digitsApart(lengths)), count: s.count,
+    }));
     const unsized = result.panels!.size.filter((s) => s < 0).length;
     if (unsized) rows.push({ color: `rgb(${UNSIZED.join(" ")})`, label: "cut to fit", count: unsized });
-    return { colors, legend: { kind: "classes", rows } };
+    return { colors, legend: { kind: "classes", title: inUnit("Edge", result), rows } };
   }
   const values = measure(result, mode);
   const finite = values.filter(Number.isFinite);
@@ -143,9 +148,26 @@ export function colour(result: Result, mode: Mode): Colouring {
   for (let i = 0; i < n; i++)
     colors.set(Number.isFinite(values[i]) ? ramp(range > 1e-12 * Math.abs(high) ? (values[i] - low) / range : 0.5) : UNSIZED, 3 * i);
   const { label, unit } = MODES.find((m) => m.mode === mode)!;
-  const title = unit === "relative" ? `${label} / edge` : unit === "length" ? `${label} (model units)` : label;
+  const title = unit === "relative" ? `${label} / edge` : unit === "length" ? inUnit(label, result) : label;
   return { colors, legend: { kind: "ramp", title, low: number(low), high: number(high) } };
 }
+
+/** One type, or the sum of so many. */
+export interface Types { edge_length: number; count: number; color: string; types?: number }
+
+/** Regular cells of each size, then the other types; many of these, as along folds, are told together. */
+export function collected({ sizes, quality }: Result): Types[] {
+  const all = sizes ?? [];
+  const others = all.slice(regular(all, quality.trade_off?.taken));
+  if (all.length <= MOST_ROWS || !others.length) return all;
+  const count = others.reduce((sum, type) => sum + type.count, 0);
+  return [...all.slice(0, -others.length), { edge_length: NaN, count, color: others[0].color, types: others.length }];
+}
+
+/** How many types are those of regular cells, which come first. */
+export const regular = (sizes: Types[], taken: number | null | undefined) => Math.min(taken || sizes.length, sizes.length);
+
+const inUnit = (label: string, { unit }: Result) => `${label}, ${unit ?? "model units"}`;
 
 /** Significant digits that tell neighbouring sizes apart. */
 function digitsApart(lengths: number[]): number {
@@ -156,6 +178,7 @@ function digitsApart(lengths: number[]): number {
 /** A figure as people read it: four significant digits, no needless zeros. */
 export function number(x: number | null | undefined, digits = 4): string {
   if (x === null || x === undefined || !Number.isFinite(x)) return "–";
-  if (x !== 0 && (Math.abs(x) < 1e-3 || Math.abs(x) >= 1e6)) return x.toExponential(1).replace("e+", "e");
+  if (Math.abs(x) < 1e-12) return "0"; // a rounding error, in whatever unit
+  if (Math.abs(x) < 1e-3 || Math.abs(x) >= 1e6) return x.toExponential(1).replace("e+", "e");
   return String(Number(x.toPrecision(digits)));
 }

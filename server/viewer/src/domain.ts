@@ -4,7 +4,7 @@ import { MapControls } from "three/examples/jsm/controls/MapControls.js";
 import type { Result, Vec2 } from "./api";
 import { cellCorners, faceCorners } from "./colors";
 import { FeatureLines } from "./features";
-import { pack, PolygonLayer } from "./polygons";
+import { PolygonLayer } from "./polygons";
 
 const CORNER_TOLERANCE = 1e-3;
 
@@ -14,11 +14,17 @@ export class DomainView {
   private readonly controls: MapControls;
   private readonly scene = new THREE.Scene();
   private readonly marks = new THREE.Group();
-  private layer: PolygonLayer | null = null;
+  private readonly layer = new PolygonLayer(false);
   private features: FeatureLines | null = null;
   private panelOfPolygon: number[] = [];
   private polygonOfPanel = new Map<number, number>();
-  private box = new THREE.Box2(new THREE.Vector2(-1, -1), new THREE.Vector2(1, 1));
+  /** What is drawn: it stays while it is the same. */
+  private map: Result["map"] | null = null;
+  private pattern: Result["pattern"] = null;
+  /** Of the mesh in the domain: everything is drawn about it. */
+  private middle: Vec2 = [0, 0];
+  private readonly outline = new THREE.Box2();
+  private readonly box = new THREE.Box2(new THREE.Vector2(-1, -1), new THREE.Vector2(1, 1));
   private next = 0;
 
   constructor(readonly element: HTMLElement) {
@@ -35,7 +41,7 @@ export class DomainView {
     this.controls.zoomToCursor = true;
     this.controls.mouseButtons.LEFT = THREE.MOUSE.PAN;
     this.controls.addEventListener("change", () => this.invalidate());
-    this.scene.add(this.marks);
+    this.scene.add(this.layer.group, this.marks);
     new ResizeObserver(() => this.fit()).observe(element);
     this.invalidate();
   }
@@ -50,38 +56,52 @@ export class DomainView {
   }
 
   clear(): void {
-    this.layer?.dispose();
-    this.layer = null;
-    this.features = null;
+    this.layer.show([]);
+    this.map = this.pattern = this.features = null;
+    for (const mark of this.marks.children) (mark as THREE.Points).geometry?.dispose();
     this.marks.clear();
     this.polygonOfPanel.clear();
     this.invalidate();
   }
 
   show(result: Result, keepView: boolean): void {
-    this.clear();
-    const corners = moved(faceCorners(result), result.map.apart?.face, result.map.apart?.shift);
-    const middle = this.middleOf(result.mesh.faces.map((_, i) => corners(i)[0]));
-    const local = ([x, y]: Vec2): Vec2 => [x - middle[0], y - middle[1]];
-    const { pattern, panels } = result;
-    this.box.makeEmpty();
-    if (pattern) {
-      const flat = moved(cellCorners(result), result.map.apart?.cell, result.map.apart?.shift);
-      const cells = pattern.faces.map((_, f) => flat(f).map(local));
-      this.layer = new PolygonLayer(pack(cells), false);
-      for (const cell of cells) for (const p of cell) this.box.expandByPoint(new THREE.Vector2(...p));
-      this.scene.add(this.layer.group);
-      this.panelOfPolygon = new Array(cells.length).fill(-1);
-      panels?.face.forEach((face, i) => {
-        this.panelOfPolygon[face] = i;
-        this.polygonOfPanel.set(i, face);
-      });
-    }
-    this.drawBoundary(result, (face) => corners(face).map(local), local);
-    this.features = FeatureLines.inDomain(result.mesh, (face) => corners(face).map(local));
-    this.marks.add(this.features.group);
+    if (this.map !== result.map) this.showMap(result);
+    if (this.pattern !== result.pattern) this.showCells(result);
+    this.select(null);
+    this.hover(null);
+    this.panelOfPolygon = new Array(this.layer.count).fill(-1);
+    this.polygonOfPanel.clear();
+    result.panels?.face.forEach((face, i) => {
+      this.panelOfPolygon[face] = i;
+      this.polygonOfPanel.set(i, face);
+    });
     if (!keepView) this.fit();
     this.invalidate();
+  }
+
+  private showMap(result: Result): void {
+    this.clear();
+    this.map = result.map;
+    const flat = moved(faceCorners(result), result.map.apart?.face, result.map.apart?.shift);
+    this.middle = this.middleOf(result.mesh.faces.map((_, i) => flat(i)[0]));
+    const corners = result.mesh.faces.map((_, i) => flat(i).map((z) => this.local(z)));
+    this.drawBoundary(result, (face) => corners[face]);
+    this.box.copy(this.outline);
+    this.features = FeatureLines.inDomain(result.mesh, (face) => corners[face]);
+    this.marks.add(this.features.group);
+  }
+
+  private showCells(result: Result): void {
+    this.pattern = result.pattern;
+    const flat = moved(cellCorners(result), result.map.apart?.cell, result.map.apart?.shift);
+    const cells = result.pattern?.faces.map((_, f) => flat(f).map((z) => this.local(z))) ?? [];
+    this.layer.show(cells);
+    this.box.copy(this.outline);
+    for (const cell of cells) for (const p of cell) this.box.expandByPoint(new THREE.Vector2(...p));
+  }
+
+  private local([x, y]: Vec2): Vec2 {
+    return [x - this.middle[0], y - this.middle[1]];
   }
 
   private middleOf(uv: Vec2[]): Vec2 {
@@ -94,7 +114,8 @@ export class DomainView {
   }
 
   /** Mesh boundary as drawn by the faces that hold it, corners as dots, the cut's two images left open. */
-  private drawBoundary(result: Result, corners: (face: number) => Vec2[], local: (z: Vec2) => Vec2): void {
+  private drawBoundary(result: Result, corners: (face: number) => Vec2[]): void {
+    this.outline.makeEmpty();
     const { mesh, map } = result;
     const count = new Map<string, number>();
     const key = (a: number, b: number) => (a < b ? `${a},${b}` : `${b},${a}`);
@@ -115,15 +136,15 @@ export class DomainView {
         const p = at[k];
         const q = at[(k + 1) % 3];
         lines.push(...p, 0.01, ...q, 0.01);
-        this.box.expandByPoint(new THREE.Vector2(...p));
+        this.outline.expandByPoint(new THREE.Vector2(...p));
         if (!curved && corner.has(a)) dots.push(...p, 0.02);
       }
     });
     this.marks.add(new THREE.LineSegments(positions(lines), new THREE.LineBasicMaterial({ color: 0xc2410c })));
     if (dots.length) this.marks.add(new THREE.Points(positions(dots), new THREE.PointsMaterial({ color: 0xc2410c, size: 8, sizeAttenuation: false })));
     if (centres.length) this.marks.add(new THREE.Points(positions(centres), new THREE.PointsMaterial({ color: 0x6a3fa0, size: 8, sizeAttenuation: false })));
-    if (map.apex && !map.apart && this.box.clone().expandByScalar(0.3 * this.box.getSize(new THREE.Vector2()).length()).containsPoint(new THREE.Vector2(...local(map.apex))))
-      this.marks.add(new THREE.Points(positions([...local(map.apex), 0.02]), new THREE.PointsMaterial({ color: 0x1f6f78, size: 7, sizeAttenuation: false })));
+    if (map.apex && !map.apart && this.outline.clone().expandByScalar(0.3 * this.outline.getSize(new THREE.Vector2()).length()).containsPoint(new THREE.Vector2(...this.local(map.apex))))
+      this.marks.add(new THREE.Points(positions([...this.local(map.apex), 0.02]), new THREE.PointsMaterial({ color: 0x1f6f78, size: 7, sizeAttenuation: false })));
   }
 
   fit(): void {
@@ -141,7 +162,6 @@ export class DomainView {
   }
 
   paint(panelColors: Uint8Array): void {
-    if (!this.layer) return;
     const colors = new Uint8Array(3 * this.layer.count).fill(205);
     this.polygonOfPanel.forEach((polygon, panel) => colors.set(panelColors.subarray(3 * panel, 3 * panel + 3), 3 * polygon));
     this.layer.paint(colors);
@@ -149,12 +169,12 @@ export class DomainView {
   }
 
   select(panel: number | null): void {
-    this.layer?.select(panel === null ? null : this.polygonOfPanel.get(panel) ?? null);
+    this.layer.select(panel === null ? null : this.polygonOfPanel.get(panel) ?? null);
     this.invalidate();
   }
 
   hover(panel: number | null): void {
-    this.layer?.hover(panel === null ? null : this.polygonOfPanel.get(panel) ?? null);
+    this.layer.hover(panel === null ? null : this.polygonOfPanel.get(panel) ?? null);
     this.invalidate();
   }
 
@@ -173,7 +193,7 @@ export class DomainView {
   }
 
   pick(x: number, y: number): number | null {
-    const polygon = this.layer?.pick(this.renderer, this.camera, x, y, this.element.clientWidth, this.element.clientHeight);
+    const polygon = this.layer.pick(this.renderer, this.camera, x, y, this.element.clientWidth, this.element.clientHeight);
     const panel = polygon === null || polygon === undefined ? -1 : this.panelOfPolygon[polygon];
     this.invalidate();
     return panel < 0 ? null : panel;

@@ -1,12 +1,17 @@
 // Variants of the surface: a scatter of what they cost against what they leave open, with sliders for limits.
-import { api, type Figures, type Job, type Request, type Variants } from "./api";
+import { api, UnreachableError, type Figures, type Job, type Request, type Variant, type Variants } from "./api";
 import { svg } from "./charts";
 import { number } from "./colors";
 import { element } from "./form";
 
 const W = 340;
 const H = 220;
-const PAD = { left: 40, right: 10, top: 12, bottom: 28 };
+const PAD = { left: 50, right: 10, top: 30, bottom: 34 };
+/** Less that stays uncovered than this is drawn as this. */
+const LEAST = 1e-5;
+
+/** Of a share of the most types. */
+const hue = (share: number) => `hsl(${250 - 200 * share} 65% 52%)`;
 
 /** What a variant may be at most, to be shown as one that will do. */
 const LIMITS: { name: "types" | "gap_max" | "panels"; label: string }[] = [
@@ -17,6 +22,9 @@ const LIMITS: { name: "types" | "gap_max" | "panels"; label: string }[] = [
 
 export class Explorer {
   private found: Variants | null = null;
+  /** Variants by their number, as they come. */
+  private known: Variant[] = [];
+  private frame = 0;
   private chosen: number | null = null;
   private turn = 0;
   private job: Job | null = null;
@@ -31,6 +39,7 @@ export class Explorer {
   clear(): void {
     this.turn++;
     this.found = this.job = this.chosen = null;
+    this.known = [];
     this.draw();
   }
 
@@ -42,23 +51,57 @@ export class Explorer {
   async follow(job: Job): Promise<void> {
     const turn = ++this.turn;
     this.found = this.chosen = null;
-    while (true) {
-      this.job = job;
-      this.draw();
-      if (job.status !== "queued" && job.status !== "running") break;
-      job = await api.job(job.id, 1);
-      if (turn !== this.turn) return;
+    this.known = [];
+    this.job = job;
+    this.draw();
+    while (this.busy) {
+      try {
+        for await (const { name, data } of api.events(job.id)) {
+          if (turn !== this.turn) return;
+          if (name === "variant") this.known[data.index] = data.variant;
+          else this.job = data;
+          this.soon();
+        }
+      } catch (error) {
+        if (!(error instanceof UnreachableError)) throw error;
+        if (turn !== this.turn) return;
+        this.tell(error.message);
+        await new Promise((resolve) => setTimeout(resolve, 700));
+        if (turn !== this.turn) return;
+      }
     }
-    if (job.status !== "done") return;
-    const found = await api.variants(job.id);
-    if (turn !== this.turn) return;
-    this.found = found;
-    for (const { name } of LIMITS) delete this.limits[name];
+    if (this.job?.status === "done") {
+      const found = await api.variants(job.id);
+      if (turn !== this.turn) return;
+      this.found = found;
+      this.known = found.variants;
+      for (const { name } of LIMITS) delete this.limits[name];
+    }
     this.draw();
   }
 
+  private get busy(): boolean {
+    return this.job?.status === "queued" || this.job?.status === "running";
+  }
+
+  /** Draw what has come; the button stays the one that somebody may be pressing. */
+  private soon(): void {
+    this.frame ||= requestAnimationFrame(() => {
+      this.frame = 0;
+      if (!this.busy) return;
+      const front = this.root.querySelector("svg.front");
+      if (front) front.replaceWith(this.scatter());
+      else if (this.known.length) this.root.lastElementChild!.before(this.scatter());
+      this.tell(this.said());
+    });
+  }
+
+  private tell(text: string): void {
+    this.root.lastElementChild!.textContent = text;
+  }
+
   private measured(): { index: number; figures: Figures }[] {
-    return (this.found?.variants ?? []).flatMap((one, index) => (one.measured ? [{ index, figures: one.measured }] : []));
+    return this.known.flatMap((one, index) => (one.measured ? [{ index, figures: one.measured }] : []));
   }
 
   private fits(figures: Figures): boolean {
@@ -66,47 +109,63 @@ export class Explorer {
   }
 
   private draw(): void {
-    const busy = this.job?.status === "queued" || this.job?.status === "running";
+    const busy = this.busy;
     const button = element("button", { type: "button", id: "explore" }, busy ? "Stop" : "Explore variants");
     button.addEventListener("click", () => {
       if (busy) void api.cancel(this.job!.id).finally(() => this.clear());
-      else void this.run().catch((error: Error) => (this.root.lastElementChild!.textContent = error.message));
+      else void this.run().catch((error: Error) => {
+        this.job = null;
+        this.draw();
+        this.tell(error.message);
+      });
     });
     const parts: (Node | string)[] = [element("div", { class: "buttons" }, button)];
-    if (this.found) parts.push(this.scatter(), ...this.sliders());
-    parts.push(element("p", { class: "note", role: "status" }, this.said(busy)));
+    if (this.known.length) parts.push(this.scatter());
+    if (this.found) parts.push(...this.sliders());
+    parts.push(element("p", { class: "note", role: "status" }, this.said()));
     this.root.replaceChildren(...parts);
   }
 
-  private said(busy: boolean): string {
-    if (busy) return `${this.job!.stage || "queued"} · ${Math.round(100 * this.job!.progress)} %`;
+  private said(): string {
+    if (this.busy) {
+      const known = this.known.length ? ` · ${this.known.length} foreseen, ${this.measured().length} measured` : "";
+      return `${this.job!.stage || "queued"} · ${Math.round(100 * this.job!.progress)} %${known}`;
+    }
     if (this.job?.status === "failed") return this.job.problem?.detail ?? "The exploration failed.";
     return this.found ? this.found.notes.join(" ") : "Tries boundaries, singularities, sizes and their numbers, and shows what pays.";
   }
 
   private scatter(): SVGElement {
-    const spots = this.measured();
+    const spots = this.known.map((one, index) => ({ one, index, figures: one.measured ?? one.predicted }));
+    spots.sort((a, b) => Number(Boolean(a.one.measured)) - Number(Boolean(b.one.measured)));
     const root = svg("svg", { viewBox: `0 0 ${W} ${H}`, class: "front", "aria-label": "Variants: uncovered area over cost" });
     const costs = spots.map((s) => s.figures.cost);
-    const open = spots.map((s) => Math.log(Math.max(s.figures.uncovered, 1e-5)));
+    const open = spots.map((s) => Math.log(Math.max(s.figures.uncovered, LEAST)));
     const [c0, c1, u0, u1] = [Math.min(...costs), Math.max(...costs), Math.min(...open), Math.max(...open)];
-    const most = Math.max(...spots.map((s) => s.figures.types), 1);
+    const types = spots.map((s) => s.figures.types);
+    const [fewest, most] = [Math.min(...types), Math.max(...types, 1)];
     const x = (cost: number) => PAD.left + ((W - PAD.left - PAD.right) * (cost - c0)) / (c1 - c0 || 1);
     const y = (u: number) => H - PAD.bottom - ((H - PAD.top - PAD.bottom) * (u - u0)) / (u1 - u0 || 1);
     root.append(
-      svg("line", { x1: PAD.left, x2: W - PAD.right, y1: H - PAD.bottom + 8, y2: H - PAD.bottom + 8, class: "axis" }),
-      svg("text", { x: PAD.left - 5, y: PAD.top + 4, "text-anchor": "end" }, `${number(100 * Math.exp(u1), 2)} %`),
-      svg("text", { x: PAD.left - 5, y: H - PAD.bottom + 4, "text-anchor": "end" }, `${number(100 * Math.exp(u0), 2)} %`),
+      svg("line", { x1: PAD.left, x2: W - PAD.right, y1: H - PAD.bottom + 12, y2: H - PAD.bottom + 12, class: "axis" }),
+      svg("text", { x: 0, y: 10 }, "uncovered"),
+      svg("text", { x: W - PAD.right, y: 10, "text-anchor": "end" }, svg("tspan", { fill: hue(fewest / most) }, "● "), String(fewest), ...(most > fewest ? [" – ", svg("tspan", { fill: hue(1) }, "● "), String(most)] : []), " types"),
+      svg("text", { x: PAD.left - 10, y: PAD.top + 4, "text-anchor": "end" }, `${number(100 * Math.exp(u1), 2)} %`),
+      svg("text", { x: PAD.left - 10, y: H - PAD.bottom + 4, "text-anchor": "end" }, `${number(100 * Math.exp(u0), 2)} %`),
       svg("text", { x: PAD.left, y: H - 6 }, `cost ${Math.round(c0).toLocaleString("en")}`),
       svg("text", { x: W - PAD.right, y: H - 6, "text-anchor": "end" }, Math.round(c1).toLocaleString("en")),
     );
-    spots.forEach(({ index, figures }, i) => {
-      const one = this.found!.variants[index];
-      const hue = 250 - (200 * figures.types) / most;
+    spots.forEach(({ one, index, figures }, i) => {
+      const fill = hue(figures.types / most);
+      const [cx, cy] = [x(figures.cost), y(open[i])];
       const words = `${number(100 * figures.uncovered, 3)} % uncovered, ${number(100 * figures.bare, 2)} % of the surface bare, ${figures.types} types, ${figures.panels} panels, cost ${Math.round(figures.cost).toLocaleString("en")}`;
-      const state = [index === this.chosen && "current", index === this.found!.best && "best", !this.fits(figures) && "out"].filter(Boolean).join(" ");
+      if (!one.measured) {
+        root.append(svg("circle", { cx, cy, r: 2.2, fill, class: "foreseen" }, svg("title", {}, `Foreseen: ${words}`)));
+        return;
+      }
+      const state = [index === this.chosen && "current", index === this.found?.best && "best", !this.fits(figures) && "out"].filter(Boolean).join(" ");
       const spot = svg("circle", {
-        cx: x(figures.cost), cy: y(open[i]), r: one.front ? 6 : 3.2, fill: `hsl(${hue} 65% 52%)`, class: `variant ${state}`,
+        cx, cy, r: one.front ? 6 : 3.2, fill, class: `variant ${state}`,
         tabindex: 0, role: "button", "data-variant": index, "aria-label": words,
       });
       spot.append(svg("title", {}, words));
@@ -117,7 +176,10 @@ export class Explorer {
       };
       spot.addEventListener("click", take);
       spot.addEventListener("keydown", (event) => {
-        if ((event as KeyboardEvent).key === "Enter" || (event as KeyboardEvent).key === " ") take();
+        if (!["Enter", " "].includes((event as KeyboardEvent).key)) return;
+        event.preventDefault(); // a blank would scroll the page
+        take();
+        this.root.querySelector<SVGElement>(`[data-variant="${index}"]`)!.focus();
       });
       root.append(spot);
     });
@@ -140,7 +202,7 @@ export class Explorer {
         shown.textContent = `≤ ${number(slider.valueAsNumber)}`;
         this.root.querySelector("svg.front")!.replaceWith(this.scatter());
       });
-      return [element("label", { class: "row" }, `${label} `, slider, shown)];
+      return [element("label", { class: "limit" }, label, slider, shown)];
     });
   }
 }

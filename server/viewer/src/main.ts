@@ -2,7 +2,7 @@
 import { balance, choices, close, loopOf, type Corner } from "./angles";
 import { api, FILES, ProblemError, UnreachableError, type BoundaryAngle, type FileObject, type Job, type Problem, type Request, type Result, type Vec3 } from "./api";
 import { flatOutline, histogram, singularityCurve, tradeOff } from "./charts";
-import { colour, MODES, number, RAMP_CSS, type Legend, type Mode } from "./colors";
+import { collected, colour, MODES, number, RAMP_CSS, regular, type Legend, type Mode } from "./colors";
 import { DomainView } from "./domain";
 import { Explorer } from "./explore";
 import { LineDrawing, without, type Features } from "./features";
@@ -106,28 +106,53 @@ function nearestOnBoundary(result: Result, point: Vec3): number {
 const distance = (p: number[], q: number[]) => Math.hypot(p[0] - q[0], p[1] - q[1], p[2] - q[2]);
 
 let waiting = 0;
-/** Sliders call this: the newest value wins, and a job that is still running for an older one is cancelled. */
+/** Whether what was sent last is still worked on, or drawn. */
+let busy = false;
+/**
+ * Sliders call this: the newest value wins. It is sent at once, or when the answer to the one before is drawn; where
+ * that takes longer than the hand rests, its job is cancelled. Numbers that are typed wait for their last digit.
+ */
 function solveSoon(): void {
   if (!state.surface) return;
   clearTimeout(waiting);
-  waiting = window.setTimeout(() => void solve(), 220);
+  const rests = busy || document.activeElement?.matches("input[type=number], textarea");
+  waiting = window.setTimeout(() => void solve(), rests ? 220 : 0);
 }
 
-async function solve(request = state.surface ? currentRequest() : null): Promise<void> {
-  if (!request) return note("Choose a sample or drop a file first.", true);
+async function solve(): Promise<void> {
+  if (!state.surface) return note("Choose a sample or drop a file first.", true);
   clearTimeout(waiting);
+  waiting = 0;
+  busy = true;
   const turn = ++state.turn;
   const before = state.job;
   if (before && (before.status === "queued" || before.status === "running")) void api.cancel(before.id).catch(() => undefined);
   try {
+    await sendMesh();
+    if (turn !== state.turn) return;
+    const request = currentRequest();
     const job = await api.submit(request);
     if (turn !== state.turn) return void api.cancel(job.id).catch(() => undefined);
     state.request = request;
-    sent = { id: job.id, from: beforePanels(request) };
+    sent = basis(job.id, request);
     await follow(job, turn, sameSurface());
   } catch (error) {
     if (turn === state.turn) report(error);
+  } finally {
+    if (turn === state.turn) {
+      busy = false;
+      if (waiting) void solve();
+    }
   }
+}
+
+/** A mesh is sent once, and then goes by its id as those of files do. */
+async function sendMesh(): Promise<void> {
+  const { surface } = state;
+  if (!surface || !("vertices" in surface)) return;
+  const stored = { id: (await api.store(surface)).id };
+  if (shownSurface === surface) shownSurface = stored;
+  if (state.surface === surface) state.surface = stored;
 }
 
 /** The surface that the shown result is of. */
@@ -160,32 +185,39 @@ async function follow(job: Job, turn: number, keepView: boolean): Promise<void> 
     if (!sameSurface()) forget();
     return note(`This job was ${job.status}.`);
   }
-  const [before, same] = [state.result, unchanged(job)];
-  const result = { ...(same ? before : {}), ...(await api.result(job.id, same ? OF_PANELS : DRAWN)) } as Result;
+  const [before, parts] = [state.result, missing(job)];
+  const result = { ...(parts === DRAWN ? {} : before), ...(await api.result(job.id, parts)) } as Result;
   if (turn !== state.turn) return;
-  shown = asked(job);
+  shown = sent?.id === job.id ? sent : null;
   present(job, result, keepView);
 }
 
-/** The parts of a result that are drawn, and those that follow from the settings of panels alone. */
+/** The parts of a result that are drawn, those that change with the pattern, and with the panels alone. */
 const OF_PANELS = ["panels", "sizes", "quality", "support", "timings"] as const;
-const DRAWN = ["mesh", "map", "pattern", ...OF_PANELS] as const;
+const OF_PATTERN = ["pattern", ...OF_PANELS] as const;
+const DRAWN = ["unit", "mesh", "map", ...OF_PATTERN] as const;
 
-/** What the mesh, map and pattern on the screen follow from, and those of the job sent last. */
-let shown = "";
-let sent: { id: string; from: string } | null = null;
+/** A job, and what its map and its pattern follow from, but the surface; "" where the sizes count, too. */
+interface Sent { id: string; map: string; pattern: string }
 
-const asked = (job: Job) => (sent?.id === job.id ? sent.from : "");
+/** The one sent last, and the one on the screen. */
+let sent: Sent | null = null;
+let shown: Sent | null = null;
 
-/** All that the map and the pattern of a request follow from, but the surface; "" where sizes count, too. */
-function beforePanels({ surface, boundary, pattern, singularities }: Request): string {
-  const whole = new Set(["vertices", "faces", "normals", "nurbs"]);
-  return singularities ? "" : JSON.stringify({ surface, boundary, pattern }, (key, value) => (whole.has(key) ? undefined : value));
+function basis(id: string, { surface, boundary, pattern, panels, singularities }: Request): Sent {
+  const text = (value: unknown) => (singularities ? "" : JSON.stringify(value, (key, part) => (key === "nurbs" ? undefined : part)));
+  const asked = (pattern as Settings | null)?.kind;
+  const kind = [asked, asked === "auto" && (panels as Settings | null)?.mode]; // auto: another one for watertight panels
+  return { id, map: text({ surface, boundary, kind }), pattern: text({ surface, boundary, pattern, kind }) };
 }
 
-/** Whether a job differs from the one on the screen by its panels only. */
-const unchanged = (job: Job) =>
-  state.result !== null && !state.result.map.cones.length && sameSurface() && asked(job) !== "" && asked(job) === shown;
+/** The parts of a job's result that differ from those on the screen. A map that overlaps itself says where cells lie. */
+function missing(job: Job): readonly (keyof Result)[] {
+  const map = state.result?.map;
+  if (!map || map.cones.length || !sameSurface() || sent?.id !== job.id || !sent.map || sent.map !== shown?.map) return DRAWN;
+  if (sent.pattern === shown.pattern) return OF_PANELS;
+  return map.apart ? DRAWN : OF_PATTERN;
+}
 
 /** Nothing to look at any more: what comes next is of another surface. */
 function forget(): void {
@@ -220,6 +252,9 @@ function setJob(job: Job): void {
 
 async function cancel(): Promise<void> {
   state.turn++;
+  busy = false;
+  clearTimeout(waiting);
+  waiting = 0;
   if (state.job) await api.cancel(state.job.id).catch(report);
   if (state.job) setJob({ ...state.job, status: "cancelled" });
   note("Cancelled.");
@@ -247,6 +282,8 @@ function present(job: Job, result: Result, keepView: boolean): void {
 
 async function takeFile(file: File, object?: string): Promise<void> {
   const turn = ++state.turn;
+  await described; // files may be dropped before
+  if (turn !== state.turn) return;
   if (object === undefined) drawObjects(file, []);
   state.surface = null;
   explorer.clear();
@@ -264,6 +301,7 @@ async function takeFile(file: File, object?: string): Promise<void> {
     await solve();
   } catch (error) {
     if (turn !== state.turn) return;
+    note("");
     report(error);
     if (error instanceof ProblemError) {
       if (error.problem.objects) drawObjects(file, error.problem.objects);
@@ -443,7 +481,7 @@ function drawColours(): void {
 function legendNodes(legend: Legend): Node[] {
   if (legend.kind === "none") return [element("span", {}, legend.text)];
   if (legend.kind === "classes")
-    return [element("table", {}, ...legend.rows.map((row) => element("tr", {},
+    return [element("div", {}, legend.title), element("table", {}, ...legend.rows.map((row) => element("tr", {},
       element("td", {}, element("i", { style: `background:${row.color}` })), element("td", {}, row.label), element("td", {}, `× ${row.count}`))))];
   return [element("div", {}, legend.title), element("div", { class: "ramp", style: `background:${RAMP_CSS}` }),
     element("div", { class: "ends" }, element("span", {}, legend.low), element("span", {}, legend.high))];
@@ -452,7 +490,7 @@ function legendNodes(legend: Legend): Node[] {
 function drawCharts(): void {
   const { result } = state;
   const curve = result?.quality.trade_off;
-  $("histogram").replaceChildren(...(result?.sizes?.length ? [histogram(result.sizes, curve?.taken || result.sizes.length)] : []));
+  $("histogram").replaceChildren(...(result?.sizes?.length ? [histogram(collected(result), regular(result.sizes, curve?.taken))] : []));
   $("curve").replaceChildren(...(curve ? [tradeOff(curve, chooseSizes)] : []));
   drawSingularities();
 }
@@ -634,9 +672,12 @@ async function copy(text: string, what: string): Promise<void> {
   }
 }
 
-function asCurl(): string {
-  const body = JSON.stringify(state.request ?? currentRequest()).replace(/'/g, "'\\''");
-  return `curl -s ${location.origin}/v1/solve -H 'Content-Type: application/json' -d '${body}'`;
+/** The surface goes by its id, for a mesh is too long for a command; it is sent again, lest it is kept no more. */
+async function copyCurl(): Promise<void> {
+  const request = state.request ?? currentRequest();
+  await api.again(request.surface).catch(() => undefined); // without a server it is for later
+  const body = JSON.stringify(request).replace(/'/g, "'\\''");
+  await copy(`curl -s ${location.origin}/v1/solve -H 'Content-Type: application/json' -d '${body}'`, "The request");
 }
 
 function asGrasshopper(): string {
@@ -795,7 +836,7 @@ $("fit").addEventListener("click", () => {
 const cut = () => space.cut(Number($<HTMLSelectElement>("axis").value), Number($<HTMLInputElement>("cut").value));
 $("cut").addEventListener("input", cut);
 $("axis").addEventListener("change", cut);
-$("copy-curl").addEventListener("click", () => void copy(asCurl(), "The request"));
+$("copy-curl").addEventListener("click", () => void copyCurl());
 $("copy-gh").addEventListener("click", () => void copy(asGrasshopper(), "The settings"));
 
 document.addEventListener("keydown", (event) => {
@@ -847,14 +888,17 @@ async function untilReached<T>(ask: () => Promise<T>): Promise<T> {
   }
 }
 
-async function start(): Promise<void> {
-  theme(storedTheme());
+/** Makes the form of what the server says can be set. */
+async function describe(): Promise<void> {
   description = await untilReached(api.settings);
   form = new Form($("settings"), description, settingChanged, { "boundary.angles": $("angles") });
-  form.suggestion = (path) => (path === "pattern.around" ? 48 : Number(meanEdge().toPrecision(3)));
-  form.set("pattern.around", 48);
+  form.suggestion = (path) => (path === "pattern.around" ? state.result?.pattern?.around ?? 48 : Number(meanEdge().toPrecision(3)));
   form.set("boundary.angle_unit", "deg");
   drawForm();
+}
+
+async function start(): Promise<void> {
+  await described;
   const names = await api.samples().catch(() => []);
   $("sample").append(...names.map(({ name }) => element("option", { value: name }, name)));
   await drawJobs();
@@ -871,4 +915,6 @@ declare global {
 }
 // For those who script the page (and for the tests): where things stand on the screen.
 window.hexwrapViewer = { space, domain, state, corners };
+theme(storedTheme());
+const described = describe();
 void start();

@@ -8,7 +8,7 @@ export interface PolygonData {
   offsets: Uint32Array;
 }
 
-export function pack(polygons: ArrayLike<number>[][]): PolygonData {
+function pack(polygons: ArrayLike<number>[][]): PolygonData {
   const offsets = new Uint32Array(polygons.length + 1);
   polygons.forEach((polygon, i) => (offsets[i + 1] = offsets[i] + polygon.length));
   const points = new Float32Array(3 * offsets[polygons.length]);
@@ -108,30 +108,36 @@ const LINEAR = Uint16Array.from({ length: 256 }, (_, i) => {
 
 export class PolygonLayer {
   readonly group = new THREE.Group();
-  readonly fills: THREE.Mesh;
-  readonly edges: THREE.LineSegments;
-  readonly count: number;
-  private readonly owner: Uint32Array;
-  private readonly firstTriangle: Uint32Array;
-  private readonly picker: THREE.Mesh;
+  readonly edges = new THREE.LineSegments(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({ color: 0x15262b, transparent: true, opacity: 0.55 }));
+  count = 0;
+  private readonly fills: THREE.Mesh;
+  private readonly picker = new THREE.Mesh(new THREE.BufferGeometry(), new THREE.ShaderMaterial({
+    vertexShader: PICK_VERTEX, fragmentShader: PICK_FRAGMENT, side: THREE.DoubleSide, clipping: true,
+  }));
+  private data: PolygonData = pack([]);
+  /** The polygon of each triangle. */
+  private owner: Uint32Array = new Uint32Array();
   private readonly pickScene = new THREE.Scene();
   private readonly chosen = new Mark(0xff6a13, 0.75);
   readonly pointed = new Mark(0xffb347, 0.45);
 
-  constructor(readonly data: PolygonData, lit: boolean) {
-    this.count = data.offsets.length - 1;
-    const { corners, owner } = triangulate(data);
-    this.owner = owner;
-    this.firstTriangle = new Uint32Array(this.count + 1);
-    for (const i of owner) this.firstTriangle[i + 1]++;
-    for (let i = 0; i < this.count; i++) this.firstTriangle[i + 1] += this.firstTriangle[i];
-    this.fills = new THREE.Mesh(this.fillGeometry(corners), fillMaterial(lit));
-    this.edges = new THREE.LineSegments(this.edgeGeometry(), new THREE.LineBasicMaterial({ color: 0x15262b, transparent: true, opacity: 0.55 }));
-    this.picker = new THREE.Mesh(this.fills.geometry, new THREE.ShaderMaterial({
-      vertexShader: PICK_VERTEX, fragmentShader: PICK_FRAGMENT, side: THREE.DoubleSide, clipping: true,
-    }));
+  constructor(lit: boolean) {
+    this.fills = new THREE.Mesh(this.picker.geometry, fillMaterial(lit));
     this.pickScene.add(this.picker);
+    this.edges.renderOrder = 1; // over the wires of a mesh
     this.group.add(this.fills, this.edges, this.chosen.group, this.pointed.group);
+  }
+
+  show(polygons: ArrayLike<number>[][]): void {
+    this.data = pack(polygons);
+    this.count = polygons.length;
+    const { corners, owner } = triangulate(this.data);
+    this.owner = owner;
+    reshape(this.fills, this.fillGeometry(corners));
+    this.picker.geometry = this.fills.geometry;
+    reshape(this.edges, this.edgeGeometry());
+    this.select(null);
+    this.hover(null);
   }
 
   private fillGeometry(corners: Uint32Array): THREE.BufferGeometry {
@@ -225,16 +231,12 @@ export class PolygonLayer {
     const id = pixel[0] + (pixel[1] << 8) + (pixel[2] << 16);
     return id > 0 && id <= this.count ? id - 1 : null;
   }
+}
 
-  dispose(): void {
-    for (const object of [this.fills, this.edges, this.picker]) {
-      object.geometry.dispose();
-      (object.material as THREE.Material).dispose();
-    }
-    this.chosen.show(null);
-    this.pointed.show(null);
-    this.group.removeFromParent();
-  }
+/** Another geometry for an object that stays: with its material stays its program, which takes long to compile. */
+export function reshape(object: THREE.Mesh | THREE.LineSegments, geometry?: THREE.BufferGeometry | null): void {
+  object.geometry.dispose();
+  object.geometry = geometry ?? new THREE.BufferGeometry();
 }
 
 function fillMaterial(lit: boolean): THREE.Material {

@@ -3,7 +3,7 @@ import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import type { Problem, Result, Vec3 } from "./api";
 import { FeatureLines } from "./features";
-import { pack, PolygonLayer } from "./polygons";
+import { PolygonLayer, reshape } from "./polygons";
 
 export interface Toggles {
   edges: boolean;
@@ -25,14 +25,14 @@ export class View3D {
   private readonly headlight = new THREE.DirectionalLight(0xffffff, 1.5);
   private readonly section = new THREE.Plane(new THREE.Vector3(0, 0, -1), Infinity);
   private readonly labels: HTMLElement;
-  private layer: PolygonLayer | null = null;
+  private readonly layer = new PolygonLayer(true);
+  private readonly normals = new THREE.LineSegments(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({ color: 0xd9622b }));
+  private readonly supports = new THREE.Mesh(new THREE.BufferGeometry(), new THREE.MeshLambertMaterial({ color: 0x5b4a3f, side: THREE.DoubleSide }));
   private mesh: THREE.Object3D | null = null;
-  private normals: THREE.LineSegments | null = null;
-  private supports: THREE.Object3D | null = null;
   private boundary: THREE.Points | null = null;
   private cones: THREE.Points | null = null;
   private solid: THREE.Mesh | null = null;
-  /** Of the result, for rays: made into a solid when the first one is sent. */
+  /** Of the result: what is drawn of it stays while it is the same. For rays, made into a solid when the first one is sent. */
   private sheet: Result["mesh"] | null = null;
   /** Creases and drawn lines, and the line that is being drawn. */
   private features: FeatureLines | null = null;
@@ -62,7 +62,7 @@ export class View3D {
     this.controls.dampingFactor = 0.12;
     this.controls.zoomToCursor = true;
     this.controls.addEventListener("change", () => this.invalidate());
-    this.scene.add(new THREE.HemisphereLight(0xffffff, 0x9aa0a4, 2.1), this.content, this.camera);
+    this.scene.add(new THREE.HemisphereLight(0xffffff, 0x9aa0a4, 2.1), this.content, this.layer.group, this.normals, this.supports, this.camera);
     this.headlight.position.set(0.5, 0.8, 1);
     this.camera.add(this.headlight);
     new ResizeObserver(() => this.resize()).observe(element);
@@ -117,13 +117,19 @@ export class View3D {
 
   /** Moves the camera so that everything is seen; keeps the direction of view. */
   fit(): void {
-    const sphere = this.box.getBoundingSphere(new THREE.Sphere());
-    const half = THREE.MathUtils.degToRad(this.camera.fov / 2);
-    const distance = (0.93 * sphere.radius) / Math.sin(Math.min(half, Math.atan(Math.tan(half) * this.camera.aspect)));
+    const center = this.box.getCenter(new THREE.Vector3());
     const direction = this.camera.position.clone().sub(this.controls.target);
     if (direction.lengthSq() < 1e-12 || !Number.isFinite(direction.x)) direction.set(1, -1.6, 0.7);
-    this.controls.target.copy(sphere.center);
-    this.camera.position.copy(sphere.center).addScaledVector(direction.normalize(), distance);
+    this.camera.position.copy(center).add(direction);
+    this.camera.lookAt(center);
+    this.camera.updateMatrix();
+    const [right, up, back] = [0, 1, 2].map((axis) => new THREE.Vector3().setFromMatrixColumn(this.camera.matrix, axis));
+    const half = Math.tan(THREE.MathUtils.degToRad(this.camera.fov / 2));
+    const { min, max } = this.box;
+    const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((k) => new THREE.Vector3(k & 1 ? max.x : min.x, k & 2 ? max.y : min.y, k & 4 ? max.z : min.z).sub(center));
+    const distance = 1.08 * Math.max(...corners.map((c) => c.dot(back) + Math.max(Math.abs(c.dot(right)) / this.camera.aspect, Math.abs(c.dot(up))) / half));
+    this.controls.target.copy(center);
+    this.camera.position.copy(center).addScaledVector(back, distance);
     this.camera.near = distance / 200;
     this.camera.far = distance * 20;
     this.camera.updateProjectionMatrix();
@@ -131,40 +137,40 @@ export class View3D {
   }
 
   clear(): void {
-    this.layer?.dispose();
-    this.layer = null;
     for (const child of [...this.content.children]) dispose(child);
-    this.mesh = this.normals = this.supports = this.boundary = this.cones = this.solid = null;
+    this.mesh = this.boundary = this.cones = this.solid = null;
     this.sheet = this.features = this.sketch = null;
-    this.labelText = null;
+    this.showPanels(null);
     this.invalidate();
   }
 
   /** Shows a finished result. keepView: a slider moved, the person did not. */
   show(result: Result, keepView: boolean): void {
-    this.clear();
-    this.frame(result.mesh.vertices);
-    this.mesh = this.meshObject(result.mesh.vertices, result.mesh.faces, Boolean(result.panels));
-    this.content.add(this.mesh);
-    const { panels, support } = result;
-    if (panels) {
-      this.layer = new PolygonLayer(pack(panels.polygons.map((polygon) => polygon.map((p) => this.local(p)))), true);
-      this.content.add(this.layer.group);
-      this.labelText = { text: panels.label, centers: panels.center.map((c) => this.local(c)), normals: panels.normal };
-      this.normals = this.normalLines(panels.center, panels.normal, panels.edge_length);
-      this.content.add(this.normals);
-    }
-    if (support) {
-      this.supports = this.stripObject(support.strips);
-      this.content.add(this.supports);
-    }
-    this.sheet = result.mesh;
-    this.showCones(result);
-    const { vertices, features } = result.mesh;
-    this.features = new FeatureLines(features.map((line) => line.map((v) => this.local(vertices[v]))));
-    this.content.add(this.features.group);
+    const covered = Boolean(result.panels?.face.length);
+    if (this.sheet !== result.mesh || covered !== this.layer.count > 0) this.showSurface(result, covered);
+    this.showPanels(result);
     this.toggle(this.shown);
     if (!keepView) this.fit();
+  }
+
+  private showSurface(result: Result, covered: boolean): void {
+    this.clear();
+    const { vertices, faces, features } = result.mesh;
+    this.frame(vertices);
+    this.mesh = this.meshObject(vertices, faces, covered);
+    this.content.add(this.mesh);
+    this.sheet = result.mesh;
+    this.showCones(result);
+    this.features = new FeatureLines(features.map((line) => line.map((v) => this.local(vertices[v]))));
+    this.content.add(this.features.group);
+  }
+
+  private showPanels(result: Result | null): void {
+    const { panels, support } = result ?? {};
+    this.layer.show(panels?.polygons.map((polygon) => polygon.map((p) => this.local(p))) ?? []);
+    this.labelText = panels ? { text: panels.label, centers: panels.center.map((c) => this.local(c)), normals: panels.normal } : null;
+    reshape(this.normals, panels && this.normalLines(panels.center, panels.normal, panels.edge_length));
+    reshape(this.supports, support && this.strips(support.strips));
   }
 
   /** Singularities as dots that can be dragged along the surface. */
@@ -329,7 +335,7 @@ export class View3D {
     return group;
   }
 
-  private normalLines(centers: Vec3[], normals: Vec3[], lengths: number[]): THREE.LineSegments {
+  private normalLines(centers: Vec3[], normals: Vec3[], lengths: number[]): THREE.BufferGeometry {
     const position = new Float32Array(6 * centers.length);
     centers.forEach((center, i) => {
       const c = this.local(center);
@@ -340,10 +346,10 @@ export class View3D {
     });
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute("position", new THREE.BufferAttribute(position, 3));
-    return new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ color: 0xd9622b }));
+    return geometry;
   }
 
-  private stripObject(strips: Vec3[][]): THREE.Object3D {
+  private strips(strips: Vec3[][]): THREE.BufferGeometry {
     const position = new Float32Array(strips.flatMap((s) => s.flatMap((p) => this.local(p))));
     const index = new Uint32Array(6 * strips.length);
     for (let i = 0; i < strips.length; i++) index.set([0, 1, 2, 0, 2, 3].map((k) => 4 * i + k), 6 * i);
@@ -352,7 +358,7 @@ export class View3D {
     geometry.setIndex(new THREE.BufferAttribute(index, 1));
     const flat = geometry.toNonIndexed();
     flat.computeVertexNormals();
-    return new THREE.Mesh(flat, new THREE.MeshLambertMaterial({ color: 0x5b4a3f, side: THREE.DoubleSide }));
+    return flat;
   }
 
   private faults(vertices: Vec3[], faces: number[][], problem: Problem): THREE.Object3D {
@@ -381,11 +387,11 @@ export class View3D {
 
   toggle(shown: Toggles): void {
     this.shown = { ...shown };
-    if (this.layer) this.layer.edges.visible = shown.edges;
-    if (this.normals) this.normals.visible = shown.normals;
-    if (this.supports) this.supports.visible = shown.supports;
+    this.layer.edges.visible = shown.edges;
+    this.normals.visible = shown.normals;
+    this.supports.visible = shown.supports;
     if (this.features) this.features.group.visible = shown.features;
-    if (this.mesh) this.mesh.visible = shown.mesh || !this.layer;
+    if (this.mesh) this.mesh.visible = shown.mesh || !this.layer.count;
     this.invalidate();
   }
 
@@ -400,23 +406,23 @@ export class View3D {
   }
 
   paint(colors: Uint8Array): void {
-    this.layer?.paint(colors);
+    this.layer.paint(colors);
     this.invalidate();
   }
 
   select(i: number | null): void {
-    this.layer?.select(i);
+    this.layer.select(i);
     this.invalidate();
   }
 
   hover(i: number | null): void {
-    this.layer?.hover(i);
+    this.layer.hover(i);
     this.invalidate();
   }
 
   pick(x: number, y: number): number | null {
     const { clientWidth: w, clientHeight: h } = this.element;
-    return this.layer?.pick(this.renderer, this.camera, x, y, w, h) ?? null;
+    return this.layer.pick(this.renderer, this.camera, x, y, w, h);
   }
 
   /** Boundary vertices that can be given angles; marked: those that have one. */

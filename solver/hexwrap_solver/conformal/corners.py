@@ -27,6 +27,8 @@ from hexwrap_solver.words import length, place
 FAR = 0.02
 #: Equation (1) may miss by this much in total, radians: angles are often typed with four digits.
 GAUSS_BONNET_TOLERANCE = 1e-3
+#: No boundary angle is so large, in radians or multiples of π.
+DEGREES = 10
 
 
 #: Field of the request that an entry of a list of angles stands in.
@@ -292,12 +294,14 @@ def _gauss_bonnet_error(
     least = float((np.pi - angles).sum()) + unlisted * np.pi - total
     if least <= 0:
         i = int(angles.argmax())
+        are_degrees = unit != "deg" and angles[i] > DEGREES * ANGLE_UNITS[unit]
         return BoundaryError(
             f"The listed boundary angles are too large for any surface: their curvatures π − θ add up to "
             f"{_angle_text((np.pi - angles).sum(), unit)}, and even with angles of 0 at all the other "
             f"{unlisted} boundary vertices the sum over all loops, equation (1), would be "
             f"{_angle_text(least, unit)} too small; the largest is {_angle_text(angles[i], unit)} at vertex "
-            f"{surface.input_vertex[vertices[i]]}.",
+            f"{surface.input_vertex[vertices[i]]}."
+            + (' If angles are given in degrees, set angle_unit to "deg".' if are_degrees else ""),
             vertices=[surface.input_vertex[vertices[i]]],
             field=(*listed.field[i], "angle"),
         )

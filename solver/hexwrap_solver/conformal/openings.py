@@ -29,6 +29,9 @@ def cut_openings(found: ConformalMap, wall: Surface) -> ConformalMap:
         domain = domain.restricted(keep)
     else:
         domain = replace(domain, uv=domain.uv[used], sheet=domain.sheet[keep])
+    fitted = found.fitted
+    if fitted is not None and fitted.chart is not None:
+        fitted = replace(fitted, chart=fitted.chart.restricted(keep))
     cones = found.cones
     at_wall = used[cones.vertex]
     cones = replace(
@@ -44,6 +47,7 @@ def cut_openings(found: ConformalMap, wall: Surface) -> ConformalMap:
         surface=surface,
         log_scale=found.log_scale[used],
         domain=domain,
+        fitted=fitted,
         cones=cones,
         inserted=len(surface.vertices) - len(wall.vertices),
         notes=(sentence, *found.notes),

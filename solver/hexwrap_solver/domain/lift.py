@@ -10,6 +10,7 @@ from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.domain.interpolate import surface_weights
 from hexwrap_solver.domain.locate import find_places
+from hexwrap_solver.geometry import weighted
 
 #: No domain reaches so far; larger coordinates would overflow on the way.
 BEYOND = 1e300
@@ -50,6 +51,5 @@ def lift(cmap: ConformalMap, places: Complexes) -> Lifted:
 def points_at(cmap: ConformalMap, face: Ints, weights: Floats) -> tuple[Floats, Floats]:
     """Points and unit normals (k, 3) of the mesh at barycentric coordinates (k, 3) on the surface."""
     surface = cmap.surface
-    corners = surface.faces[face]
-    points = np.einsum("kc,kcd->kd", weights, surface.vertices[corners])
+    points = weighted(surface.vertices, surface.faces[face], weights)
     return points, surface.normals_at(face, weights)

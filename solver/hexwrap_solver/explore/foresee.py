@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hexwrap_solver.arrays import Progress, no_progress
-from hexwrap_solver.errors import HexwrapError
+from hexwrap_solver.errors import HexwrapError, PanelsError, PatternError
 from hexwrap_solver.explore.predict import Outlook, outlook
 from hexwrap_solver.explore.types import ExploreSettings, Figures
-from hexwrap_solver.explore.variants import Frame, Variant, as_settings
+from hexwrap_solver.explore.variants import AROUND_DEFAULT, Frame, Variant, as_settings
 from hexwrap_solver.panels.polygons import edge_lengths, fan_areas
 from hexwrap_solver.pattern.lattice import LATTICES
 from hexwrap_solver.pattern.place.placement import edge_angle
+from hexwrap_solver.pattern.place.rotation import check_parameters
+from hexwrap_solver.pattern.place.sense import check_edge
 from hexwrap_solver.pattern.place.size import mean_stretch, wanted_edge
 from hexwrap_solver.pipeline import Solution, SolveSettings, StageRunner, mapped
 from hexwrap_solver.singularities.solve import chosen, frame_of
 from hexwrap_solver.singularities.types import SingularityAt, SingularitySettings
+from hexwrap_solver.surface.holes import fill_openings
 from hexwrap_solver.surface.types import Surface
 from hexwrap_solver.threads import one_blas_thread
 
@@ -26,85 +28,99 @@ from hexwrap_solver.threads import one_blas_thread
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048, "in": 0.0254}
 
 
+#: Where the singularities of a variant stand.
+Seats = tuple[SingularityAt, ...]
+
+
 @dataclass(frozen=True)
 class Candidate:
-    """A variant as a request, and what it will come to; foreseen: None where it cannot be, and then why.
-    place: of the variant."""
+    """A variant as a request, and what it will come to, or why it cannot be."""
 
     settings: SolveSettings
-    foreseen: Figures | None
-    problem: str = ""
-    place: int = 0
+    foreseen: Figures | HexwrapError
 
 
 def default_edge(
     take_in: Callable[[], Surface], settings: ExploreSettings, run: StageRunner, source: object = None
-) -> float:
-    """Edge length of the cells on the surface where none is asked for, model units. Raises HexwrapError."""
-    pattern = settings.pattern
+) -> float | None:
+    """Edge length of the cells on the surface, model units; longer where the smallest cells that are tried
+    about it would be more than the limit of panels allows; None where a size is asked for.
+
+    Raises HexwrapError, also for a pattern that no variant can have on this surface.
+    """
+    pattern, vary = settings.pattern, settings.vary
+    surface = run("surface", source, lambda progress: take_in())
+    varies = vary.edge_length is not None or vary.around is not None
+    if not varies:
+        check_edge(surface, pattern)
     if pattern.rotation in ("u", "v"):
+        if vary.rotation is None:
+            check_parameters(surface)
         pattern = replace(pattern, rotation="edge")
+    if varies or pattern.edge_length is not None or pattern.around is not None:
+        return None
     lattice = LATTICES[pattern.cell_kind]
     with one_blas_thread():
         cmap, _ = mapped(take_in, SolveSettings(pattern=pattern, panels=None), run, source=source)
-    return wanted_edge(cmap, lattice, pattern, edge_angle(lattice, pattern)) * mean_stretch(cmap)
+    edge = wanted_edge(cmap, lattice, pattern, edge_angle(lattice, pattern)) * mean_stretch(cmap)
+    area = float(cmap.surface.areas.sum())
+    fewest = area / (lattice.cell_area / lattice.edge**2 * (settings.limits.panels or np.inf))
+    return max(edge, float(np.sqrt(fewest)) / AROUND_DEFAULT[0])
 
 
-def foresee(
+def seated(
     take_in: Callable[[], Surface],
     settings: ExploreSettings,
-    listed: tuple[Variant, ...],
-    runner: Callable[[], StageRunner],
-    *,
+    listed: Sequence[Variant],
+    run: StageRunner,
     source: object = None,
-    progress: Progress = no_progress,
-) -> tuple[Candidate, ...]:
-    """Variants of one frame, in their order.
+) -> list[tuple[Seats, tuple[Variant, ...]]]:
+    """Variants of one frame, those of as many singularities together, ascending, and where these stand.
 
-    runner: makes one for each way through the stages. Raises HexwrapError where the surface cannot be used.
+    Where a number is impossible, such as an odd one with two straight ends, the next smaller one is taken.
+    Raises HexwrapError where the surface cannot be used.
     """
+    frame, most = listed[0].frame, max(settings.vary.singularities)
+    seats: dict[int, Seats] = {0: ()}
     with one_blas_thread():
-        return tuple(_foresee(take_in, settings, listed, runner, source, progress))
-
-
-def _foresee(
-    take_in: Callable[[], Surface],
-    settings: ExploreSettings,
-    listed: tuple[Variant, ...],
-    runner: Callable[[], StageRunner],
-    source: object,
-    progress: Progress,
-) -> Iterator[Candidate]:
-    run = runner()
-    surface = run("surface", source, lambda progress: take_in())
-    frame = listed[0].frame
-    most = max(variant.singularities for variant in listed)
-    seats: dict[int, tuple[SingularityAt, ...]] = {0: ()}
-    if most:
+        surface = run("surface", source, lambda progress: take_in())
         try:
             searched = run("seats", (frame, most), lambda progress: _seats(surface, frame, most))
             seats |= {len(at): at for at in searched}
         except HexwrapError:  # then there are the variants without
             pass
-    # Such as an odd number with two straight ends: then the next smaller one.
-    possible = [max(count for count in seats if count <= variant.singularities) for variant in listed]
-    seen: dict[int, Outlook | str] = {}
-    counts = sorted(set(possible))
-    for i, count in enumerate(counts):
-        progress(i / len(counts), f"{frame.boundary.mode}, {count} singularities")
+    parts: dict[int, list[Variant]] = {}
+    for variant in listed:
+        count = max(count for count in seats if count <= variant.singularities)
+        parts.setdefault(count, []).append(variant)
+    return [(seats[count], tuple(parts[count])) for count in sorted(parts)]
+
+
+def foresee(
+    take_in: Callable[[], Surface],
+    settings: ExploreSettings,
+    at: Seats,
+    listed: Sequence[Variant],
+    run: StageRunner,
+    *,
+    source: object = None,
+) -> tuple[Candidate, ...]:
+    """Variants of one frame, in their order, with singularities there: they share their map."""
+    asked = as_settings(listed[0], settings, at)
+    with one_blas_thread():
         try:
-            asked = as_settings(listed[0], settings, seats[count])
-            cmap, _ = mapped(take_in, asked, runner(), source=source)
-            seen[count] = outlook(cmap, frame.pattern)
+            cmap, _ = mapped(take_in, asked, run, source=source)
+            seen = outlook(cmap, listed[0].frame.pattern)
         except HexwrapError as error:
-            seen[count] = error.detail
-    for variant, count in zip(listed, possible, strict=True):
-        found = _candidate(variant, settings, seats[count], seen[count], surface.unit)
-        yield replace(found, place=variant.place)
+            return tuple(Candidate(as_settings(one, settings, at), error) for one in listed)
+    return tuple(
+        _candidate(as_settings(one, settings, at), settings, seen, cmap.surface.unit) for one in listed
+    )
 
 
-def _seats(surface: Surface, frame: Frame, most: int) -> tuple[tuple[SingularityAt, ...], ...]:
+def _seats(surface: Surface, frame: Frame, most: int) -> tuple[Seats, ...]:
     """The best places for each number of singularities that is possible, as a request says them."""
+    surface = fill_openings(surface)
     boundary, asked = frame.boundary.adapted(frame.pattern.cell_kind), SingularitySettings(count=most)
     found = chosen(surface, frame_of(surface, boundary, asked, frame.pattern, None), asked)
     return tuple(
@@ -116,19 +132,21 @@ def _seats(surface: Surface, frame: Frame, most: int) -> tuple[tuple[Singularity
     )
 
 
-def _candidate(
-    variant: Variant,
-    settings: ExploreSettings,
-    at: tuple[SingularityAt, ...],
-    seen: Outlook | str,
-    unit: str | None,
-) -> Candidate:
-    asked = as_settings(variant, settings, at)
-    if isinstance(seen, str):
-        return Candidate(asked, None, seen)
-    found = seen.foresee(variant.sizes, variant.joint)
+def _candidate(asked: SolveSettings, settings: ExploreSettings, seen: Outlook, unit: str | None) -> Candidate:
+    assert asked.panels is not None
+    sizes = asked.panels.sizes
+    assert isinstance(sizes, int)
+    found = seen.foresee(sizes, asked.panels.joint)
     if not found.panels:
-        return Candidate(asked, None, "No cell has room for a panel.")
+        if not len(seen.size):
+            return Candidate(asked, PatternError("No whole cell fits: ask for smaller cells."))
+        return Candidate(
+            asked,
+            PanelsError(
+                "No cell has room for a panel between such joints: ask for narrower joints or larger cells.",
+                field=("joint",),
+            ),
+        )
     cost = settings.cost.of(
         found.types, found.panels, found.area, found.perimeter, METRES.get(unit or "m", 1.0)
     )

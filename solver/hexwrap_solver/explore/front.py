@@ -17,7 +17,8 @@ MOST_SOLVED = 30
 SAME = (1e-3, 0.0, 5e-3, 0.03)
 #: Whatever closes the rest, and how it looks, is dear: an open square metre counts as this many of panels.
 OPEN = 10.0
-#: Figures are foreseen only so well: a variant this much beyond a limit of the panels may yet keep it.
+#: Figures are foreseen only so well: a variant this much beyond a limit, or beyond what comes nearest to it,
+#: may yet be better.
 NEARLY = 1.05
 
 
@@ -38,19 +39,26 @@ def non_dominated(values: Floats, same: tuple[float, ...]) -> Bools:
     return kept
 
 
-def within(figures: Figures, limits: Limits, sizes: int | None, slack: float = 1.0) -> bool:
-    """sizes: number of edge lengths that was asked for."""
-    return (
-        (limits.sizes is None or (sizes is not None and sizes <= limits.sizes))
-        and (limits.panels is None or figures.panels <= limits.panels * slack)
-        and (limits.max_gap is None or figures.gap_max is None or figures.gap_max <= limits.max_gap)
-    )
+def limited(figures: Figures, limits: Limits, sizes: int) -> dict[str, tuple[float, float]]:
+    """Of each limit by name: what a variant has, and the most that it may have. sizes: number of edge lengths
+    that was asked for."""
+    has = {"sizes": sizes, "max_gap": figures.gap_max, "panels": figures.panels}
+    pairs = {name: (value, getattr(limits, name)) for name, value in has.items()}
+    return {name: (v, most) for name, (v, most) in pairs.items() if v is not None and most is not None}
 
 
-def to_solve(figures: Sequence[Figures], most: int = MOST_SOLVED) -> Ints:
-    """Indices of the non-dominated, at most this many: ends of the front, and what fills its widest holes."""
+def excess(figures: Figures, limits: Limits, sizes: int) -> float:
+    """By which parts of them limits are exceeded, all together; 0 where all are kept."""
+    pairs = limited(figures, limits, sizes).values()
+    return sum(max(has / max(most, TINY) - 1, 0.0) for has, most in pairs if has > most)
+
+
+def to_solve(figures: Sequence[Figures], beyond: Sequence[float], most: int = MOST_SOLVED) -> Ints:
+    """Indices of the non-dominated of those that come nearest to the limits, at most this many: ends of the
+    front, and what fills its widest holes. beyond: their ``excess``."""
+    near = np.flatnonzero(np.asarray(beyond) <= (1 + min(beyond, default=0.0)) * NEARLY - 1)
     values = objectives(figures)
-    candidates = np.flatnonzero(non_dominated(values, SAME))
+    candidates = near[non_dominated(values[near], SAME)]
     if len(candidates) <= most:
         return candidates
     spread = _scaled(values[candidates])
@@ -59,7 +67,7 @@ def to_solve(figures: Sequence[Figures], most: int = MOST_SOLVED) -> Ints:
     while len(chosen) < most:
         chosen.append(int(away.argmax()))
         away = np.minimum(away, np.abs(spread - spread[chosen[-1]]).sum(axis=1))
-    return np.sort(candidates[chosen])
+    return np.sort(candidates[chosen[: max(most, 0)]])
 
 
 def front_of(figures: Sequence[Figures]) -> Bools:

@@ -19,12 +19,14 @@ from scipy.spatial import cKDTree
 from hexwrap_solver.arrays import Complexes, Floats, Ints, Progress, no_progress
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.domain.locate import barycentric
+from hexwrap_solver.geometry import outline_area, plane_areas
 from hexwrap_solver.panels.sizes import partition_by_area
 from hexwrap_solver.pattern.lattice import LATTICES, Lattice
 from hexwrap_solver.pattern.lay.nodes import lattice_points_in_triangles
-from hexwrap_solver.pattern.lay_pattern import CLOSE, off_by
+from hexwrap_solver.pattern.lay_pattern import CLOSE, check_count, off_by
 from hexwrap_solver.pattern.place.choose import PlacementFamily
 from hexwrap_solver.pattern.place.rotation import with_rotation
+from hexwrap_solver.pattern.place.sense import check_edge
 from hexwrap_solver.pattern.place.size import HALF_ROW
 from hexwrap_solver.pattern.types import PatternSettings
 from hexwrap_solver.tolerances import RELATIVE, TINY
@@ -85,7 +87,7 @@ class Outlook:
 
     @property
     def edge(self) -> float:
-        """Mean edge of the cells."""
+        """Mean edge of the cells; infinite where there are none."""
         return float(self.size.mean()) if len(self.size) else np.inf
 
     def foresee(self, sizes: int | None, joint: float = 0.0) -> Foreseen:
@@ -94,7 +96,7 @@ class Outlook:
         types = panels = 0
         area = perimeter = cells = 0.0
         for sides, outline in self.lattice.centred.items():
-            of_kind, unit = self.sides == sides, _area(outline)
+            of_kind, unit = self.sides == sides, outline_area(outline)
             limit = self.limit[of_kind] - joint / (2 * _inradius(outline))
             cells += unit * float((self.size[of_kind] ** 2).sum())
             limit = limit[limit > 0]
@@ -113,9 +115,9 @@ class Outlook:
             return Foreseen(1.0, 0, 0, 0.0, 0.0, 1.0)
         # a piece of a cell is as compact as the cell, more or less
         largest = self.lattice.sides
-        around = float(np.sqrt(others * self.rest / _area(self.lattice.centred[largest]))) * largest
+        around = float(np.sqrt(others * self.rest / outline_area(self.lattice.centred[largest]))) * largest
         return Foreseen(
-            1 - (area + self.rest) / (cells + self.rest),
+            max(1 - (area + self.rest) / (cells + self.rest), 0.0),
             panels + others,
             types + self.special + self.trimmed + self.kinds,
             area + self.rest,
@@ -127,15 +129,16 @@ class Outlook:
 def outlook(cmap: ConformalMap, settings: PatternSettings, progress: Progress = no_progress) -> Outlook:
     """The lattice is placed as for the pattern itself, but no cell is made.
 
-    Raises NotAdaptedError, PatternError as ``lay_pattern`` does where no lattice fits.
+    Raises NotAdaptedError, PatternError as ``lay_pattern`` does where no lattice fits, or cells are too many.
     """
+    check_edge(cmap.surface, settings)
     lattice = LATTICES[settings.cell_kind]
     settings, _ = with_rotation(cmap, lattice, settings)
     placing = PlacementFamily.of(cmap, lattice, settings)
     progress(0.5, "placing the lattice")
     seen = _outlook(cmap, placing, settings)
     wanted, edge = settings.edge_length, seen.edge
-    if wanted is None or abs(edge / wanted - 1) <= CLOSE:
+    if wanted is None or not len(seen.size) or abs(edge / wanted - 1) <= CLOSE:
         return seen
     # As ``lay_pattern`` does, which may come to other numbers of cells and rows.
     again = _outlook(cmap, placing, replace(settings, edge_length=wanted**2 / edge))
@@ -145,15 +148,13 @@ def outlook(cmap: ConformalMap, settings: PatternSettings, progress: Progress = 
 def _outlook(cmap: ConformalMap, placing: PlacementFamily, settings: PatternSettings) -> Outlook:
     lattice, placement, surface = placing.lattice, placing.at(settings), cmap.surface
     placed = placement.glued.corners(surface.faces, placement.place)
-    p, q, r = placed.T
-    cells = abs(((q - p).conj() * (r - p)).imag) / (2 * lattice.cell_area)
-    a, b, c = (surface.vertices[corner] for corner in surface.faces.T)
-    area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
-    wider, skew = _stretched(placing.cmap.corners(), placed)
-    unit = lattice.cell_area / lattice.edge**2
+    check_count(cmap, placed, lattice, settings)
+    cells, area = plane_areas(placed) / lattice.cell_area, surface.areas
+    skew = _stretched(placing.cmap.corners(), placed)
     size: Floats = np.exp(-(cmap.log_scale - cmap.log_scale.mean()))
-    square = (size**2)[surface.faces].mean(axis=1) / wider**2
-    size *= np.sqrt(area.sum() / (unit * float(cells @ square)))
+    square = lattice.cell_area / lattice.edge**2 * cells * (size**2)[surface.faces].mean(axis=1)
+    # of each triangle, which is as large as the cells on it
+    wide = np.sqrt(area / np.maximum(abs(square), TINY))
     slope: Floats = np.bincount(surface.faces.ravel(), np.repeat(area * _slope(cmap, area), 3)).astype(float)
     slope = slope / np.maximum(np.bincount(surface.faces.ravel(), np.repeat(area, 3)), TINY)
     face, weight, sides = _middles(lattice, placed)
@@ -161,11 +162,11 @@ def _outlook(cmap: ConformalMap, placing: PlacementFamily, settings: PatternSett
         np.einsum("kc,kc...->k...", weight, values[surface.faces[face]])
         for values in (np.log(size), slope, surface.vertices)
     )
-    size = np.exp(here) / wider[face]
+    size = np.exp(here) * wide[face]
     uphill = _uphill(placed, cmap.log_scale[surface.faces])[face]
     unit_area, shorter = np.zeros(lattice.sides + 1), np.zeros(len(face))
     for kind, outline in lattice.centred.items():
-        unit_area[kind], own = _area(outline), sides == kind
+        unit_area[kind], own = outline_area(outline), sides == kind
         shorter[own] = shortened(outline, (slope * size * uphill)[own], skew[face[own]])
     reach: Floats = np.asarray(sides / (2 * np.pi) * size)
     regular, alone = np.ones(len(face), dtype=bool), len(cmap.cones)
@@ -212,13 +213,12 @@ def shortened(outline: Complexes, gradient: Complexes, skew: Complexes) -> Float
     return np.asarray((lost[:, one] + lost[:, other]).max(axis=1) / 2)
 
 
-def _stretched(conformal: Complexes, placed: Complexes) -> tuple[Floats, Complexes]:
-    """(m,) by what the lattice is larger on the triangles, (m, 3) each, where it was placed than on the map;
-    and (m,) μ: a circle of the lattice is drawn as z + μ z̄ on the map."""
+def _stretched(conformal: Complexes, placed: Complexes) -> Complexes:
+    """(m,) μ of triangles, (m, 3) each: a circle of the lattice is drawn as z + μ z̄ on the map."""
     (e, f), (g, h) = ((t[:, 1] - t[:, 0], t[:, 2] - t[:, 0]) for t in (conformal, placed))
     area = e * f.conj() - e.conj() * f
     turn, skew = (g * f.conj() - h * e.conj()) / area, (e * h - f * g) / area  # g = turn·e + skew·ē
-    return np.sqrt(abs(abs(turn) ** 2 - abs(skew) ** 2)), -skew / turn.conj()
+    return -skew / turn.conj()
 
 
 def _uphill(placed: Complexes, values: Floats) -> Complexes:
@@ -227,10 +227,6 @@ def _uphill(placed: Complexes, values: Floats) -> Complexes:
     turned = (values[:, 1] - values[:, 0]) * f - (values[:, 2] - values[:, 0]) * e
     length = abs(turned)
     return np.asarray(-1j * turned / np.where(length > 0, length, 1.0))
-
-
-def _area(outline: Complexes) -> float:
-    return 0.5 * float((outline.conj() * np.roll(outline, -1)).imag.sum())
 
 
 def _inradius(outline: Complexes) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -39,42 +39,46 @@ class Frame:
 
 @dataclass(frozen=True)
 class Variant:
-    """singularities: how many are wanted. place: in the order of the sequence."""
+    """singularities: how many are wanted."""
 
     frame: Frame
     singularities: int
     sizes: int
     joint: float
-    place: int = field(default=0, compare=False)
 
 
-def variants(settings: ExploreSettings, edge: float) -> list[Variant]:
+def variants(settings: ExploreSettings, edge: float | None) -> list[Variant]:
     """SPARE times as many different ones as are asked for, or as there are: first what would be taken if
     nothing varied, then in the order of the sequence.
 
-    edge: default edge length of the cells on the surface, for settings that give none.
+    Of the numbers of sizes, those within the limit are tried, where there are such. edge: default edge length
+    of the cells on the surface, for settings that give none.
     """
     vary, panels = settings.vary, settings.panels
     joints = _between(*(vary.joint or (panels.joint, panels.joint)), JOINTS)
-    sizes = range(vary.sizes[0], vary.sizes[1] + 1)
+    low, high = vary.sizes
+    most = max(low, min(high, settings.limits.sizes or high))
+    sizes = range(low, most + 1)
     shapes = _shapes(settings, edge)
     kinds = vary.kind or (settings.pattern.cell_kind,)
     rotations = vary.rotation or (settings.pattern.rotation,)
     choices = (vary.boundary, vary.singularities, kinds, shapes, rotations, sizes, joints)
-    usual = panels.sizes if isinstance(panels.sizes, int) else vary.sizes[1]
+    usual = (
+        min(panels.sizes, settings.limits.sizes or panels.sizes) if isinstance(panels.sizes, int) else most
+    )
     found = {Variant(Frame(BoundaryCondition(), settings.pattern), 0, usual, panels.joint): None}
-    most = SPARE * settings.variants
-    for point in _halton(PATIENCE * most, settings.seed):
-        if len(found) == most:
+    wanted = SPARE * settings.variants
+    for point in _halton(PATIENCE * wanted, settings.seed):
+        if len(found) == wanted:
             break
         taken: list[Any] = [options[int(x * len(options))] for options, x in zip(choices, point, strict=True)]
         boundary, count, kind, shape, rotation, number, joint = taken
         pattern = replace(shape, kind=kind, rotation=rotation)
         found[Variant(Frame(BoundaryCondition(boundary), pattern), count, number, joint)] = None
-    return [replace(variant, place=i) for i, variant in enumerate(found)]
+    return list(found)
 
 
-def _shapes(settings: ExploreSettings, edge: float) -> list[PatternSettings]:
+def _shapes(settings: ExploreSettings, edge: float | None) -> list[PatternSettings]:
     vary, pattern = settings.vary, settings.pattern
     if vary.around is not None:
         steps = dict.fromkeys(round(n) for n in _between(*vary.around, STEPS))
@@ -82,6 +86,7 @@ def _shapes(settings: ExploreSettings, edge: float) -> list[PatternSettings]:
     if vary.edge_length is None:
         if pattern.around is not None or pattern.edge_length is not None:
             return [pattern]
+        assert edge is not None
         low, high = (edge * part for part in AROUND_DEFAULT)
     else:
         low, high = vary.edge_length

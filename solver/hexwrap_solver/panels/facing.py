@@ -7,8 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
-from hexwrap_solver.arrays import Complexes, Floats, Ints, Ragged
-from hexwrap_solver.geometry import angles_between, dot, normalize, plane_axes
+from hexwrap_solver.arrays import Floats, Ints, Ragged
+from hexwrap_solver.geometry import angles_between, dot_first, normalize, plane_axes
 from hexwrap_solver.pattern.halfedges import HalfEdges
 
 
@@ -31,9 +31,10 @@ class Facing:
     kink: Floats
 
     @cached_property
-    def axes(self) -> Floats:
-        """(k, 2, 3) orthonormal, right-handed with the mean normals. Not to be written to."""
-        return plane_axes(self.mean)
+    def frame(self) -> Floats:
+        """(3, 3, k) two axes and the mean normal, right-handed, coordinates first. Not to be written to."""
+        axes = np.concatenate([plane_axes(self.mean), self.mean[:, None]], axis=1)
+        return np.ascontiguousarray(axes.transpose(1, 2, 0))
 
 
 def facing_edges(edges: HalfEdges, panel: Ints, corner: Ints, normal: Floats) -> Facing:
@@ -49,35 +50,40 @@ def facing_edges(edges: HalfEdges, panel: Ints, corner: Ints, normal: Floats) ->
     return Facing(here, there, left[both], right[both], corner.take(here), corner.take(there), mean, kink)
 
 
-def edge_ends(polygons: Ragged, panel: Ints, corner: Ints) -> tuple[Floats, Floats]:
-    """(k, 3) both ends of the panels' edges that start at the given corners."""
-    start, count = polygons.offsets.take(panel), polygons.lengths.take(panel)
-    points = np.asarray(polygons.values, dtype=np.float64)
-    following = np.where(corner + 1 < count, corner + 1, 0)
-    return points.take(start + corner, axis=0), points.take(start + following, axis=0)
+def sides(polygons: Ragged, facing: Facing) -> Floats:
+    """(3, 3, k) from where the left panel's edge starts: to its end, and to the right panel's start and end,
+    coordinates first."""
+    points = np.ascontiguousarray(np.asarray(polygons.values, dtype=np.float64).T)
+    ends = []
+    for panel, corner in ((facing.left, facing.start_left), (facing.right, facing.start_right)):
+        start, count = polygons.offsets.take(panel), polygons.lengths.take(panel)
+        following = np.where(corner + 1 < count, corner + 1, 0)
+        ends += [points.take(start + corner, axis=1), points.take(start + following, axis=1)]
+    return np.stack(ends[1:]) - ends[0]
 
 
 def widths(polygons: Ragged, facing: Facing) -> Floats:
     """(k,) least distance of two facing edges, seen along the mean normals; negative where an edge has
     crossed the other."""
-    a, b = edge_ends(polygons, facing.left, facing.start_left)
-    c, d = edge_ends(polygons, facing.right, facing.start_right)
-    x_axis, y_axis = facing.axes.transpose(1, 0, 2)
-    p, q, r = (dot(end - a, x_axis) + 1j * dot(end - a, y_axis) for end in (b, c, d))
-    o = np.zeros_like(p)
-    return np.minimum(_signed_distance(q, r, o, p), _signed_distance(o, p, q, r))
+    return least_distances(sides(polygons, facing), facing)
 
 
-def _signed_distance(one: Complexes, two: Complexes, a: Complexes, b: Complexes) -> Floats:
-    """Least distance of two points to segment ab, negative on its left (inside the polygon that runs along
-    ab)."""
-    along = b - a
-    length = np.abs(along)
-    back = np.where(length > 0, along, 1.0).conj() / np.where(length > 0, length, 1.0)
-    least = np.full(len(a), np.inf)
-    for point in (one, two):
-        place = (point - a) * back  # along the edge, and to its left
-        beyond = np.maximum(-place.real, place.real - length)
-        distance = np.hypot(np.maximum(beyond, 0.0), place.imag)
-        least = np.minimum(least, np.where((place.imag > 0) & (beyond <= 0), -distance, distance))
+def least_distances(ends: Floats, facing: Facing) -> Floats:
+    """The same of ``sides``."""
+    p, q, r = np.stack([dot_first(ends.swapaxes(0, 1), axis[:, None]) for axis in facing.frame[:2]], axis=1)
+    return np.minimum(_signed_distance((q, r), p), _signed_distance((-q, p - q), r - q))
+
+
+def _signed_distance(points: tuple[Floats, ...], end: Floats) -> Floats:
+    """(k,) least distance of the points, (2, k) each, to the segment from 0 to end (2, k), negative on its
+    left (inside the polygon that runs along it)."""
+    length = np.sqrt(end[0] ** 2 + end[1] ** 2)
+    u, v = end / np.where(length > 0, length, 1.0)
+    u = np.where(length > 0, u, 1.0)
+    least = np.full(len(length), np.inf)
+    for x, y in points:
+        along, left = x * u + y * v, y * u - x * v
+        beyond = np.maximum(np.maximum(-along, along - length), 0.0)
+        distance = np.sqrt(beyond**2 + left**2)
+        least = np.minimum(least, np.where((left > 0) & (beyond <= 0), -distance, distance))
     return least

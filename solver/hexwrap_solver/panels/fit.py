@@ -465,6 +465,8 @@ def _trimmed(
 ) -> tuple[Ragged, Floats, Bools]:
     """Flat polygons for the chosen cells, their centres, and which cells (of all) keep a panel. origin: (c,
     3) points of the planes."""
+    if not chosen.any():
+        return Ragged.from_table(np.zeros((0, 1, 3))), np.zeros((0, 3)), chosen.copy()
     shapes, at = take_rows(cells, np.flatnonzero(chosen))
     flat, center, size = flatten_and_clear(
         shapes, normal[chosen], planes.direction[at], planes.offset[at], edges.across[at], origin[chosen]

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexwrap_solver.arrays import Floats
-from hexwrap_solver.geometry import dot
-from hexwrap_solver.panels.facing import Facing, edge_ends, widths
-from hexwrap_solver.panels.types import Panels
+from hexwrap_solver.geometry import dot_first
+from hexwrap_solver.panels.facing import Facing, least_distances
 
 
 @dataclass(frozen=True)
@@ -26,13 +25,12 @@ class Gaps:
     kink: Floats
 
 
-def gaps(facing: Facing, panels: Panels, n_half_edges: int) -> Gaps:
-    """n_half_edges: of the pattern."""
-    a, b = edge_ends(panels.polygons, facing.left, facing.start_left)
-    c, d = edge_ends(panels.polygons, facing.right, facing.start_right)
+def gaps(facing: Facing, ends: Floats, n_half_edges: int) -> Gaps:
+    """ends: the ``sides`` that face each other. n_half_edges: of the pattern."""
+    p, q, r = ends
     figures = (
-        widths(panels.polygons, facing),
-        np.abs(dot((c + d - a - b) / 2, facing.mean)),
+        least_distances(ends, facing),
+        np.abs(dot_first(q + r - p, facing.frame[2])) / 2,
         facing.kink,
     )
     result = np.full((3, n_half_edges), np.nan)

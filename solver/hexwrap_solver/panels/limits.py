@@ -7,12 +7,12 @@ plane's offset o_k.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 
 from hexwrap_solver.arrays import Bools, Floats, Ints
-from hexwrap_solver.geometry import cross_2d
 from hexwrap_solver.panels.regular import Poses
 from hexwrap_solver.tolerances import RELATIVE
 
@@ -35,6 +35,36 @@ def support_function(poses: Poses, direction: Floats) -> Floats:
     return reached.T
 
 
+@dataclass(frozen=True)
+class _Programmes:
+    """s_k·c + ℓ h_k ≤ o_k for every cell, as lines of the panels' planes: x, y: (k, q) of s; h: (k, q); room:
+    (k, q) left beside the centre. NumPy runs along the cells."""
+
+    x: Floats
+    y: Floats
+    h: Floats
+    room: Floats
+
+    def part(self, cells: Ints) -> _Programmes:
+        return _Programmes(*(part.take(cells, axis=1) for part in (self.x, self.y, self.h, self.room)))
+
+    def of(self, triple: Ints) -> _Programmes:
+        """Those of three planes alone; triple: (3, q)."""
+        cell = np.arange(self.x.shape[1])
+        return _Programmes(*(part[triple, cell] for part in (self.x, self.y, self.h, self.room)))
+
+    @property
+    def turns(self) -> tuple[Floats, Floats, Floats]:
+        """(q,) sines of the angles from the second of three planes to the third, from that to the first, and
+        from that to the second."""
+        x, y = self.x, self.y
+        return tuple(x[i] * y[j] - y[i] * x[j] for i, j in ((1, 2), (2, 0), (0, 1)))
+
+    def length(self, shift: Floats) -> Floats:
+        """(q,) of the panels with centres moved by (2, q)."""
+        return np.asarray(((self.room - self.x * shift[0] - self.y * shift[1]) / self.h).min(axis=0))
+
+
 def inscribed(poses: Poses, direction: Floats, offset: Floats) -> tuple[Floats, Floats]:
     """The largest panels of the given orientations within their planes; direction (q, k, 3), offset (q, k).
 
@@ -43,48 +73,52 @@ def inscribed(poses: Poses, direction: Floats, offset: Floats) -> tuple[Floats, 
     the least dual value over all triples with non-negative multipliers, taken here for all cells at once.
     Returns lengths (q,), which may be negative where the planes leave no room, and centres (q, 3).
     """
-    axes = np.stack([poses.x_axis, poses.y_axis], axis=1)
-    flat = np.einsum("qkd,qed->qke", direction, axes)
-    room = offset - np.einsum("qkd,qd->qk", direction, poses.center)
-    h = support_function(poses, direction)
-    best, chosen = _least_dual(flat, h, room)
-    shift = _touching_centre(flat, h, room, chosen)
+    s = np.ascontiguousarray(direction.T)
+    x_axis, y_axis, middle = (
+        np.ascontiguousarray(part.T) for part in (poses.x_axis, poses.y_axis, poses.center)
+    )
+    h = np.ascontiguousarray(support_function(poses, direction).T)
+    along = (s[0] * axis[0] + s[1] * axis[1] + s[2] * axis[2] for axis in (x_axis, y_axis, middle))
+    x, y, at = along
+    programmes = _Programmes(x, y, h, offset.T - at)
+    best, chosen = _least_dual(programmes)
+    own = programmes.of(chosen)
+    shift = _touching_centre(own)
     bounded = np.where(np.isfinite(best), best, 0.0)
-    short = ~np.isfinite(best) | (_room_length(shift, flat, h, room) < bounded - SHORTFALL * np.abs(bounded))
-    again = np.flatnonzero(short | _is_loose(flat, chosen))
-    shift[again] = _middle_vertex(flat[again], h[again], room[again])
-    center = poses.center + np.einsum("qe,qed->qd", shift, axes)
+    short = ~np.isfinite(best) | (programmes.length(shift) < bounded - SHORTFALL * np.abs(bounded))
+    again = np.flatnonzero(short | _is_loose(own))
+    shift[:, again] = _middle_vertex(programmes.part(again))
+    center = middle + shift[0] * x_axis + shift[1] * y_axis
     # The length is taken from the centre found, so that rounding in the centre cannot break a constraint.
-    return length_at(center, direction, offset, h), center
+    reached = s[0] * center[0] + s[1] * center[1] + s[2] * center[2]
+    return ((offset.T - reached) / h).min(axis=0), np.ascontiguousarray(center.T)
 
 
-def _is_loose(flat: Floats, triple: Ints) -> Bools:
+def _is_loose(own: _Programmes) -> Bools:
     """Where two of the three planes are as good as parallel, so that the panel can slide between them."""
-    a, b, c = np.moveaxis(flat[np.arange(len(flat))[:, None], triple], 1, 0)
-    weight = np.abs([cross_2d(b, c), cross_2d(c, a), cross_2d(a, b)])
+    weight = np.abs(own.turns)
     return np.asarray(weight.min(axis=0) < LOOSE * weight.max(axis=0))
 
 
-def _middle_vertex(flat: Floats, h: Floats, room: Floats) -> Floats:
-    """(q, 2) the same optimum by trying every triple's touching point, and the mean of all that are as good.
+def _middle_vertex(programmes: _Programmes) -> Floats:
+    """(2, q) the same optimum by trying every triple's touching point, and the mean of all that are as good.
 
     For cells with nearly parallel sides, whose dual vertices rounding cannot tell apart.
     """
-    triples = list(combinations(range(flat.shape[1]), 3))
-    tried = np.array([_touching_centre(flat, h, room, np.tile(triple, (len(flat), 1))) for triple in triples])
-    length = np.array([_room_length(shift, flat, h, room) for shift in tried])
+    k, q = programmes.x.shape
+    tried = [
+        _touching_centre(programmes.of(np.repeat(triple, q).reshape(3, q)))
+        for triple in combinations(range(k), 3)
+    ]
+    length = np.array([programmes.length(shift) for shift in tried])
     as_good = length >= length.max(axis=0) - LOOSE * np.abs(length.max(axis=0))
-    return np.asarray(np.einsum("tq,tqe->qe", as_good, tried) / as_good.sum(axis=0)[:, None])
+    return np.asarray((as_good[:, None] * np.array(tried)).sum(axis=0) / as_good.sum(axis=0))
 
 
-def _room_length(shift: Floats, flat: Floats, h: Floats, room: Floats) -> Floats:
-    return np.asarray(((room - np.einsum("qke,qe->qk", flat, shift)) / h).min(axis=1))
-
-
-def _least_dual(flat: Floats, h: Floats, room: Floats) -> tuple[Floats, Ints]:
+def _least_dual(programmes: _Programmes) -> tuple[Floats, Ints]:
     """(q,) least value of the dual vertices of three planes each, infinite where none is feasible, and the
-    three (q, 3)."""
-    x, y, h, room = (np.ascontiguousarray(part.T) for part in (flat[..., 0], flat[..., 1], h, room))
+    three (3, q)."""
+    x, y, h, room = programmes.x, programmes.y, programmes.h, programmes.room
     k, q = h.shape
     turn = {(i, j): x[i] * y[j] - y[i] * x[j] for i, j in combinations(range(k), 2)}
     triples = list(combinations(range(k), 3))
@@ -97,24 +131,28 @@ def _least_dual(flat: Floats, h: Floats, room: Floats) -> tuple[Floats, Ints]:
         feasible = (np.abs(total) > DUAL_TOLERANCE) & ~(least < -DUAL_TOLERANCE)
         value = (u * room[a] + v * room[b] + w * room[c]) / np.where(feasible, total, 1.0)
         better = feasible & (value < best)
-        best[better], which[better] = value[better], t
-    return best, np.array(triples, dtype=np.int64).reshape(-1, 3)[which]
+        np.copyto(best, value, where=better)
+        which[better] = t
+    return best, np.array(triples, dtype=np.int64).reshape(-1, 3).T.take(which, axis=1)
 
 
-def _touching_centre(flat: Floats, h: Floats, room: Floats, triple: Ints) -> Floats:
-    """(q, 2) where the panel touches the three planes that bound it."""
-    rows = np.arange(len(flat))[:, None]
-    matrix = np.concatenate([flat[rows, triple], h[rows, triple][..., None]], axis=2)
-    right = room[rows, triple]
+def _touching_centre(own: _Programmes) -> Floats:
+    """(2, q) where the panel touches the three planes that bound it: by Cramer's rule."""
+    x, y, h, room = own.x, own.y, own.h, own.room
+    a, b, c = own.turns
+    det = a * h[0] + b * h[1] + c * h[2]
     # Two parallel sides bound a panel that can still slide between them; least norm keeps it near the
     # centroid.
-    singular = np.abs(np.linalg.det(matrix)) < RELATIVE
-    solution = np.zeros((len(flat), 3))
-    solution[~singular] = np.linalg.solve(matrix[~singular], right[~singular][..., None])[..., 0]
-    solution[singular] = np.einsum(
-        "qij,qj->qi", np.linalg.pinv(matrix[singular], rcond=RELATIVE), right[singular]
-    )
-    return solution[:, :2]
+    singular = np.flatnonzero(np.abs(det) < RELATIVE)
+    d, e, f = (room[i] * h[j] - h[i] * room[j] for i, j in ((1, 2), (2, 0), (0, 1)))
+    safe = det.copy()
+    safe[singular] = 1.0
+    shift = np.stack([-(y[0] * d + y[1] * e + y[2] * f), x[0] * d + x[1] * e + x[2] * f]) / safe
+    if len(singular):
+        matrix = np.stack([part.take(singular, axis=1) for part in (x, y, h)], axis=2).transpose(1, 0, 2)
+        right = room.take(singular, axis=1).T
+        shift[:, singular] = np.einsum("qij,qj->iq", np.linalg.pinv(matrix, rcond=RELATIVE), right)[:2]
+    return np.asarray(shift)
 
 
 def length_at(center: Floats, direction: Floats, offset: Floats, h: Floats) -> Floats:

@@ -6,7 +6,7 @@ import numpy as np
 import shapely
 
 from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged
-from hexwrap_solver.geometry import dot, normalize, plane_axes
+from hexwrap_solver.geometry import dot_first, normalize, plane_axes
 
 #: Two panels overlap when they share more area than this, times the squared edge length.
 AREA_TOLERANCE = 1e-9
@@ -31,6 +31,8 @@ def overlap_areas(
     believed to lie one behind the other: whether they do is seen first, in a fraction of the time.
     """
     area = np.zeros(len(first))
+    if not len(first):
+        return area
     if across is not None:
         slack = DEPTH_TOLERANCE * np.minimum(edge_length[first], edge_length[second])
         left = np.flatnonzero(~_lie_apart(polygons, normal, first, second, across, slack))
@@ -63,22 +65,23 @@ def overlapping_pairs(
 def _lie_apart(
     polygons: Ragged, normal: Floats, first: Ints, second: Ints, across: Floats, slack: Floats
 ) -> Bools:
-    """(k,) whether the shadows of the panels on the directions, made square to the mean of the normals, are
-    apart."""
-    mean = normal.take(first, axis=0) + normal.take(second, axis=0)
-    flat = across - (dot(across, mean) / dot(mean, mean))[:, None] * mean
-    axis = normalize(flat)
-    start = np.asarray(polygons.values.take(polygons.offsets[:-1], axis=0), dtype=np.float64)
-    spoke = np.ascontiguousarray((polygons.values - start.take(polygons.row, axis=0)).T)
-    along = np.ascontiguousarray(axis.T)
+    """(k,) whether the shadows of the panels on the directions (3, k), made square to the mean of the
+    normals, are apart."""
+    upright = np.ascontiguousarray(normal.T)
+    mean = upright.take(first, axis=1) + upright.take(second, axis=1)
+    flat = across - dot_first(across, mean) / dot_first(mean, mean) * mean
+    length = np.sqrt(dot_first(flat, flat))
+    axis = flat / np.where(length > 0, length, 1.0)
+    start = polygons.offsets[:-1].take(first)
+    place = np.ascontiguousarray(polygons.values.T)
+    origin = place.take(start, axis=1)
 
     def shadow(which: Ints) -> Floats:
         corner = _corners(polygons, which)
-        return np.asarray(sum(spoke[d].take(corner) * along[d] for d in range(3)))
+        return np.asarray(sum((place[d].take(corner) - origin[d]) * axis[d] for d in range(3)))
 
-    apart = dot(start.take(second, axis=0) - start.take(first, axis=0), axis)
-    ahead = apart + shadow(second).min(axis=0) >= shadow(first).max(axis=0) - slack
-    return np.asarray(ahead & flat.any(axis=1))
+    ahead = shadow(second).min(axis=0) >= shadow(first).max(axis=0) - slack
+    return np.asarray(ahead & (length > 0))
 
 
 def _corners(polygons: Ragged, which: Ints) -> Ints:

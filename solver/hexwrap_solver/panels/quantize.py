@@ -11,7 +11,6 @@ from hexwrap_solver.arrays import Floats, Ints, Ragged
 from hexwrap_solver.errors import PanelsError
 from hexwrap_solver.panels.facing import widths
 from hexwrap_solver.panels.fewest import Fewest, Joints, fewest_lengths
-from hexwrap_solver.panels.regular import outline_areas
 from hexwrap_solver.panels.sizes import (
     ALIKE,
     ALIKE_AREA,
@@ -253,18 +252,18 @@ def _loss(
     """What is to be least: panels below the allowed range, then what ``size_cost`` asks for."""
     below = int((length < smallest).sum())
     if settings.size_cost == "area" or not len(length):
-        return below, -float(outline_areas(fitted.spokes) @ length**2)
+        return below, -float(fitted.area @ length**2)
     return below, float((_free_length(fitted) - length).max())
 
 
 def _free_length(fitted: FittedPanels) -> Floats:
     """(r,) edges of the regular polygons that are as large as the regular panels' cells."""
-    return np.asarray(np.sqrt(fitted.cell_area[fitted.regular] / outline_areas(fitted.spokes)))
+    return np.asarray(np.sqrt(fitted.cell_area[fitted.regular] / fitted.area))
 
 
 def _inradius(fitted: FittedPanels) -> Floats:
     """(r,) of the panels with edge 1: how far a side moves per length; a mean for those not regular."""
-    return np.asarray(2 * outline_areas(fitted.spokes) / fitted.spokes.lengths)
+    return np.asarray(2 * fitted.area / fitted.spokes.lengths)
 
 
 def _require_increment(allowed: Floats, panel: Ints, increment: float) -> None:
@@ -280,23 +279,24 @@ def _require_increment(allowed: Floats, panel: Ints, increment: float) -> None:
 
 def _polygons(fitted: FittedPanels, length: Floats) -> Ragged:
     """All panels in the order of their faces."""
-    regular = fitted.regular
-    spokes = fitted.spokes
+    regular, spokes = fitted.regular, fitted.spokes
+    center, row = fitted.center[regular], spokes.row
+    points = center.take(row, axis=0) + length.take(row)[:, None] * spokes.values
+    if regular.all():
+        return Ragged(points, spokes.offsets)
     count = np.zeros(len(regular), dtype=np.int64)
     count[regular], count[~regular] = spokes.lengths, fitted.shapes.lengths
     offsets = np.concatenate([[0], np.cumsum(count)]).astype(np.int64)
-    points = np.zeros((int(offsets[-1]), 3))
     is_regular = np.repeat(regular, count)
-    center, row = fitted.center[regular], spokes.row
-    points[is_regular] = center.take(row, axis=0) + length.take(row)[:, None] * spokes.values
-    points[~is_regular] = fitted.shapes.values
-    return Ragged(points, offsets)
+    every = np.zeros((int(offsets[-1]), 3))
+    every[is_regular], every[~is_regular] = points, fitted.shapes.values
+    return Ragged(every, offsets)
 
 
 def _curve(fitted: FittedPanels, allowed: Floats, settings: PanelSettings) -> Floats:
     """(k, 4) for 1…k classes of each kind: uncovered part, worst gap, mean and greatest width of the
     joints."""
-    kind_of, area, inradius = _kinds(fitted), outline_areas(fitted.spokes), _inradius(fitted)
+    kind_of, area, inradius = _kinds(fitted), fitted.area, _inradius(fitted)
     cell_area = float(fitted.cell_area[fitted.regular].sum())
     free_length = _free_length(fitted)
     kinds = []
@@ -305,22 +305,23 @@ def _curve(fitted: FittedPanels, allowed: Floats, settings: PanelSettings) -> Fl
         own = own[np.argsort(allowed[own], kind="stable")]
         made, floored = partition(allowed[own], TRADE_OFF_CLASSES, settings.size_cost, settings.increment)
         kinds.append((own, made.start, floored))
-    joints = None if fitted.facing is None else _joints(fitted)
-    own_width = np.zeros(0) if joints is None else joints.width(allowed)
+    own_width, sides = np.zeros(0), []
+    if fitted.facing is not None:
+        joints = _joints(fitted)
+        own_width, sides = joints.width(allowed), [joints.left + 1, joints.right + 1]
     # The first: of panels with a given shape, which lose nothing.
     shrunk = np.zeros(len(allowed) + 1)
     length = np.zeros_like(allowed)
+    # A cell's inradius exceeds its panel's by half the gap between cells of the same size.
+    free_gap, gap_per_length = 2 * inradius * free_length, 2 * inradius
     curve = []
     for k in range(max(len(start) for _, start, _ in kinds)):
         for own, start, floored in kinds:
             length[own] = lengths_of(start[min(k, len(start) - 1)], floored)
         uncovered = 1 - float(area @ length**2) / cell_area
         shrunk[1:] = inradius * (allowed - length)
-        joint = own_width
-        if joints is not None:
-            joint = own_width + shrunk.take(joints.left + 1) + shrunk.take(joints.right + 1)
-        # A cell's inradius exceeds its panel's by half the gap between cells of the same size.
-        widest = float(np.max(2 * inradius * (free_length - length)))
+        joint = sum((shrunk.take(side) for side in sides), start=own_width)
+        widest = float(np.max(free_gap - gap_per_length * length))
         curve.append((uncovered, widest, joint.mean() if len(joint) else 0.0, joint.max(initial=0.0)))
     return np.array(curve)
 

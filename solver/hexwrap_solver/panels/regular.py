@@ -33,7 +33,7 @@ class Poses:
 
     @property
     def normal(self) -> Floats:
-        return np.asarray(np.cross(self.x_axis, self.y_axis))
+        return cross(self.x_axis, self.y_axis)
 
     def spokes(self, p: int) -> Floats:
         """(q, p, 3) from the centre to the corners of polygons of edge length 1."""
@@ -69,7 +69,7 @@ def nearest_regular(points: Floats) -> Poses:
     a, b = _moments(points)
     g11, g12, g22 = dot(a, a), dot(a, b), dot(b, b)
     # Square root of the 2×2 Gram matrix G by Cayley–Hamilton: √G = (G + √det G) / √(tr G + 2 √det G).
-    root_det = np.linalg.norm(np.cross(a, b), axis=1)
+    root_det = lengths(cross(a, b))
     trace_root = np.sqrt(g11 + g22 + 2 * root_det)
     scale = 1 / (root_det * trace_root)
     s11, s12, s22 = g11 + root_det, g12, g22 + root_det
@@ -84,10 +84,10 @@ def nearest_regular_in_plane(points: Floats, normal: Floats) -> Poses:
     a = a - dot(a, normal)[:, None] * normal
     b = b - dot(b, normal)[:, None] * normal
     # In the plane the best rotation turns every direction θ_i to Σ z_i e^{−iθ_i}, that is to a − n×b.
-    x_axis = a - np.cross(normal, b)
-    length = np.linalg.norm(x_axis, axis=1)
+    x_axis = a - cross(normal, b)
+    length = lengths(x_axis)
     x_axis /= length[:, None]
-    return _orthonormal(points, x_axis, np.cross(normal, x_axis), length)
+    return _orthonormal(points, x_axis, cross(normal, x_axis), length)
 
 
 def nearest_copy(points: Floats, outline: Floats, normal: Floats | None = None) -> Poses:
@@ -131,14 +131,20 @@ def _orthonormal(points: Floats, x_axis: Floats, y_axis: Floats, trace: Floats) 
     """Makes the axes orthonormal to the last bit that matters; trace: σ₁ + σ₂."""
     x_axis = normalize(x_axis)
     y_axis = normalize(y_axis - dot(x_axis, y_axis)[:, None] * x_axis)
-    return Poses(points.mean(axis=1), x_axis, y_axis, trace * np.sin(np.pi / points.shape[1]))
+    return Poses(_means(points), x_axis, y_axis, trace * np.sin(np.pi / points.shape[1]))
+
+
+def _means(points: Floats) -> Floats:
+    """(q, 3) of the corners (q, p, 3)."""
+    return np.ascontiguousarray(np.ascontiguousarray(points.T).mean(axis=1).T)
 
 
 def _moments(points: Floats) -> tuple[Floats, Floats]:
     p = points.shape[1]
     angle = 2 * np.pi * np.arange(p) / p
     # Centred first: far from the origin the cosines alone would cancel digits away.
-    centred = points - points.mean(axis=1, keepdims=True)
-    a = np.einsum("i,qid->qd", np.cos(angle), centred) * (2 / p)
-    b = np.einsum("i,qid->qd", np.sin(angle), centred) * (2 / p)
-    return a, b
+    corner = np.ascontiguousarray(points.T)
+    a, b = (
+        np.array([np.cos(angle), np.sin(angle)]) @ (corner - corner.mean(axis=1, keepdims=True))
+    ).swapaxes(0, 1)
+    return a.T * (2 / p), b.T * (2 / p)

@@ -42,9 +42,9 @@ PRICE = 0.02
 #: they count no more than there, for the sums to keep their digits.
 RELATIVE, COUNTS_FROM = (0.1, 0.2, 0.4, 0.8, 1.6, 3.2), 0.01
 
-#: So many choices of the programmes (8 bytes each) are remembered, of those used last: another number of
-#: classes over the same limits needs no more than the layers that are not there yet.
-REMEMBERED = 1 << 21
+#: So many numbers (8 bytes each) are remembered of the programmes used last, OBJECTS more for each: another
+#: number of classes over the same limits needs no more than the layers that are not there yet.
+REMEMBERED, OBJECTS = 1 << 21, 128
 
 
 @dataclass(frozen=True)
@@ -85,13 +85,8 @@ def partition_by_area(length: Floats, classes: int, weight: Floats | None = None
     value at j never exceeds V_{k−1}(j). Equal limits are one line.
     """
     key = (length.tobytes(), None if weight is None else weight.tobytes())
-    with _REMEMBERING:
-        known = _remembered.pop(key, None)
-    layers = _more_layers(known or _Layers(), classes, length, weight)
-    with _REMEMBERING:
-        _remembered[key] = layers
-        while sum(one.size for one in _remembered.values()) > REMEMBERED:
-            _remembered.popitem(last=False)
+    layers = _more_layers(_memory.taken(key) or _Layers(), classes, length, weight)
+    _memory.keep(key, layers)
     return Partition(list(layers.start[:classes]), np.array(layers.loss[:classes]))
 
 
@@ -110,11 +105,43 @@ class _Layers:
 
     @property
     def size(self) -> int:
-        return sum(map(len, self.choice))
+        return sum(map(len, (*self.choice, *self.start)))
 
 
-_remembered: OrderedDict[tuple[bytes, bytes | None], _Layers] = OrderedDict()
-_REMEMBERING = Lock()
+_Key = tuple[bytes, bytes | None]
+
+
+class _Memory:
+    """Layers by their limits and weights; threads may share it."""
+
+    def __init__(self) -> None:
+        self._kept: OrderedDict[_Key, _Layers] = OrderedDict()
+        self._size = 0
+        self._lock = Lock()
+
+    def taken(self, key: _Key) -> _Layers | None:
+        with self._lock:
+            return self._pop(key)
+
+    def keep(self, key: _Key, layers: _Layers) -> None:
+        with self._lock:
+            self._pop(key)  # of another thread
+            self._kept[key] = layers
+            self._size += _size(key, layers)
+            while self._size > REMEMBERED:
+                self._pop(next(iter(self._kept)))
+
+    def _pop(self, key: _Key) -> _Layers | None:
+        known = self._kept.pop(key, None)
+        self._size -= _size(key, known) if known else 0
+        return known
+
+
+def _size(key: _Key, layers: _Layers) -> int:
+    return OBJECTS + layers.size + (len(key[0]) + len(key[1] or b"")) // 8
+
+
+_memory = _Memory()
 
 
 def _more_layers(known: _Layers, classes: int, length: Floats, weight: Floats | None) -> _Layers:
@@ -126,42 +153,45 @@ def _more_layers(known: _Layers, classes: int, length: Floats, weight: Floats | 
     counted = np.arange(len(length) + 1.0) if weight is None else np.append(0.0, np.cumsum(weight))
     begin = counted[np.append(first, len(length))]
     total = float(np.sum(length**2 if weight is None else weight * length**2))
-    choice, start, loss, value = list(known.choice), list(known.start), list(known.loss), known.value
-    for k in range(len(choice) + 1, min(classes, m) + 1):
+    choice, loss, value = list(known.choice), list(known.loss), known.value
+    for _ in range(len(choice), min(classes, m)):
         if value is None:
             chosen, before = np.zeros(m + 1, dtype=np.int64), np.zeros(m + 1)
         else:
             chosen = _upper_envelope(square, value[:-1] - begin[:-1] * square, begin)
-            before = value[chosen]
-        value = before + (begin - begin[chosen]) * square[np.minimum(chosen, m - 1)]
+            before = value.take(chosen)
+        value = before + (begin - begin.take(chosen)) * square.take(chosen)
         value[0] = 0.0
         choice.append(chosen)
-        start.append(first[_trace(choice, k, m)])
-        start[-1].flags.writeable = False  # what is remembered is shared
         loss.append(max(total - float(value[-1]), 0.0))
-    return _Layers(tuple(choice), value, tuple(start), tuple(loss))
+    start = [first[which] for which in _traces(choice, len(known.start), m)]
+    for one in start:
+        one.flags.writeable = False  # what is remembered is shared
+    return _Layers(tuple(choice), value, (*known.start, *start), tuple(loss))
 
 
 def _upper_envelope(slope: Floats, intercept: Floats, at: Floats) -> Ints:
     """For each ascending abscissa the index of the highest of the lines, slopes strictly ascending."""
-    run = np.diff(slope)
-    quotient = np.diff(intercept) / run
+    run = slope[1:] - slope[:-1]
+    quotient = (intercept[1:] - intercept[:-1]) / run
     # Blocks of the decreasing fit are the edges of the concave majorant; their ends are its corners.
     fit = scipy.optimize.isotonic_regression(quotient, weights=run, increasing=False)
     corner = np.asarray(fit.blocks)
-    edge_slope = np.diff(intercept[corner]) / np.diff(slope[corner])
-    # Line corner[t+1] overtakes corner[t] where the abscissa passes −edge_slope[t], ascending in t.
-    return corner[np.searchsorted(-edge_slope, at, side="right")]
+    height, place = intercept.take(corner), slope.take(corner)
+    edge_slope = (height[1:] - height[:-1]) / (place[1:] - place[:-1])
+    # Line corner[t+1] overtakes corner[t] where the abscissa passes −edge_slope[t], ascending in t but for
+    # rounding. There are few corners, so that each is looked up among the abscissas.
+    from_there = np.concatenate([[0], np.searchsorted(at, -edge_slope), [len(at)]])
+    return np.repeat(corner, np.diff(np.maximum.accumulate(from_there)))
 
 
-def _trace(choice: list[Ints], k: int, m: int) -> Ints:
-    """Indices of the distinct values at which the k classes begin."""
-    starts = []
-    j = m
-    for layer in range(k - 1, -1, -1):
-        j = int(choice[layer][j])
-        starts.append(j)
-    return np.unique(np.array(starts, dtype=np.int64))
+def _traces(choice: list[Ints], known: int, m: int) -> list[Ints]:
+    """Indices of the distinct values at which the classes begin, for known + 1 … len(choice) classes."""
+    begins = np.full((len(choice) + 1, len(choice) - known), m, dtype=np.int64)
+    for layer in range(len(choice) - 1, -1, -1):
+        late = max(layer - known, 0)  # fewer classes have no such layer
+        begins[layer, late:] = choice[layer].take(begins[layer + 1, late:])
+    return [np.array(sorted(set(column) - {m}), dtype=np.int64) for column in begins.T.tolist()]
 
 
 def partition_by_worst(length: Floats, floored: Floats, classes: int) -> Partition:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Annotated, Literal
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged
 from hexwrap_solver.errors import SettingError
 from hexwrap_solver.panels.facing import Facing
+from hexwrap_solver.panels.regular import outline_areas
 from hexwrap_solver.setting import Setting
 from hexwrap_solver.singularities.types import Choices
 
@@ -168,6 +170,11 @@ class FittedPanels:
     sides: Ints | None = None
     pieces: int = 0
     bends: Bends | None = None
+
+    @cached_property
+    def area(self) -> Floats:
+        """(r,) of the regular panels at edge length 1. Not to be written to."""
+        return outline_areas(self.spokes)
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexwrap_solver.arrays import Bools, Ints, Ragged
+from hexwrap_solver.geometry import stable_order
 
 
 @dataclass(frozen=True)
@@ -37,8 +38,9 @@ class HalfEdges:
         start = faces.values.astype(np.int64)
         end = start[faces.next()]
         key = np.minimum(start, end) * n + np.maximum(start, end)
-        order = np.argsort(key, kind="stable")
-        same: Bools = key[order[1:]] == key[order[:-1]]
+        order = stable_order(key, n * n)
+        ordered = key.take(order)
+        same: Bools = ordered[1:] == ordered[:-1]
         first, second = order[:-1][same], order[1:][same]
         twin = np.full(len(start), -1, dtype=np.int64)
         twin[first], twin[second] = second, first

@@ -267,7 +267,7 @@ class Lattice:
         return max(self.outlines)
 
     @cached_property
-    def _cells(self) -> list[Complexes]:
+    def every_cell(self) -> list[Complexes]:
         """The corners of all cells up to translations."""
         every = [self.stand(np.array(self.cell(start, step))) for start, step in self._every_edge]
         middles = np.array([cell.mean() for cell in every]) / complex(self.position(self.basis[0]))
@@ -277,12 +277,12 @@ class Lattice:
     @cached_property
     def middles(self) -> Complexes:
         """(k,) the middles of all cells up to translations."""
-        return np.array([cell.mean() for cell in self._cells])
+        return np.array([cell.mean() for cell in self.every_cell])
 
     @cached_property
     def sides_around_middles(self) -> Ints:
         """(k,) corners of those cells."""
-        return np.array([len(cell) for cell in self._cells])
+        return np.array([len(cell) for cell in self.every_cell])
 
     @cached_property
     def cell_area(self) -> float:

@@ -7,8 +7,6 @@ import sys
 from dataclasses import replace
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints, Progress, Ragged, no_progress
 from hexwrap_solver.conformal.types import ConformalMap
@@ -16,7 +14,7 @@ from hexwrap_solver.domain.interpolate import surface_weights
 from hexwrap_solver.domain.lift import points_at
 from hexwrap_solver.domain.locate import barycentric
 from hexwrap_solver.errors import PatternError
-from hexwrap_solver.geometry import cross, dot, lengths
+from hexwrap_solver.geometry import cross, dot, lengths, orbits, plane_areas
 from hexwrap_solver.pattern.along import feature_notes, on_features
 from hexwrap_solver.pattern.lattice import LATTICES, Lattice
 from hexwrap_solver.pattern.lay.cells import (
@@ -74,7 +72,7 @@ def lay_pattern(cmap: ConformalMap, settings: PatternSettings, progress: Progres
     Raises NotAdaptedError where the cone angle does not suit the kind of pattern, PatternError where the
     cells are too many (``settings.max_cells``) or too large to close up around the surface.
     """
-    check_edge(cmap, settings)
+    check_edge(cmap.surface, settings)
     lattice = LATTICES[settings.cell_kind]
     settings, notes = with_rotation(cmap, lattice, settings)
     placing = PlacementFamily.of(cmap, lattice, settings)
@@ -151,7 +149,7 @@ def _lay(
     progress(0.1, "placing the lattice")
     layout = layout_of(placing.cmap, lattice, placement)
     layout = replace(layout, tolerance=wider * layout.tolerance)
-    _check_count(cmap, layout, settings)
+    check_count(cmap, layout.corners, layout.lattice, settings)
     surface = placing.cmap.surface
     numbers = sorted(placing.features)
     features = FeatureEdges.of(surface, [surface.features[i] for i in numbers])
@@ -235,11 +233,13 @@ def _corner_of(faces: Ints, vertex: Ints) -> Ints:
     return corner[vertex]
 
 
-def _check_count(cmap: ConformalMap, layout: Layout, settings: PatternSettings) -> None:
-    extent = float(abs(layout.corners).max())
-    p, q, r = layout.corners.T / extent  # on cones that shrink beyond all measure areas would overflow
-    area = float((abs(((q - p).conj() * (r - p)).imag) / 2).sum())
-    cells = min(area / layout.lattice.cell_area * extent * extent, sys.float_info.max)
+def check_count(cmap: ConformalMap, corners: Complexes, lattice: Lattice, settings: PatternSettings) -> None:
+    """Before cells are made, whether they are too many. corners: (m, 3) of the triangles in the plane of the
+    lattice. Raises PatternError."""
+    extent = float(abs(corners).max())
+    # on cones that shrink beyond all measure areas would overflow
+    area = float(plane_areas(corners / extent).sum())
+    cells = min(area / lattice.cell_area * extent * extent, sys.float_info.max)
     if cells > MANY and np.ptp(cmap.log_scale) > STEEP:
         raise PatternError(
             f"About {cells:.0e} cells would be needed: under this boundary condition the map shrinks some "
@@ -247,7 +247,7 @@ def _check_count(cmap: ConformalMap, layout: Layout, settings: PatternSettings) 
             data={"cells": cells, "limit": settings.max_cells},
         )
     if cells > settings.max_cells:
-        raise too_many(cmap, settings, cells)
+        raise too_many(cmap.surface, settings, cells, cmap.log_scale)
 
 
 def _finish(
@@ -262,7 +262,8 @@ def _finish(
     weights = barycentric(layout.corners[triangle], place)
     on_surface = surface_weights(cmap, triangle, weights)
     vertices, normals = _on_input_surface(cmap, triangle, on_surface)
-    outward = faces_outward(cut.cells.corner, vertices, normals)
+    area = area_vectors(cut.cells.corner, vertices)
+    outward = faces_outward(cut.cells.corner, area, normals)
     folded = int(np.count_nonzero(~outward))
     keep, narrow, (corner, point) = _usable(cut.cells, outward, placement.narrows or cut.seams is not None)
     if not keep.any():
@@ -270,7 +271,7 @@ def _finish(
     cells, whole = cut.cells.part(keep), cut.whole[keep]
     triangle, place, weights = triangle[point], place[point], weights[point]
     on_surface, vertices, normals = on_surface[point], vertices[point], normals[point]
-    uv = (weights * cmap.corners()[triangle]).sum(axis=1)
+    uv = dot(weights, cmap.corners()[triangle])
     faces, neighbours = Ragged(corner, cells.corner.offsets), cells.neighbours()
     net = cmap.kind == "net"
     if net:
@@ -304,8 +305,9 @@ def _finish(
         rings=int(ring.max()) + 1,
         around=int(np.bincount(ring).max()) if net else placement.around,
         rotation=placement.rotation,
-        edge_length=mean_edge(vertices, faces),
+        edge_length=mean_edge(vertices, faces, lengths(area[keep])),
         distortion=placement.distortion,
+        proposes=placement.proposes,
         notes=(
             *placement.notes,
             *feature_notes(features),
@@ -321,7 +323,7 @@ def _turn_of_cells(
 ) -> Floats:
     """(c,) how many turns around the surface each cell stands from the anchor."""
     vertex_turn = turns_around(cmap)
-    turn = (weights * (vertex_turn[cmap.surface.faces] + cmap.sheet)[triangle]).sum(axis=1)
+    turn = dot(weights, (vertex_turn[cmap.surface.faces] + cmap.sheet)[triangle])
     turn = turn[faces.values] - vertex_turn[anchor_vertex(cmap)] + cells.isometry[:, 3]
     return np.asarray(np.add.reduceat(turn, faces.offsets[:-1]) / faces.lengths)
 
@@ -345,19 +347,24 @@ def _corners(
     beside = layout.lattice.carry(isometry[moved], place[corner[moved]])
     first = triangle[corner[faces.offsets[faces.row[moved]]]]
     weights = barycentric(layout.corners[first], beside)
-    z[moved] = (weights * cmap.corners()[first]).sum(axis=1)
+    z[moved] = dot(weights, cmap.corners()[first])
     return z
 
 
-def faces_outward(corner: Ragged, points: Floats, normals: Floats) -> Bools:
-    """(c,) cells that run counter-clockwise seen from outside. Where the surface folds back within one, it
-    may have no side that looks there. points, normals: (p, 3)."""
+def area_vectors(corner: Ragged, points: Floats) -> Floats:
+    """(c, 3) twice the areas of cells, along their normals; about their first corners, since far off those
+    about the origin would lose digits. points: (p, 3)."""
     at = corner.values.astype(np.int64)
     first = points.take(at[corner.offsets[:-1]], axis=0).take(corner.row, axis=0)
     spoke = points.take(at, axis=0) - first
-    area = cross(spoke, spoke.take(corner.next(), axis=0))
-    normal = normals.take(at, axis=0)
-    area, side = (np.add.reduceat(x, corner.offsets[:-1], axis=0) for x in (area, normal))
+    turn = cross(spoke, spoke.take(corner.next(), axis=0))
+    return np.asarray(np.add.reduceat(turn, corner.offsets[:-1], axis=0))
+
+
+def faces_outward(corner: Ragged, area: Floats, normals: Floats) -> Bools:
+    """(c,) cells that run counter-clockwise seen from outside. Where the surface folds back within one, it
+    may have no side that looks there. area: (c, 3) their ``area_vectors``. normals: (p, 3)."""
+    side = np.add.reduceat(normals.take(corner.values.astype(np.int64), axis=0), corner.offsets[:-1], axis=0)
     return np.asarray(dot(area, side) > 0)
 
 
@@ -423,15 +430,12 @@ def _on_input_surface(cmap: ConformalMap, triangle: Ints, weights: Floats) -> tu
     return points, with_tangents(exact, normals)
 
 
-def mean_edge(vertices: Floats, faces: Ragged) -> float:
+def mean_edge(vertices: Floats, faces: Ragged, area: Floats) -> float:
     """Mean edge length of the cells, each weighted with its area (the mean over the surface)."""
     corner = faces.values.astype(np.int64)
-    tail, following = vertices.take(corner, axis=0), faces.next()
-    edge = lengths(tail.take(following, axis=0) - tail)
+    tail = vertices.take(corner, axis=0)
+    edge = lengths(tail.take(faces.next(), axis=0) - tail)
     length = np.add.reduceat(edge, faces.offsets[:-1]) / faces.lengths
-    # far off, areas about the origin lose digits
-    spoke = tail - tail.take(faces.offsets[:-1], axis=0).take(faces.row, axis=0)
-    area = lengths(np.add.reduceat(cross(spoke, spoke.take(following, axis=0)), faces.offsets[:-1]))
     return float(length @ area / area.sum())
 
 
@@ -474,13 +478,12 @@ def _at_first_loop(
     edge = np.flatnonzero(neighbours.values < 0)
     tail, head = faces.values[edge], faces.values[following[edge]]
     n = int(faces.values.max()) + 1
-    _, part = connected_components(
-        coo_array((np.ones(len(edge)), (tail, head)), shape=(n, n)), directed=False
-    )
-    loops, which = np.unique(part[tail], return_inverse=True)
+    at = np.zeros(n, dtype=np.int64)
+    at[tail] = np.arange(len(edge))  # boundaries are simple loops
+    which, loops = orbits(at[head])
     gained = np.rint(np.bincount(which, weights=sheet[following[edge]] - sheet[edge]))
     euler = n - (len(faces.values) + len(edge)) // 2 + faces.n_rows
-    if sorted(gained[gained != 0]) != [-1, 1] or euler != 2 - len(loops):
+    if sorted(gained[gained != 0]) != [-1, 1] or euler != 2 - loops:
         return None
     side = int(np.argmax(gained * winding(cmap, layout)))
     first = np.zeros(faces.n_rows, dtype=bool)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from hexwrap_solver.arrays import Bools, Complexes, Ints, Ragged
+from hexwrap_solver.geometry import outline_area
 from hexwrap_solver.pattern.lattice import Lattice
 from hexwrap_solver.pattern.lay.cells import Cells
 from hexwrap_solver.pattern.types import FoldPieces, PatternFeature
@@ -66,7 +67,7 @@ def _makes_one(lattice: Lattice, shape: Ragged, place: Complexes, side: Ints, ot
     both = area[shape.row[side]] + area[shape.row[other]]
     fits = np.zeros(len(side), dtype=bool)
     for outline in lattice.outlines.values():
-        fits |= abs(both - (outline.conj() * np.roll(outline, -1)).imag.sum() / 2) < SAME
+        fits |= abs(both - outline_area(outline)) < SAME
     return fits
 
 

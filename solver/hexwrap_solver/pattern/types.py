@@ -10,6 +10,7 @@ import numpy as np
 
 from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints, Ragged
 from hexwrap_solver.errors import SettingError
+from hexwrap_solver.geometry import cross_first, dot_first
 from hexwrap_solver.pattern.halfedges import HalfEdges
 from hexwrap_solver.setting import Setting
 
@@ -133,7 +134,8 @@ class Pattern:
     rotation: angle actually taken, radians, from the boundary direction (or the horizontal axis on cones).
     edge_length: mean edge length on the surface. distortion: worst singular-value ratio − 1 of the stretch
     that ``align`` and features needed, 0 where none, 10⁶ where a triangle turns over. features: what
-    became of those of the surface. pieces: cells cut along them, None where there are none.
+    became of those of the surface. pieces: cells cut along them, None where there are none. proposes: whether
+    one of the notes says what would fit folds better.
     """
 
     kind: Kind
@@ -158,6 +160,7 @@ class Pattern:
     notes: tuple[str, ...] = ()
     features: tuple[PatternFeature, ...] = ()
     pieces: FoldPieces | None = None
+    proposes: bool = False
 
     @property
     def n_cells(self) -> int:
@@ -172,6 +175,15 @@ class Pattern:
     def cells(self) -> Ragged:
         """The corners of the cells on the surface. Not to be written to."""
         return Ragged(self.vertices.take(self.faces.values.astype(np.int64), axis=0), self.faces.offsets)
+
+    @cached_property
+    def area(self) -> float:
+        """Of the cells, each the fan of triangles around the mean of its corners."""
+        cells, corner = self.cells, np.asarray(self.cells.values, dtype=np.float64)
+        middle = np.add.reduceat(corner, cells.offsets[:-1]) / cells.lengths[:, None]
+        spoke = np.ascontiguousarray((corner - middle.take(cells.row, axis=0)).T)
+        triangle = cross_first(spoke, spoke.take(cells.next(), axis=1))
+        return float(np.sqrt(dot_first(triangle, triangle)).sum()) / 2
 
     def labels(self) -> list[str]:
         """Ring and place, as ``R03-P017``; at least two and three digits."""

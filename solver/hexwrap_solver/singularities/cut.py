@@ -10,6 +10,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from hexwrap_solver.arrays import Ints
+from hexwrap_solver.errors import ConvergenceError
 from hexwrap_solver.surface.topology import half_edges
 from hexwrap_solver.surface.types import Surface
 
@@ -30,8 +31,8 @@ class Branches:
 
 
 def branches(surface: Surface, root: int, leaves: Ints, loops: tuple[Ints, ...]) -> Branches:
-    """Shortest paths that pass through no leaf and along no loop. Raises ValueError where one cannot be
-    reached."""
+    """Shortest paths that pass through no leaf and along no loop. Raises ConvergenceError where one cannot
+    be reached."""
     n = len(surface.vertices)
     ends = np.zeros(n, dtype=bool)
     ends[leaves] = True
@@ -53,7 +54,10 @@ def branches(surface: Surface, root: int, leaves: Ints, loops: tuple[Ints, ...])
         while at != root:
             towards = int(before[at])
             if towards < 0:
-                raise ValueError(f"no path from vertex {root} to vertex {start} that keeps off the boundary")
+                raise ConvergenceError(
+                    "The mesh is too coarse for its singularities: no path along its edges joins them all "
+                    "without running through another one or along the boundary. Refine it first."
+                )
             h = half_edge(at, towards)
             path.append(h)
             taken[h] = taken.get(h, 0) + 1

@@ -8,7 +8,7 @@ its Hessian at the solution without singularities tells what any of them would d
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -38,13 +38,19 @@ NOTHING = 1e-6
 
 @dataclass(frozen=True)
 class Steepness:
-    """pairs: (k, 2) neighbouring patches. inverse: (k,) inverse distances between their middles. share: how
-    pairs add up to patches, a sparse (p, k) matrix. The mean squared slope of a linear function towards the
-    neighbours is half its squared gradient."""
+    """patches: their number p. pairs: (k, 2) neighbouring ones. inverse: (k,) inverse distances between their
+    middles. The mean squared slope of a linear function towards neighbours is half its squared gradient."""
 
+    patches: int
     pairs: Ints
     inverse: Floats
-    share: csr_array
+
+    @cached_property
+    def share(self) -> csr_array:
+        """How pairs add up to patches, (p, k)."""
+        degree = np.maximum(np.bincount(self.pairs.ravel(), minlength=self.patches), 1)
+        row, pair = self.pairs.T.ravel(), np.tile(np.arange(len(self.pairs)), 2)
+        return csr_array((1.0 / degree[row], (row, pair)), shape=(self.patches, len(self.pairs)))
 
     def of(self, u: Floats) -> Floats:
         """(p, …) norm of the gradient of functions u (p, …)."""
@@ -59,11 +65,7 @@ class Steepness:
         edge = np.sort(np.stack([one.ravel(), other.ravel()], axis=1), axis=1)
         pairs = np.unique(edge[edge[:, 0] != edge[:, 1]], axis=0).reshape(-1, 2)
         far = np.linalg.norm(middle[pairs[:, 0]] - middle[pairs[:, 1]], axis=1)
-        at, n = np.arange(len(pairs)), len(middle)
-        degree = np.maximum(np.bincount(pairs.ravel(), minlength=n), 1)
-        row = pairs.T.ravel()
-        share = csr_array((1.0 / degree[row], (row, np.concatenate([at, at]))), shape=(n, len(pairs)))
-        return cls(pairs, 1 / np.maximum(far, TINY), share)
+        return cls(len(middle), pairs, 1 / np.maximum(far, TINY))
 
 
 @dataclass(frozen=True)
@@ -107,6 +109,10 @@ class Model:
     def size(self) -> Ints:
         """(q,) singularities per seat."""
         return np.ones(len(self.seat), dtype=np.int64) if self.orbits is None else self.orbits.lengths
+
+    def on(self, kept: Bools) -> Model:
+        """With fewer seats. kept: (q,) of a model without orbits and turns."""
+        return replace(self, seat=self.seat[kept], place=self.place[kept], response=self.response[:, kept])
 
 
 def vertex_areas(surface: Surface) -> Floats:

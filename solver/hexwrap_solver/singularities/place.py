@@ -64,10 +64,12 @@ def place(
         if rules.apart > NEAREST:
             near = NEAREST / rules.apart
             return place(surface, replace(rules, apart=NEAREST, opposite=near * rules.opposite), count, tube)
+        n = len(surface.vertices)
+        few = f" The mesh has {n} vertices for them to stand at: refine it first." if n < rules.most else ""
         raise SingularitiesError(
             f"No {rules.most} singularities or fewer can make the angles of this surface add up, "
             f"{_index_rule(rules)}, and stand {rules.apart:g} cells apart (a cell is {rules.cell:.3g} wide): "
-            "smaller cells, smaller distances from boundary and folds, or more singularities would help."
+            f"smaller cells, smaller distances from boundary and folds, or more of them would help.{few}"
         )
     chosen = _choice(proposals, count)
     if proposals[chosen].count and not rules.symmetric:

@@ -178,19 +178,34 @@ class Search:
             crowd += self._close[int(index * k > 0)][seat]
         return np.asarray(crowd == 0)
 
-    def additions(self, state: State, k: int, most: int) -> list[tuple[float, State]]:
-        """The best ways to add a singularity of index k, loops changed along with it."""
-        values = _Drafts(self, [state]).with_one_more(np.array([float(k)]))[0]
+    def additions(self, states: list[State], kinds: list[int], most: int) -> list[tuple[float, State]]:
+        """The best ways to add a singularity of each of these indices to each, loops changed along."""
+        found: list[list[tuple[float, State]]] = [[] for _ in states]
+        for begin in range(0, len(states), self._together):
+            some = states[begin : begin + self._together]
+            drafts = _Drafts(self, some)
+            for k in kinds:
+                values = drafts.with_one_more(np.full(len(some), float(k)))
+                for i, state in enumerate(some):
+                    found[begin + i] += self._least_of(values[i], state, k, most)
+        return [one for ways in found for one in ways]
+
+    def _least_of(self, values: Floats, state: State, k: int, most: int) -> list[tuple[float, State]]:
+        """values: (moves, q) with one more of index k."""
         if not values.size:
             return []
-        best = np.argpartition(values.ravel(), min(most, values.size) - 1)[:most]
-        found = []
-        for i in best:
-            move, seat = divmod(int(i), self.seats)
+        ways = []
+        for i in np.argpartition(values.ravel(), min(most, values.size) - 1)[:most].tolist():
+            move, seat = divmod(i, self.seats)
             if np.isfinite(values[move, seat]):
                 more = State.of([*state.pairs, (seat, k)], _plus(state.loops, self.moves[move]))
-                found.append((float(values[move, seat]), more))
-        return sorted(found, key=lambda one: (one[0], one[1].seat, one[1].loops))
+                ways.append((float(values[move, seat]), more))
+        return sorted(ways, key=lambda one: (one[0], one[1].seat, one[1].loops))
+
+    @property
+    def _together(self) -> int:
+        """States whose values are held at a time."""
+        return max(1, TOGETHER // max(len(self.moves) * self.seats, 1))
 
     @property
     def least(self) -> float:
@@ -201,9 +216,8 @@ class Search:
         """States with equally many singularities: each of these relocated with the others held, loops changed
         by one, until nothing gains."""
         found: list[tuple[float, State]] = []
-        together = max(1, TOGETHER // max(len(self.moves) * self.seats, 1))
-        for begin in range(0, len(states), together):
-            drafts = _Drafts(self, states[begin : begin + together])
+        for begin in range(0, len(states), self._together):
+            drafts = _Drafts(self, states[begin : begin + self._together])
             drafts.settle(self.least)
             found += [(self.value(state), state) for state in drafts.states]
         return found
@@ -477,9 +491,8 @@ def ranked(search: Search, starts: int = STARTS, refine: bool = True) -> Iterato
         if number > search.rules.enough:
             starts, promising = min(starts, FEW), 1
         if number:
-            added = [
-                one for one in _additions(search, beam, kinds) if search.count_of(one[1]) <= search.rules.most
-            ]
+            added = search.additions([state for _, state in beam], kinds, TRIED)
+            added = [one for one in added if search.count_of(one[1]) <= search.rules.most]
             beam = [
                 one for group in _grouped(search, added, number) for one in _best(search, group, rng, starts)
             ]
@@ -492,12 +505,6 @@ def ranked(search: Search, starts: int = STARTS, refine: bool = True) -> Iterato
         yield [state for _, state in whole]
         grouped = {state for _, state in beam[:BEAM]} | {state for _, state in whole[:1]}
         beam = [(search.value(state), state) for state in sorted(grouped, key=lambda state: state.seat)]
-
-
-def _additions(
-    search: Search, beam: list[tuple[float, State]], kinds: list[int]
-) -> list[tuple[float, State]]:
-    return [one for _, state in beam for k in kinds for one in search.additions(state, k, TRIED)]
 
 
 def _grouped(

@@ -10,6 +10,8 @@ from hexwrap_solver.tolerances import RELATIVE
 
 #: Patches whose sizes differ by less than this (relatively) count as one.
 ALIKE = 2e-3
+#: Values of u that are told apart within a patch.
+WITHIN = 5
 #: Sizes are told apart in this many steps when many states are compared.
 STEPS = 64
 
@@ -32,6 +34,13 @@ def uncovered_by(u: Floats, weight: Floats, most: int) -> Floats:
     length = np.exp((there + 0.5) * ALIKE)
     made = partition_by_area(length, most, share[there] / length**2)
     return np.asarray(made.loss[np.minimum(np.arange(most), len(made.loss) - 1)] / share.sum())
+
+
+def within(u: Floats, slope: Floats, area: Floats) -> tuple[Floats, Floats]:
+    """u and shares of the area where it varies by a slope over each of the patches, (p,) all: as if they were
+    squares that it crosses straight."""
+    across = ((np.arange(WITHIN) + 0.5) / WITHIN - 0.5)[:, None] * np.sqrt(area)
+    return (u + across * slope).ravel(), np.tile(area / (WITHIN * area.sum()), WITHIN)
 
 
 def uncovered_of_many(u: Floats, weight: Floats, sizes: int) -> Floats:

@@ -21,6 +21,7 @@ from hexwrap_solver.errors import ConvergenceError, NotAdaptedError, Singulariti
 from hexwrap_solver.pattern.lattice import LATTICES, Lattice
 from hexwrap_solver.pattern.place.placement import edge_angle, is_straight
 from hexwrap_solver.pattern.place.rows import rows_along
+from hexwrap_solver.pattern.place.sense import too_many
 from hexwrap_solver.pattern.place.size import (
     DEFAULT_ON_NETS,
     face_areas,
@@ -93,7 +94,8 @@ def frame_of(
     pattern: PatternSettings | None,
     sizes: int | None,
 ) -> Frame:
-    """Raises RequestError; SingularitiesError where the pattern cannot have what is asked for."""
+    """Raises RequestError; SingularitiesError where the pattern cannot have what is asked for; PatternError
+    where its cells would be too many."""
     pattern = pattern or PatternSettings()
     if pattern.rotation in ("u", "v"):
         pattern = replace(pattern, rotation="edge")
@@ -162,10 +164,13 @@ def _parts_left(lattice: Lattice, k: int) -> int:
 
 def _lines(surface: Surface, settings: SingularitySettings, width: float) -> tuple[tuple[Floats, float], ...]:
     """Polylines to keep away from, with how many cells: creases, unless these are everywhere, as on a faceted
-    surface, the rims of filled openings, and the curves that were asked for."""
+    surface, or all vertices lie on them, as on a coarse box; the rims of filled openings, and the curves that
+    were asked for."""
     creases = [surface.vertices[feature.vertices] for feature in surface.features]
     length = sum(float(np.linalg.norm(np.diff(crease, axis=0), axis=1).sum()) for crease in creases)
-    if 2 * length * settings.from_features * width > FACETED * vertex_areas(surface).sum():
+    creased = {v for feature in surface.features for v in feature.vertices.tolist()}
+    is_faceted = 2 * length * settings.from_features * width > FACETED * vertex_areas(surface).sum()
+    if is_faceted or len(creased) == len(surface.vertices):
         creases = []
     asked = [(np.array(one.line, dtype=float), one.distance) for one in settings.keep_off]
     creases += [surface.vertices[edge] for edge in rims(surface)]
@@ -225,6 +230,9 @@ def _width(
     """Of a cell: the shortest translation of the lattice, model units."""
     if pattern.edge_length is not None:
         edge = pattern.edge_length
+        cells = float(vertex_areas(surface).sum()) / (lattice.cell_area * (edge / lattice.edge) ** 2)
+        if cells > pattern.max_cells:  # before singularities are moved over so many
+            raise too_many(surface, pattern, cells)
     elif tube is not None:
         on_surface, in_domain = face_areas(tube)  # as many cells as without singularities
         edge = wanted_edge(tube, lattice, pattern, angle) * float(np.sqrt(on_surface.sum() / in_domain.sum()))

@@ -3,7 +3,9 @@
 A cap is a flat or nearly flat region of faces, bounded by sharp folds all around, above whose rim nothing
 else of the surface rises. A closed prism has many such regions: its walls are some, too. Ends of a tube do
 not touch each other, and look in opposite directions; of several such pairs the upright one is taken, unless
-the mass lies: is much longer in another direction than in all others, as a bar is and a slab is not.
+the mass lies: is much longer in another direction than in all others, as a bar is and a slab is not. Slopes
+that meet at a ridge are a roof, not caps: a house loses its floor alone. A plate, as a roof slab or a thick
+wall, has two sides; of these one is left.
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from hexwrap_solver.arrays import Bools, Floats, Ints
-from hexwrap_solver.geometry import angles_between, face_normals, normalize
+from hexwrap_solver.geometry import angles_between, dot, face_normals, normalize
 from hexwrap_solver.surface.orient import is_inside_out
 from hexwrap_solver.surface.topology import boundary_loops, face_graph, half_edges, sum_rows
 from hexwrap_solver.surface.types import Triangles
@@ -37,6 +39,9 @@ UPRIGHT = np.sqrt(0.5)
 LONGER = 2.5
 #: More flat regions than this make a faceted surface, not a mass with caps.
 MOST = 60
+#: A plate is thinner than this part of the root of its area; its sides are alike up to a factor, and their
+#: area vectors cancel up to this part of their area. If each is smaller than that, the plate goes all around.
+THIN, EQUAL, FACING = 0.04, 0.75, 0.2
 #: Walls that fall apart into more tubes than this are not a building with courtyards.
 MOST_TUBES = 20
 #: Walls around a courtyard stand: they lean by no more than this, radians; else the block is a ring.
@@ -71,7 +76,12 @@ def caps_of(mesh: Triangles) -> tuple[list[Cap], str]:
         return [], ""
     if is_inside_out(mesh.vertices, mesh.faces, mesh.twin):
         mesh = Triangles(mesh.vertices, mesh.faces[:, [0, 2, 1]])
-    found = _regions(mesh)
+    region, total = _smooth(mesh)
+    if not loops:
+        plate, sentence = _plate(mesh, region, total)
+        if plate:
+            return plate, sentence
+    found = _regions(mesh, region, total)
     pairs = [pair for pair in combinations(found, 2) if _is_pair(*pair)]
     upright = [pair for pair in pairs if all(abs(cap.normal[2]) > UPRIGHT for cap in pair)]
     chosen: list[Cap] = []
@@ -80,14 +90,17 @@ def caps_of(mesh: Triangles) -> tuple[list[Cap], str]:
             chosen = list(max(upright, key=_length))
         else:
             chosen = _opposite(mesh, found, loops[0])
-    elif pairs:
-        best, *others = sorted(pairs, key=_length, reverse=True)
-        if upright and any(_length(best) <= LONGER * _length(pair) for pair in others):
-            best = max(upright, key=_length)
-        chosen = list(best)
     else:
         low = [cap for cap in found if cap.normal[2] < -UPRIGHT]
         chosen = low[:1] if len(low) == 1 else found if len(found) == 1 else []
+        if pairs:
+            best, *others = sorted(pairs, key=_length, reverse=True)
+            across = [_length(pair) for pair in others] or [np.sqrt(cap.area) for cap in low]
+            lies = all(_length(best) > LONGER * x for x in across)
+            if upright and not lies:
+                chosen = [end for end in max(upright, key=_length) if not _is_roof(end, found)]
+            elif lies or len(low) != 1:
+                chosen = list(best)
     keep = kept(mesh, chosen)
     if not chosen or not keep.any():
         return [], ""
@@ -108,8 +121,8 @@ def caps_of(mesh: Triangles) -> tuple[list[Cap], str]:
     return [*chosen, court], _sentence(chosen, len(pairs)) + sentence
 
 
-def _regions(mesh: Triangles) -> list[Cap]:
-    """All flat regions that could be caps, the largest first."""
+def _smooth(mesh: Triangles) -> tuple[Ints, Floats]:
+    """(m,) the region without sharp folds that each face is in, and (k, 3) twice their area vectors."""
     m = len(mesh.faces)
     area2 = face_normals(mesh.vertices, mesh.faces)
     normal = normalize(area2)
@@ -117,9 +130,42 @@ def _regions(mesh: Triangles) -> list[Cap]:
     one, two = h // 3, mesh.twin[h] // 3
     smooth = angles_between(normal[one], normal[two]) <= SHARP
     graph = coo_array((np.ones(int(smooth.sum()), dtype=np.int8), (one[smooth], two[smooth])), shape=(m, m))
-    count, region = connected_components(graph, directed=False)
-    total = sum_rows(area2, region.astype(np.int64), count)
-    size = np.linalg.norm(total, axis=1)
+    count, label = connected_components(graph, directed=False)
+    region = np.asarray(label, dtype=np.int64)
+    return region, sum_rows(area2, region, count)
+
+
+def _plate(mesh: Triangles, region: Ints, total: Floats) -> tuple[list[Cap], str]:
+    """All of a plate but its upper side, or the larger one where it stands or goes around, and a sentence."""
+    area = np.bincount(region, mesh.areas)
+    one, two = np.argsort(-area, kind="stable")[[0, min(1, len(area) - 1)]]
+    facing = np.linalg.norm(total, axis=1) / 2
+    points = mesh.vertices[mesh.faces]
+    points = points - points.mean(axis=(0, 1))
+    volume = float(dot(points[:, 0], np.cross(points[:, 1], points[:, 2])).sum()) / 6
+    both = area[one] + area[two]
+    thick = 2 * volume / both
+    if (
+        thick > THIN * np.sqrt(area[two])
+        or area[two] < EQUAL * area[one]
+        or both < EQUAL * area.sum()
+        or np.linalg.norm(total[one] + total[two]) / 2 > FACING * area[two]
+    ):
+        return [], ""
+    is_open = facing[two] > FACING * area[two]
+    side = two if is_open and total[two, 2] > 2 * UPRIGHT * facing[two] else one
+    rest = np.flatnonzero(region != side)
+    name = _side(total[side] / 2 / facing[side]) if is_open else "outside"
+    what = f"The mass is a plate, {length(thick)} thick, of which the {name}"
+    off = Cap(rest, np.zeros(3), np.zeros(3), 0.0, rest[:0])
+    return [off], f'{what} is panelized; surface.caps "keep" leaves all of it.'
+
+
+def _regions(mesh: Triangles, region: Ints, total: Floats) -> list[Cap]:
+    """All flat regions that could be caps, the largest first."""
+    area2 = face_normals(mesh.vertices, mesh.faces)
+    normal = normalize(area2)
+    count, size = len(total), np.linalg.norm(total, axis=1)
     lean = np.zeros(count)
     np.maximum.at(lean, region, angles_between(normal, total[region]) * (np.linalg.norm(area2, axis=1) > 0))
     likely = np.flatnonzero((lean <= SHALLOW) & (size > 1e-6 * size.sum()))
@@ -149,8 +195,21 @@ def _regions(mesh: Triangles) -> list[Cap]:
 
 
 def _is_pair(one: Cap, two: Cap) -> bool:
-    apart = len(np.intersect1d(one.vertices, two.vertices)) == 0
-    return apart and float(one.normal @ two.normal) < -OPPOSITE
+    return _are_apart(one, two) and float(one.normal @ two.normal) < -OPPOSITE
+
+
+def _is_roof(cap: Cap, found: list[Cap]) -> bool:
+    """Whether another region that looks up, or down, as it does meets it."""
+    return any(
+        other is not cap
+        and min(other.normal[2] * np.sign(cap.normal[2]), abs(cap.normal[2])) > UPRIGHT
+        and not _are_apart(cap, other)
+        for other in found
+    )
+
+
+def _are_apart(one: Cap, two: Cap) -> bool:
+    return len(np.intersect1d(one.vertices, two.vertices)) == 0
 
 
 def _length(pair: Iterable[Cap]) -> float:
@@ -163,13 +222,13 @@ def _opposite(mesh: Triangles, found: list[Cap], loop: Ints) -> list[Cap]:
     rim = mesh.vertices[loop]
     out = []
     for cap in found:
-        if len(np.intersect1d(cap.vertices, loop)):
-            continue
+        if len(np.intersect1d(cap.vertices, loop)) or 2 * cap.area > mesh.areas.sum():
+            continue  # of a canopy the fascia alone would be left
         height = mesh.vertices[np.unique(mesh.faces)] @ cap.normal
         low, high = float(height.min()), float(height.max())
         away = cap.centre - rim.mean(axis=0)
         ends = (rim @ cap.normal).max() <= low + END * (high - low)
-        cut_into = any(len(np.intersect1d(other.vertices, loop)) for other in found)
+        cut_into = any(np.isin(loop, other.vertices).all() for other in found)
         if ends and not cut_into and float(away @ cap.normal) > UPRIGHT * float(np.linalg.norm(away)):
             out.append(cap)
     return out if len(out) == 1 else []

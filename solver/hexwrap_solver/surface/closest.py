@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from hexwrap_solver.arrays import Floats, Ints
-from hexwrap_solver.geometry import dot
+from hexwrap_solver.arrays import Bools, Floats, Ints
+from hexwrap_solver.geometry import dot, dot_first
 from hexwrap_solver.tolerances import RELATIVE
 
 #: Points searched together, pairs of points and triangles looked at together, and compared together; they
@@ -143,111 +143,128 @@ class TriangleTree:
         last time keep what was found then.
         """
         last: tuple[Floats, Ints, Ints, Floats] | None = self.__dict__.get("_last")
+        place = np.ascontiguousarray(points.T)
         if last is None or len(last[3]) != rows or not np.array_equal(last[1], row):
-            greatest = self._farthest(points, row, rows, near, twin)
+            greatest = self._farthest(place, row, rows, near, twin)
         else:
-            changed = np.zeros(rows, dtype=bool)
-            changed[row[(points != last[0]).any(axis=1) | (near != last[2])]] = True
-            some, place = np.flatnonzero(changed.take(row)), np.cumsum(changed) - 1
-            greatest = last[3].copy()
+            changed, greatest = np.zeros(rows, dtype=bool), last[3].copy()
+            changed[row[(place != last[0]).any(axis=0) | (near != last[2])]] = True
+            some, at = np.flatnonzero(changed.take(row)), np.cumsum(changed) - 1
             greatest[changed] = self._farthest(
-                points[some], place.take(row[some]), int(changed.sum()), near[some], twin
+                place.take(some, axis=1), at.take(row.take(some)), int(changed.sum()), near.take(some), twin
             )
         # as a cached property would be
-        self.__dict__["_last"] = tuple(one.copy() for one in (points, row, near, greatest))
+        self.__dict__["_last"] = tuple(one.copy() for one in (place, row, near, greatest))
         return greatest
 
     def _farthest(self, points: Floats, row: Ints, rows: int, near: Ints, twin: Ints) -> Floats:
+        """points: (3, k), as below: NumPy runs along them."""
         near, bound = self._walked(points, near, twin)
         greatest = np.full(rows, -1.0)
         np.maximum.at(greatest, row, bound)
-        first = np.flatnonzero(bound == greatest.take(row))
+        first = bound == greatest.take(row)
         greatest[:] = 0.0
-        greatest[row[first]] = self._least_distance(points[first], near[first], bound[first])
-        rest = np.flatnonzero(bound > greatest.take(row))
-        np.maximum.at(greatest, row[rest], self._least_distance(points[rest], near[rest], bound[rest]))
+
+        def search(which: Bools) -> None:
+            some = np.flatnonzero(which)
+            found = self._least_distance(points.take(some, axis=1), near.take(some), bound.take(some))
+            np.maximum.at(greatest, row.take(some), found)
+
+        search(first)
+        search(bound > greatest.take(row))
         return greatest
 
     def _walked(self, points: Floats, face: Ints, twin: Ints) -> tuple[Ints, Floats]:
-        """(k,) triangles nearer to the points (k, 3), as a rule, than those given, and the distances from
-        them: while a point lies beyond a side of its own, the one across is next."""
-        face, left = face.copy(), np.arange(len(face))
-        placed = self._placed(points, face)
+        """(k,) triangles nearer to the points (3, k), as a rule, than those given, and the distances from
+        them: while a point lies beyond a side of its own, the one across is next, unless it came from there.
+        """
+        face, before, left = face.copy(), np.full(len(face), -1), np.arange(len(face))
+        placed = here = self._placed(points, face)
         for _ in range(MOST_STEPS):
-            second, third, _ = placed.take(left, axis=1)
-            weight = np.stack([1 - second - third, second, third])
-            beyond = np.flatnonzero(weight.min(axis=0) < 0)
-            left, side = left.take(beyond), weight.take(beyond, axis=1).argmin(axis=0)
+            second, third, _ = here
+            beyond = np.flatnonzero((second < 0) | (third < 0) | (second + third > 1))
+            left, second, third = (of.take(beyond) for of in (left, second, third))
+            side = np.stack([1 - second - third, second, third]).argmin(axis=0)
+            now = face.take(left)
             # the half-edge from the next corner on lies opposite
-            across = twin.take(3 * face.take(left) + (side + 1) % 3)
-            left, across = left[across >= 0], across[across >= 0]
-            if not len(left):
+            across = twin.take(3 * now + (side + 1) % 3)
+            on = np.flatnonzero((across >= 0) & (across // 3 != before.take(left)))
+            if not len(on):
                 break
-            face[left] = across // 3
-            placed[:, left] = self._placed(points.take(left, axis=0), face.take(left))
+            left = left.take(on)
+            before[left], face[left] = now.take(on), across.take(on) // 3
+            here = self._placed(points.take(left, axis=1), face.take(left))
+            placed[:, left] = here
         return face, self._distance(points, face, placed=placed)
 
     def _least_distance(self, points: Floats, near: Ints, bound: Floats) -> Floats:
         """(k,) distances from the mesh. bound: from the triangles near (k,); where these are not near, the
         search begins elsewhere."""
-        corners = self.corners.take(near, axis=0)
-        close = bound <= np.abs(corners[:, 1] - corners[:, 0]).max(axis=1)
-        some, least = points[close], bound.copy()
-        scale = np.maximum(np.abs(some).max(axis=1, initial=0.0), np.abs(self.corners).max())
+        start, end, _ = self._corner.take(near, axis=2)
+        close = bound <= np.abs(end - start).max(axis=0)
+        some, least = points[:, close], bound.copy()
+        scale = np.maximum(np.abs(some).max(axis=0, initial=0.0), np.abs(self._corner).max())
         reach = bound[close] * (1 + RELATIVE) + ROUNDINGS * np.finfo(float).eps * scale
-        found = self._around(some, near[close], reach) if len(some) else None
+        found = self._around(some, near[close], reach) if len(reach) else None
         if found is None:
             close[:] = False
         else:
             point, leaf = found
             there = least[close]
-            distance = self._distance(some.take(point, axis=0), self.order.take(leaf), there.take(point))
+            distance = self._distance(some.take(point, axis=1), self.order.take(leaf), there.take(point))
             np.minimum.at(there, point, distance)
             least[close] = there
-        least[~close] = self.nearest(points[~close]).distance
+        if not close.all():
+            least[~close] = self.nearest(points[:, ~close].T).distance
         return least
 
     def _around(self, points: Floats, near: Ints, reach: Floats) -> tuple[Ints, Ints] | None:
-        """The pairs of ``_within``, and others, of points within reach of the triangles near (k,)."""
+        """The pairs of ``_within``, and others, of points (3, k) within reach of the triangles near (k,)."""
         beside, others = np.flatnonzero(reach <= self._margin), np.flatnonzero(reach > self._margin)
         known: _Beside = self.__dict__.get("_beside", _Beside.none(len(self.corners)))
         new = np.unique(near[beside][known.first.take(near[beside]) < 0])
-        low, high = (end(self.corners[new], axis=1).T for end in (np.min, np.max))
-        added = self._meeting(low - self._margin, high + self._margin) if len(new) else _NO_PAIRS
-        searched = self._within(points[others], reach[others]) if len(others) else _NO_PAIRS
+        own = self._corner.take(new, axis=2)
+        low, high = own.min(axis=0) - self._margin, own.max(axis=0) + self._margin
+        added = self._meeting(low, high) if len(new) else _NO_PAIRS
+        searched = self._within(points[:, others].T, reach[others]) if len(others) else _NO_PAIRS
         if added is None or searched is None:
             return None
         if len(new):
             known = known.knowing(new, *added)
             self.__dict__["_beside"] = known  # as a cached property would be
         point, leaf = known.pairs(near[beside])
-        place, reach = points[beside].T, reach[beside]
+        below, above = ((points + way * reach).take(beside, axis=1) for way in (-1, 1))
         for axis in range(3):
-            at, far = place[axis].take(point), reach.take(point)
-            meets = self.low[-1][axis].take(leaf) - at <= far
-            meets &= at - self.high[-1][axis].take(leaf) <= far
-            point, leaf = point[meets], leaf[meets]
-        return np.concatenate([beside.take(point), others.take(searched[0])]), np.append(leaf, searched[1])
+            meets = self.low[-1][axis].take(leaf) <= above[axis].take(point)
+            meets &= self.high[-1][axis].take(leaf) >= below[axis].take(point)
+            kept = np.flatnonzero(meets)
+            point, leaf = point.take(kept), leaf.take(kept)
+        return np.append(beside.take(point), others.take(searched[0])), np.append(leaf, searched[1])
 
     @cached_property
     def _margin(self) -> float:
         return MARGIN * float(np.median(np.ptp(self.corners, axis=1).max(axis=1)))
 
     @cached_property
+    def _corner(self) -> Floats:
+        """(corner, coordinate, m), so that NumPy runs along the triangles."""
+        return np.ascontiguousarray(self.corners.transpose(1, 2, 0))
+
+    @cached_property
     def _frames(self) -> Floats:
-        """(m, 3, 3) what carries an offset from the first corner of a triangle to the barycentric coordinates
-        of the other two and the height above it; not numbers where it has no area."""
+        """(coordinate, 3, m) what carries an offset from the first corner of a triangle to the barycentric
+        coordinates of the other two and the height above it; not numbers where it has no area."""
         ab, ac = self.corners[:, 1] - self.corners[:, 0], self.corners[:, 2] - self.corners[:, 0]
         normal = np.cross(ab, ac)
         square = dot(normal, normal)[:, None]
         with np.errstate(divide="ignore", invalid="ignore"):
             rows = np.cross(ac, normal) / square, np.cross(normal, ab) / square, normal / np.sqrt(square)
-        return np.stack(rows, axis=1)
+        return np.ascontiguousarray(np.stack(rows).transpose(2, 0, 1))
 
     def _placed(self, points: Floats, face: Ints) -> Floats:
         """(3, k) barycentric coordinates for the second and third corner, and height above the triangle."""
-        offset = points - self.corners[:, 0].take(face, axis=0)
-        return np.asarray(np.einsum("kij,kj->ik", self._frames.take(face, axis=0), offset))
+        offset = points - self._corner[0].take(face, axis=1)
+        return dot_first(self._frames.take(face, axis=2), offset[:, None])
 
     def _distance(
         self, points: Floats, face: Ints, most: Floats | float = np.inf, placed: Floats | None = None
@@ -258,8 +275,8 @@ class TriangleTree:
         distance: Floats = np.abs(height)
         outside = ~((second >= 0) & (third >= 0) & (second + third <= 1)) & ~(distance >= most)
         outer = np.flatnonzero(outside)
-        corners = self.corners.take(face.take(outer), axis=0)
-        distance[outer] = nearest_in_triangles(points.take(outer, axis=0), corners)[1]
+        corners = self._corner.take(face.take(outer), axis=2)
+        distance[outer] = np.sqrt(_on_sides(points.take(outer, axis=1), corners)[1].min(axis=0))
         return distance
 
     def _moved_near(self, points: Floats) -> tuple[Ints, Floats]:
@@ -321,8 +338,8 @@ class TriangleTree:
             at = place[axis].take(point)
             outside = np.maximum(self.low[-1][axis].take(leaf) - at, at - self.high[-1][axis].take(leaf))
             square += np.maximum(outside, 0.0) ** 2
-        keep = np.sqrt(square) <= reach.take(point)
-        return point[keep], leaf[keep]
+        kept = np.flatnonzero(np.sqrt(square) <= reach.take(point))
+        return point.take(kept), leaf.take(kept)
 
     def _meeting(self, below: Floats, above: Floats) -> tuple[Ints, Ints] | None:
         """All pairs of a box, (3, k) its ends, and a leaf that it meets, and others; None where several boxes
@@ -350,7 +367,8 @@ class TriangleTree:
             for axis in range(3):
                 meets = self.low[level][axis].take(node) <= high[axis].take(group)
                 meets &= self.high[level][axis].take(node) >= low[axis].take(group)
-                group, node = group[meets], node[meets]
+                kept = np.flatnonzero(meets)
+                group, node = group.take(kept), node.take(kept)
             if len(group) * together > MOST_PAIRS and k > 1:
                 return None
         size = np.minimum(together, k - start)[group]
@@ -377,20 +395,22 @@ def nearest_in_triangles(points: Floats, corners: Floats) -> tuple[Floats, Float
 
 
 def _nearest_on_sides(points: Floats, corners: Floats) -> Floats:
-    best = np.full(len(points), np.inf)
+    way, distance = _on_sides(points.T, corners.transpose(1, 2, 0))
+    side, k = distance.argmin(axis=0), np.arange(len(points))
     barycentric = np.zeros((len(points), 3))
-    for k in range(3):
-        start, along = corners[:, k], corners[:, (k + 1) % 3] - corners[:, k]
-        squared = dot(along, along)
-        t = np.clip(dot(points - start, along) / np.where(squared > 0, squared, 1.0), 0.0, 1.0)
-        gap = start + t[:, None] * along - points
-        distance = dot(gap, gap)
-        nearer = distance < best
-        best = np.where(nearer, distance, best)
-        side = np.zeros((len(points), 3))
-        side[:, k], side[:, (k + 1) % 3] = 1 - t, t
-        barycentric[nearer] = side[nearer]
+    barycentric[k, side], barycentric[k, (side + 1) % 3] = 1 - way[side, k], way[side, k]
     return barycentric
+
+
+def _on_sides(points: Floats, corners: Floats) -> tuple[Floats, Floats]:
+    """(3, k) how far along each side, 0…1 from each corner to the next, the place nearest to the point lies,
+    and its squared distance. points: (coordinate, k); corners: (corner, coordinate, k) of the triangles."""
+    along = (np.roll(corners, -1, axis=0) - corners).swapaxes(0, 1)
+    offset = (points - corners).swapaxes(0, 1)
+    squared = dot_first(along, along)
+    way = np.clip(dot_first(offset, along) / np.where(squared > 0, squared, 1.0), 0.0, 1.0)
+    gap = way * along - offset
+    return way, dot_first(gap, gap)
 
 
 def _morton(points: Floats) -> Ints:

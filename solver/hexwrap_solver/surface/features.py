@@ -35,9 +35,11 @@ class FeatureEdges:
     @classmethod
     def of(cls, mesh: Triangles, features: Sequence[Feature]) -> FeatureEdges:
         """Edges that the mesh does not have are left out."""
-        none = [np.zeros(0, dtype=np.int64)]
-        tail = np.concatenate(none + [f.vertices[:-1] for f in features])
-        head = np.concatenate(none + [f.vertices[1:] for f in features])
+        if not features:
+            none = np.zeros(0, dtype=np.int64)
+            return cls(none, none, none, none, np.zeros(0, dtype=bool))
+        tail = np.concatenate([f.vertices[:-1] for f in features])
+        head = np.concatenate([f.vertices[1:] for f in features])
         count = np.array([len(f.vertices) - 1 for f in features], dtype=np.int64)
         feature = np.repeat(np.arange(len(features)), count)
         last = np.zeros(len(tail), dtype=bool)

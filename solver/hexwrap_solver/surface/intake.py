@@ -5,13 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.sparse.csgraph import connected_components
 
-from hexwrap_solver.arrays import Bools, Ints
+from hexwrap_solver.arrays import Bools, Ints, Ragged
 from hexwrap_solver.errors import SurfaceError
 from hexwrap_solver.surface.caps import caps_of, kept
 from hexwrap_solver.surface.checks import LISTED, check_arrays, check_extent
 from hexwrap_solver.surface.degenerate import flat, repair_flat
-from hexwrap_solver.surface.duplicates import first_of_equals
+from hexwrap_solver.surface.duplicates import equal_faces
 from hexwrap_solver.surface.errors import DegeneratePolygonError, NotOrientableError
 from hexwrap_solver.surface.features import chained, folds, lie_along
 from hexwrap_solver.surface.genus import (
@@ -24,7 +25,8 @@ from hexwrap_solver.surface.genus import (
 )
 from hexwrap_solver.surface.normals import sent_normals
 from hexwrap_solver.surface.orient import flipped
-from hexwrap_solver.surface.topology import vertex_normals
+from hexwrap_solver.surface.pieces import divided
+from hexwrap_solver.surface.topology import face_graph, vertex_normals
 from hexwrap_solver.surface.triangulate import triangulate
 from hexwrap_solver.surface.types import (
     Feature,
@@ -34,7 +36,7 @@ from hexwrap_solver.surface.types import (
     SurfaceSettings,
     Triangles,
 )
-from hexwrap_solver.surface.weld import TOLERANCE, relabelled, weldings
+from hexwrap_solver.surface.weld import TOLERANCE, coincident, relabelled, weldings
 
 
 def surface_from_mesh(sent: SentMesh, settings: SurfaceSettings | None = None) -> Surface:
@@ -47,14 +49,18 @@ def surface_from_mesh(sent: SentMesh, settings: SurfaceSettings | None = None) -
     check_arrays(sent)
     vertices = np.ascontiguousarray(sent.vertices, dtype=float)
     triangles, polygon = triangulate(vertices, sent.faces)
+    # Both sides of a face that was sent twice may be cut along other diagonals.
+    once = (equal_faces(vertices, sent.faces) == np.arange(sent.faces.n_rows))[polygon]
+    triangles, polygon = triangles[once], polygon[once]
     used = _mark(triangles, len(vertices))
     size = float(np.linalg.norm([np.ptp(x) for x in vertices[used].T]))
     check_extent(size)
     refusal: SurfaceError | None = None
     mesh = Triangles(vertices, triangles)
-    for label in weldings(mesh, TOLERANCE * size):
+    tolerance = TOLERANCE * size
+    for label in weldings(mesh, tolerance):
         try:
-            return _build(sent, mesh, polygon, label, settings)
+            return _build(sent, mesh, polygon, label, tolerance, settings)
         except NotOrientableError:  # without the weld at its seam a Möbius band would pass for a strip
             raise
         except SurfaceError as error:  # less welding may help; else the fullest one's error stands
@@ -90,7 +96,14 @@ class _Draft:
             self.faces, self.polygon = self.faces[keep], self.polygon[keep]
 
 
-def _build(sent: SentMesh, mesh: Triangles, polygon: Ints, label: Ints, settings: SurfaceSettings) -> Surface:
+def _build(
+    sent: SentMesh,
+    mesh: Triangles,
+    polygon: Ints,
+    label: Ints,
+    tolerance: float,
+    settings: SurfaceSettings,
+) -> Surface:
     """The surface that comes of one way of welding: label (n,) the lowest vertex each one is welded to."""
     vertices, n = mesh.vertices, len(mesh.vertices)
     draft = _Draft(relabelled(mesh, label), polygon, [])
@@ -101,11 +114,16 @@ def _build(sent: SentMesh, mesh: Triangles, polygon: Ints, label: Ints, settings
     draft.note(
         welded, "vertex", "vertices", f"{{was}} welded to one within {TOLERANCE:g} of the model's size"
     )
+    twice = sent.faces.n_rows - int(np.count_nonzero(np.diff(polygon, prepend=-1)))
+    draft.note(twice, "face", "faces", "with the same corners as another one {was} left out")
     _drop_collapsed(draft)
+    equal = equal_faces(np.arange(n, dtype=float)[:, None], Ragged.from_table(draft.faces))
     draft.drop(
-        first_of_equals(draft.faces, *draft.mesh.edge_groups),
+        equal == np.arange(len(equal)),
         "with the same corners as another one {was} left out",
     )
+    _drop_copies(draft, sent, tolerance)
+    _divide(draft, tolerance)
     names = SentNames(np.arange(n), draft.polygon, vertices)
     check_edges(draft.faces, *draft.mesh.edge_groups, names)
     _orient(draft, names)
@@ -157,7 +175,8 @@ def _features(surface: Surface, sent: SentMesh, settings: SurfaceSettings) -> tu
     low, high = surface.edge_ends
     n = len(surface.vertices)
     inside = (low * n + high)[np.diff(surface.edge_groups[1]) == 2]
-    keep = np.isin(edges.min(axis=1) * n + edges.max(axis=1), inside)
+    named = edges.min(axis=1) * n + edges.max(axis=1)
+    keep = np.searchsorted(inside, named, side="right") > np.searchsorted(inside, named)  # inside ascends
     keep[keep] = ~lie_along(surface.vertices, edges[keep], wanted.without)
     chains = chained(surface.vertices, edges[keep], fold[keep], rim)
     return tuple(replace(chain, given=sent.creases is not None) for chain in chains)
@@ -203,6 +222,28 @@ def _drop_collapsed(draft: _Draft) -> None:
     if not keep.any():
         raise DegeneratePolygonError("No face has three different corners: send faces that have an area.")
     draft.drop(keep, "without three different corners {was} left out")
+
+
+def _drop_copies(draft: _Draft, sent: SentMesh, tolerance: float) -> None:
+    """Of a mesh in pieces, leaves out faces whose corners are within the tolerance of another one's."""
+    pieces, _ = connected_components(face_graph(draft.mesh.twin), directed=False)
+    if pieces > 1:
+        where = coincident(draft.mesh.vertices, tolerance)[:, None].astype(float)
+        once = equal_faces(where, sent.faces) == np.arange(sent.faces.n_rows)
+        ends = where[draft.faces, 0]
+        small = (ends == np.roll(ends, 1, axis=1)).any(axis=1)  # faces alike in all that is left of them
+        draft.drop(
+            small | once[draft.polygon],
+            f"within {TOLERANCE:g} of the model's size of others {{was}} left out",
+        )
+
+
+def _divide(draft: _Draft, tolerance: float) -> None:
+    """Closes T-junctions: divides open edges at vertices of others that lie on them."""
+    mesh, polygon, _ = divided(draft.mesh, draft.polygon, tolerance)
+    more = len(mesh.faces) - len(draft.faces)
+    draft.note(more, "open edge", "open edges", "{was} divided at vertices of others")
+    draft.mesh, draft.polygon = mesh, polygon
 
 
 def _orient(draft: _Draft, names: SentNames) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from hexwrap_solver.arrays import Bools, Floats, Ints
-from hexwrap_solver.geometry import dot, face_normals
 from hexwrap_solver.surface.topology import half_edges, spanning_tree
 from hexwrap_solver.surface.types import Surface
 
@@ -69,16 +68,4 @@ def is_inside_out(vertices: Floats, faces: Ints, twin: Ints) -> bool:
 def inward_note(surface: Surface) -> tuple[str, ...]:
     """A sentence where an open tube looks inwards beyond doubt; it is left as it was sent."""
     ends = len(surface.loops) - surface.openings
-    if ends != 2:
-        return ()
-    vertices, faces = [surface.vertices], [surface.faces]
-    for loop in surface.loops:  # the surface is on their left, and so the cones are on their right
-        middle = np.full(len(loop), sum(map(len, vertices)))
-        vertices.append(surface.vertices[loop].mean(axis=0, keepdims=True))
-        faces.append(np.stack([middle, np.roll(loop, -1), loop], axis=1))
-    place, corner = np.concatenate(vertices), np.concatenate(faces)
-    place -= surface.vertices.mean(axis=0)
-    twice = face_normals(place, corner)
-    volume = float(np.einsum("kd,kd->", place[corner[:, 0]], twice)) / 6
-    area = float(np.sqrt(dot(twice, twice)).sum()) / 2
-    return (INWARD,) if -volume > ENCLOSING * area**1.5 else ()
+    return (INWARD,) if ends == 2 and -surface.enclosed > ENCLOSING else ()

@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 
 from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged
 from hexwrap_solver.geometry import dot, face_areas, normalize
+from hexwrap_solver.surface.duplicates import equal_faces
 from hexwrap_solver.surface.topology import face_graph, half_edges
 from hexwrap_solver.surface.triangulate import triangulate
 from hexwrap_solver.surface.types import SentMesh, Triangles
@@ -20,6 +21,8 @@ from hexwrap_solver.tolerances import TINY
 
 #: Open edges are divided again where a division has made new ones, at most so often.
 ROUNDS = 16
+#: Of edges at which more faces than these meet, none of them hang together.
+MOST_AROUND = 16
 #: Edges lie along each other, and faces on the same side, with at least this cosine.
 ALIGNED = 0.9
 
@@ -55,17 +58,23 @@ class Joint:
 
 
 def pieces(mesh: SentMesh) -> list[Piece]:
-    """The pieces of a mesh whose equal vertices count as one, the largest first. Raises SurfaceError."""
-    triangles, polygon = triangulate(mesh.vertices, mesh.faces)
+    """The pieces of a mesh whose equal vertices count as one, the largest first. Raises SurfaceError.
+
+    Faces that repeat others belong to the pieces of these. Where more than two faces meet at an edge, as at
+    a floor, those two hang together that run straight on, if any do.
+    """
+    alone, same = np.unique(equal_faces(mesh.vertices, mesh.faces), return_inverse=True)
+    triangles, polygon = triangulate(mesh.vertices, only(mesh, alone).faces)
     size = float(np.linalg.norm(np.ptp(mesh.vertices[triangles.ravel()], axis=0)))
     welded = Triangles(mesh.vertices, triangles)
     welded = relabelled(welded, weldings(welded, TOLERANCE * size)[0])
-    _, piece = connected_components(face_graph(welded.twin), directed=False)
+    twin = _straight_on(welded)
+    _, piece = connected_components(face_graph(twin), directed=False)
     # A quad may fall apart where one of its triangles has no area: the first triangle counts.
-    first = np.flatnonzero(np.diff(polygon, prepend=-1))
+    first = np.flatnonzero(np.diff(polygon, prepend=-1))[same]
     count = int(piece.max()) + 1
     area = np.bincount(piece, face_areas(mesh.vertices, triangles), count)
-    rim = np.flatnonzero(welded.twin < 0)
+    rim = np.flatnonzero(twin < 0)
     start, end = (side[rim] for side in half_edges(welded.faces))
     kept = start != end
     rim, start, end = rim[kept], start[kept], end[kept]
@@ -94,6 +103,32 @@ def pieces(mesh: SentMesh) -> list[Piece]:
         for i, k in enumerate(held.tolist())
     ]
     return sorted(found, key=lambda piece: -piece.area)
+
+
+def _straight_on(mesh: Triangles) -> Ints:
+    """The twins of the half-edges, with those of the two straightest faces where more than two meet."""
+    order, first = mesh.edge_groups
+    many = np.diff(first)
+    twin = mesh.twin.copy()
+    is_collapsed = (mesh.faces == mesh.faces[:, [1, 2, 0]]).any(axis=1)
+    for size in np.unique(many[(many > 2) & (many <= MOST_AROUND)]).tolist():
+        group = order[first[:-1][many == size][:, None] + np.arange(size)]
+        inward = _inward(mesh.vertices, mesh.faces, group.ravel()).reshape(*group.shape, 3)
+        inward[is_collapsed[group // 3]] = 0  # neither straight on from anything
+        cosine = (inward @ inward.transpose(0, 2, 1)).reshape(len(group), -1)
+        best, row = cosine.argmin(axis=1), np.arange(len(group))
+        straight = cosine[row, best] < -ALIGNED
+        one, two = group[row, best // size][straight], group[row, best % size][straight]
+        twin[one], twin[two] = two, one
+    return twin
+
+
+def _inward(vertices: Floats, faces: Ints, h: Ints) -> Floats:
+    """(k, 3) unit vectors square to half-edges, into their faces."""
+    start, end = (side[h] for side in half_edges(faces))
+    along = normalize(vertices[end] - vertices[start])
+    across = vertices[faces[h // 3, (h + 2) % 3]] - vertices[start]
+    return normalize(across - dot(across, along)[:, None] * along)
 
 
 def only(mesh: SentMesh, faces: Ints) -> SentMesh:
@@ -149,16 +184,17 @@ def joined(mesh: SentMesh, tolerance: float) -> tuple[SentMesh, Ints, Joint]:
     apart = np.linalg.norm(mesh.vertices - mesh.vertices[near], axis=1)
     worst = int(np.argmax(apart))
     joint = Joint(len(moved), float(apart[worst]), _place(mesh.vertices[worst]))
-    faces, source, divided = _divided(mesh.vertices, near[triangles], polygon, tolerance)
-    if joint.count == 0 and divided.count == 0:
+    whole, source, splits = divided(Triangles(mesh.vertices, near[triangles]), polygon, tolerance)
+    if joint.count == 0 and splits.count == 0:
         return mesh, np.arange(mesh.faces.n_rows), joint
+    faces = whole.faces
     m = mesh.faces.n_rows
     more = np.bincount(source, minlength=m) > np.bincount(polygon, minlength=m)
     kept, split = only(mesh, np.flatnonzero(~more)).faces, more[source]
     values = np.concatenate([near[np.asarray(kept.values, dtype=np.int64)], faces[split].ravel()])
     lengths = np.append(kept.lengths, np.full(int(split.sum()), 3))
-    whole = _with_faces(mesh, Ragged(values, np.append(0, np.cumsum(lengths))))
-    return whole, np.append(np.flatnonzero(~more), source[split]), joint.worse(divided)
+    closed = _with_faces(mesh, Ragged(values, np.append(0, np.cumsum(lengths))))
+    return closed, np.append(np.flatnonzero(~more), source[split]), joint.worse(splits)
 
 
 def _place(point: Floats) -> tuple[float, float, float]:
@@ -166,18 +202,20 @@ def _place(point: Floats) -> tuple[float, float, float]:
     return x, y, z
 
 
-def _divided(vertices: Floats, faces: Ints, source: Ints, tolerance: float) -> tuple[Ints, Ints, Joint]:
-    """Triangles whose open edges are divided at open vertices that lie on them."""
-    joint = Joint()
+def divided(mesh: Triangles, source: Ints, tolerance: float) -> tuple[Triangles, Ints, Joint]:
+    """The mesh with open edges divided at open vertices that lie on them; source (m,) of its triangles."""
+    vertices, joint = mesh.vertices, Joint()
     for _ in range(ROUNDS):
-        twin = Triangles(vertices, faces).twin
+        faces = mesh.faces
         start, end = half_edges(faces)
-        rim = np.flatnonzero((twin < 0) & (start != end))
+        rim = np.flatnonzero((mesh.twin < 0) & (start != end))
         h, v, apart = _on_edges(vertices, start[rim], end[rim], tolerance)
-        beside = ~_overlap(vertices, faces, rim, h, v)
+        beside = ~_overlap(vertices, faces, rim, h, v) & (v != faces[rim[h] // 3, (rim[h] + 2) % 3])
         h, v, apart = h[beside], v[beside], apart[beside]
         if len(h) == 0:
             break
+        one = np.unique(h, return_index=True)[1]
+        h, v, apart = h[one], v[one], apart[one]
         joint = joint.worse(Joint(len(h), float(apart.max()), _place(vertices[v[int(np.argmax(apart))]])))
         h, one = rim[h], np.unique(rim[h] // 3, return_index=True)[1]  # one edge of a triangle at a time
         h, v = h[one], v[one]
@@ -187,17 +225,16 @@ def _divided(vertices: Floats, faces: Ints, source: Ints, tolerance: float) -> t
         second = np.stack([v, b, c], axis=1)
         faces = np.concatenate([faces, second])
         faces[face] = first
+        mesh = Triangles(vertices, faces)
         source = np.concatenate([source, source[face]])
-    return faces, source, joint
+    return mesh, source, joint
 
 
 def _overlap(vertices: Floats, faces: Ints, rim: Ints, h: Ints, v: Ints) -> Bools:
     """(k,) whether an open edge at the vertex v lies along the open edge h with its face on the same side of
     it: one covers the other, and they are no two sides of a seam."""
     start, end = (side[rim] for side in half_edges(faces))
-    along = normalize(vertices[end] - vertices[start])
-    across = vertices[faces[rim // 3, (rim + 2) % 3]] - vertices[start]
-    inward = normalize(across - dot(across, along)[:, None] * along)
+    along, inward = normalize(vertices[end] - vertices[start]), _inward(vertices, faces, rim)
     covers = np.zeros(len(h), dtype=bool)
     for side in (start, end):
         at = np.full(len(vertices), -1, dtype=np.int64)
@@ -209,7 +246,8 @@ def _overlap(vertices: Floats, faces: Ints, rim: Ints, h: Ints, v: Ints) -> Bool
 
 
 def _on_edges(vertices: Floats, start: Ints, end: Ints, tolerance: float) -> tuple[Ints, Ints, Floats]:
-    """Edges that an end of another lies on, one such vertex and its distance each; one edge per round."""
+    """Edges that ends of others lie on, these vertices and their distances. Of each edge what is nearest to
+    its middle comes first: divided there, and again, it takes rounds as the logarithm of their number."""
     among = np.unique(np.concatenate([start, end]))
     none = (start[:0], start[:0], vertices[:0, 0])
     if len(among) == 0:
@@ -226,7 +264,6 @@ def _on_edges(vertices: Floats, start: Ints, end: Ints, tolerance: float) -> tup
     apart = np.linalg.norm(vertices[v] - a[edge] - share[:, None] * along[edge], axis=1)
     margin = np.minimum(share, 1 - share) * length[edge]
     hit = (apart <= tolerance) & (margin > tolerance) & (v != start[edge]) & (v != end[edge])
-    edge, v, apart = edge[hit], v[hit], apart[hit]
-    one: Bools = np.zeros(len(edge), dtype=bool)
-    one[np.unique(edge, return_index=True)[1]] = True
-    return edge[one], v[one], apart[one]
+    order = np.flatnonzero(hit)
+    order = order[np.lexsort((abs(share[order] - 0.5), edge[order]))]
+    return edge[order], v[order], apart[order]

@@ -11,7 +11,7 @@ import scipy
 
 from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged
 from hexwrap_solver.errors import SettingError
-from hexwrap_solver.geometry import dot, face_areas, face_normals, normalize
+from hexwrap_solver.geometry import dot, face_areas, face_normals, lengths, normalize, weighted
 from hexwrap_solver.setting import Setting
 from hexwrap_solver.surface.closest import TriangleTree
 from hexwrap_solver.surface.topology import edge_groups, edge_lengths, half_edges, twins_of
@@ -113,7 +113,8 @@ class FeatureSettings:
 class SurfaceSettings:
     """How a sent surface is taken in.
 
-    caps ``drop``: flat caps of a closed mass are taken off. ``keep``: the closed surface is meant.
+    caps ``drop``: flat caps of a closed mass are taken off, and of a plate all but one side. ``keep``: the
+    closed surface is meant.
     openings ``cut``: loops beyond the two longest are filled smoothly, mapped as wall, and cut out again.
     ``loop``: each is a boundary of its own.
     """
@@ -287,16 +288,37 @@ class Surface(Triangles):
         """(k, 3) unit normals on the outside at barycentric coordinates (k, 3) of faces (k,): interpolated
         between those of the vertices, and nowhere further than ``LEAST_COSINE`` from the face's own, as they
         would be beside edges where a coarse mesh folds back."""
-        corner = self.faces[face]
-        normal = normalize(np.einsum("kc,kcd->kd", weights, self.normals[corner]))
-        own = normalize(face_normals(self.vertices, corner))
+        normal = normalize(weighted(self.normals, self.faces[face], weights))
+        own = self.face_normals.take(face, axis=0)
         rise = dot(normal, own)
-        low = np.flatnonzero((rise < LEAST_COSINE) & own.any(axis=1))
+        low = np.flatnonzero(rise < LEAST_COSINE)
+        low = low[own[low].any(axis=1)]
         along = normalize(normal[low] - rise[low, None] * own[low])
         normal[low] = normalize(LEAST_COSINE * own[low] + np.sqrt(1 - LEAST_COSINE**2) * along)
         return normal
 
     @cached_property
+    def face_normals(self) -> Floats:
+        """(m, 3) unit normals of the faces, 0 where one has no area. Not to be written to."""
+        return np.ascontiguousarray(normalize(face_normals(self.vertices, self.faces)))
+
+    @cached_property
     def tree(self) -> TriangleTree:
         """For the nearest points of the mesh."""
         return TriangleTree.build(self.vertices, self.faces)
+
+    @cached_property
+    def enclosed(self) -> float:
+        """Volume that the surface and the cones from its loops to their middles enclose, over (their
+        area)^(3/2); negative where the normals look inwards."""
+        vertices, faces = [self.vertices], [self.faces]
+        for loop in self.loops:  # the surface is on their left, and so the cones are on their right
+            middle = np.full(len(loop), sum(map(len, vertices)))
+            vertices.append(self.vertices[loop].mean(axis=0, keepdims=True))
+            faces.append(np.stack([middle, np.roll(loop, -1), loop], axis=1))
+        place, corner = np.concatenate(vertices), np.concatenate(faces)
+        place -= self.vertices.mean(axis=0)
+        twice = face_normals(place, corner)
+        volume = float(np.einsum("kd,kd->", place[corner[:, 0]], twice)) / 6
+        area = float(lengths(twice).sum()) / 2
+        return float(volume / area**1.5)

@@ -50,6 +50,12 @@ def relabelled(mesh: Triangles, label: Ints) -> Triangles:
     return Triangles(mesh.vertices, label[mesh.faces])
 
 
+def coincident(vertices: Floats, tolerance: float) -> Ints:
+    """(n,) the lowest of the vertices that stand within the tolerance of each other, open or not."""
+    every = np.arange(len(vertices), dtype=np.int64)
+    return _merge(every, *_close(vertices, every, tolerance))
+
+
 def _collapse(mesh: Triangles) -> Ints:
     resolution = ULPS * np.finfo(float).eps * float(np.abs(mesh.vertices).max())
     none = (mesh.lengths <= resolution).ravel()

@@ -123,6 +123,8 @@ def panel_settings():
         "components": {"thickness": 0.1, "depth": 0.3},
     }
     assert json.loads(made.set(Sizes=0).Panels)["panels"]["sizes"] is None
+    fewest = json.loads(Component("Panels").set(MaxGap=0.03).Panels)
+    assert fewest["panels"] == {"sizes": "fewest", "max_gap": 0.03}
 
 
 def wrong_panel_settings_are_refused():
@@ -134,6 +136,7 @@ def wrong_panel_settings_are_refused():
         ({"Target": "largest"}, "shortest, inscribed, best, mean"),
         ({"Mode": "open"}, "split, watertight"),
         ({"Thickness": -1.0}, "Thickness"),
+        ({"MaxGap": -0.1}, "MaxGap"),
     ):
         made = Component("Panels").set(**values)
         assert len(made.said("error")) == 1 and word in made.said("error")[0], made.messages

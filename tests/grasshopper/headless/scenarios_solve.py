@@ -124,6 +124,13 @@ def check_panels(collect):
         assert len(words.split()) == 6
         assert all(word == "-" or word in labels for word in words.split())
     assert "%d panels" % len(panels) in collect.Report and "overlaps: 0" in collect.Report
+    gaps = collect.Gaps.flat()
+    worst = gaps.index(max(gaps))
+    assert any(
+        line.startswith("gap, greatest") and labels[worst] in line for line in collect.Report.split("\n")
+    )
+    assert len(collect.Widest) == 1
+    assert collect.Widest[0].points[0].DistanceTo(panels[worst].points[0]) < 1e-12
 
 
 def surfaces_are_meshed_as_rhino_does():
@@ -160,6 +167,9 @@ def sliders_send_settings_only():
     bodies = spy.bodies("POST", "/v1/jobs")
     assert len(bodies) == 3 and max(len(body) for body in bodies) < 400
     assert json.loads(bodies[1].decode("utf-8"))["panels"] == {"sizes": 3}
+    collected("Collect", Job=send.Job)
+    parts = [path.partition("include=")[2] for _, path, _ in spy.seen if "/result" in path]
+    assert parts == ["panels,pattern,sizes,quality"]
     moved = world.tube(waist=0.45)
     send.set(Mesh=moved)
     settle(send, 8)
@@ -524,6 +534,14 @@ def baked_panels():
     assert set(words for words, _ in model.history) == set(["hexwrap Bake"])
 
 
+def panels_at_wide_gaps_are_shown():
+    send = done(Panels=Component("Panels").set(Sizes=3, MaxGap=0.05).Panels)
+    collect = collected("Collect", Job=send.Job)
+    wide = sorted([gap for gap in collect.Gaps.flat() if gap > 0.05], reverse=True)
+    assert 1 < len(wide) == len(collect.Widest) < len(collect.Panels.flat())
+    assert "panels at wider gaps than MaxGap: %d" % len(wide) in collect.Report
+
+
 def baked_blocks():
     panels = Component("Panels").set(Inset=0.02, Thickness=0.05, Sizes=4)
     send = done(Panels=panels.Panels)
@@ -657,6 +675,7 @@ world.run([
     umlauts_reach_the_server,
     address_on_the_canvas,
     baked_panels,
+    panels_at_wide_gaps_are_shown,
     baked_blocks,
     baking_keeps_in_step_with_a_toggle,
     faults_while_baking_are_one_sentence,

@@ -11,7 +11,8 @@ from scipy.optimize import linprog
 from hexwrap_solver.conformal import conformal_map
 from hexwrap_solver.conformal.types import BoundaryCondition
 from hexwrap_solver.errors import SettingError
-from hexwrap_solver.explore.front import best_of, front_of, non_dominated, to_solve, within
+from hexwrap_solver.explore.foresee import foresee, seated
+from hexwrap_solver.explore.front import best_of, excess, front_of, non_dominated, to_solve
 from hexwrap_solver.explore.predict import outlook, shortened
 from hexwrap_solver.explore.types import Costs, ExploreSettings, Figures, Limits, Vary
 from hexwrap_solver.explore.variants import SPARE, variants
@@ -20,7 +21,10 @@ from hexwrap_solver.panels.types import PanelSettings
 from hexwrap_solver.pattern import lay_pattern
 from hexwrap_solver.pattern.lattice import LATTICES
 from hexwrap_solver.pattern.types import PatternSettings
+from hexwrap_solver.pipeline import PlainRunner
+from hexwrap_solver.surface import with_openings
 from tests.solver.conformal.annuli import bump, catenoid
+from tests.solver.conformal.nets import holed
 
 NEW = ("brick", "truncated-hexagonal", "truncated-square")
 
@@ -106,7 +110,7 @@ def figures(n: int = 400) -> list[Figures]:
 
 def test_no_more_are_solved_than_are_allowed_and_the_ends_are_among_them() -> None:
     found = figures()
-    picked = to_solve(found, 30)
+    picked = to_solve(found, [0.0] * len(found), 30)
     assert len(picked) == len(set(picked.tolist())) == 30
     assert min(one.cost for one in found) == pytest.approx(min(found[i].cost for i in picked), rel=0.01)
     assert min(one.uncovered for one in found) == pytest.approx(
@@ -128,19 +132,26 @@ def test_large_cells_that_leave_the_ends_bare_do_not_look_cheap() -> None:
     large, small = Figures(0.05, 50, 5, 70.0, bare=0.3), Figures(0.05, 200, 5, 100.0, bare=0.05)
     assert best_of([large, small]) == 1
     assert front_of([large, small]).tolist() == [True, True]
-    assert to_solve([large, small]).tolist() == [0, 1]
+    assert to_solve([large, small], [0.0, 0.0]).tolist() == [0, 1]
     assert front_of([large, replace(small, bare=0.29)]).tolist() == [True, False]
 
 
 def test_limits() -> None:
     one = Figures(0.1, 100, 5, 1.0, 0.03)
-    assert within(one, Limits(), 5)
-    assert within(one, Limits(sizes=5, max_gap=0.03, panels=100), 5)
-    assert not within(one, Limits(sizes=4), 5)
-    assert not within(one, Limits(sizes=4), None)
-    assert not within(one, Limits(max_gap=0.02), 5)
-    assert not within(one, Limits(panels=99), 5)
-    assert within(replace(one, gap_max=None), Limits(max_gap=0.02), 5)
+    assert not excess(one, Limits(), 5)
+    assert not excess(one, Limits(sizes=5, max_gap=0.03, panels=100), 5)
+    assert excess(one, Limits(sizes=4), 5) == pytest.approx(0.25)
+    assert excess(one, Limits(sizes=4, panels=50), 5) == pytest.approx(1.25)
+    assert excess(one, Limits(max_gap=0.0), 5) > 1e6
+    assert not excess(replace(one, gap_max=None), Limits(max_gap=0.02), 5)
+    assert not excess(replace(one, gap_max=0.0), Limits(max_gap=0.0), 5)
+
+
+def test_what_comes_nearest_to_limits_is_solved_where_none_keeps_them() -> None:
+    found = [Figures(0.1 + n / 1000, n, 2, 1.0 + n) for n in (300, 102, 100, 200)]
+    near = [excess(one, Limits(panels=10), 2) for one in found]
+    assert to_solve(found, near).tolist() == [2]
+    assert to_solve(found[:0], []).tolist() == []
 
 
 def test_cost_is_the_same_in_every_unit() -> None:
@@ -154,7 +165,6 @@ def test_variants_are_different_within_the_ranges_and_the_same_for_a_seed() -> N
     settings = ExploreSettings(vary=vary, variants=150, seed=4)
     listed = variants(settings, 1.0)
     assert len(listed) == len(set(listed)) == 150 * SPARE
-    assert [one.place for one in listed] == list(range(len(listed)))
     assert variants(settings, 1.0) == listed
     assert variants(replace(settings, seed=5), 1.0) != listed
     assert listed[0].frame.boundary.mode == "auto"  # what would be taken without exploring
@@ -185,3 +195,20 @@ def test_variants_are_different_within_the_ranges_and_the_same_for_a_seed() -> N
 def test_ranges_out_of_order_are_refused(wrong: dict) -> None:
     with pytest.raises(SettingError):
         Vary(**wrong)
+
+
+def test_numbers_of_sizes_beyond_their_limit_are_not_tried() -> None:
+    settings = ExploreSettings(limits=Limits(sizes=3), variants=20)
+    assert {one.sizes for one in variants(settings, 1.0)} == {1, 2, 3}
+    assert {one.sizes for one in variants(replace(settings, vary=Vary(sizes=(5, 9))), 1.0)} == {3, 5}
+
+
+def test_singularities_of_a_wall_with_windows_add_up_with_these_filled() -> None:
+    whole = bump(32, 24)
+    wall = with_openings(holed(whole, whole.vertices[[32 * 12]], 0.35), "cut")
+    settings = ExploreSettings(vary=Vary(boundary=("straight",), singularities=(2, 3)), variants=4)
+    listed = [one for one in variants(settings, 0.15) if one.singularities]
+    parts = seated(lambda: wall, settings, listed[:1], PlainRunner())
+    for at, some in parts:
+        assert sum(one.index for one in at) == 0
+        assert foresee(lambda: wall, settings, at, some, PlainRunner())[0].foreseen is not None

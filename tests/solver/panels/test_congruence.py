@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from hexwrap_solver.arrays import Ragged
 from hexwrap_solver.panels.congruence import congruence_classes
-from hexwrap_solver.panels.polygons import interior_angles
+from hexwrap_solver.panels.polygons import outlines
 from hexwrap_solver.panels.trimmed import plane_normals
 
 KITE = np.array([[0.0, 0, 0], [2, 0, 0], [3, 1, 0], [0, 2, 0]])
@@ -21,7 +21,7 @@ def classes(shapes):
     polygons = Ragged(
         np.concatenate(shapes), np.concatenate([[0], np.cumsum([len(s) for s in shapes])]).astype(np.int64)
     )
-    return congruence_classes(polygons, interior_angles(polygons, plane_normals(polygons))).tolist()
+    return congruence_classes(outlines(polygons, plane_normals(polygons))).tolist()
 
 
 def mirrored(shape):

@@ -12,7 +12,7 @@ from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap
 from hexwrap_solver.panels import fit_panels, make_components, measure, quantize
 from hexwrap_solver.panels.congruence import congruence_classes
 from hexwrap_solver.panels.folds import bend_angles, blanks, parts_of
-from hexwrap_solver.panels.polygons import best_plane_distances, edge_lengths, fan_areas, interior_angles
+from hexwrap_solver.panels.polygons import best_plane_distances, edge_lengths, fan_areas, outlines
 from hexwrap_solver.panels.types import ComponentSettings, Panels, PanelSettings, Quality
 from hexwrap_solver.pattern import lay_pattern
 from hexwrap_solver.pattern.types import Kind, Pattern, PatternSettings
@@ -49,7 +49,7 @@ def test_halves_are_flat_and_of_few_types(kind: Kind, rotation: str) -> None:
     assert quality.overlaps == 0
     assert panels.n_special == panels.divided.sum() <= 4
     assert np.isin(panels.face[panels.divided[panels.size]], pieces).all()
-    shape = congruence_classes(panels.polygons, interior_angles(panels.polygons, panels.normal))
+    shape = congruence_classes(outlines(panels.polygons, panels.normal))
     for size in range(len(panels.class_length)):  # one class, one shape
         assert len(np.unique(shape[panels.size == size])) == 1
 

@@ -64,7 +64,7 @@ def test_what_is_remembered_of_the_partition_changes_nothing(length, asked, weig
     weight = 1 / length if weighted else None
     for classes in asked:
         made = partition_by_area(length, classes, weight)
-    sizes._remembered.clear()
+    sizes._memory = sizes._Memory()
     fresh = partition_by_area(length, asked[-1], weight)
     assert made.loss.tobytes() == fresh.loss.tobytes()
     assert [start.tolist() for start in made.start] == [start.tolist() for start in fresh.start]
@@ -72,11 +72,17 @@ def test_what_is_remembered_of_the_partition_changes_nothing(length, asked, weig
 
 def test_no_more_is_remembered_of_partitions_than_a_bound(monkeypatch):
     monkeypatch.setattr(sizes, "REMEMBERED", 5000)
+    monkeypatch.setattr(sizes, "_memory", sizes._Memory())
+    kept = sizes._memory._kept
     for seed in range(20):
         partition_by_area(np.sort(np.random.default_rng(seed).uniform(1, 2, 200)), 8)
-        assert sum(layers.size for layers in sizes._remembered.values()) <= 5000
+        partition_by_area(np.full(1000, 1.0 + seed), 8)  # all alike: one choice, but a thousand limits
+        partition_by_area(np.full(1, 1.0 + seed), 1)
+        assert 0 < sum(len(limits) for limits, _ in kept) <= 8 * 5000
+        assert sizes._memory._size == sum(sizes._size(*one) for one in kept.items()) <= 5000
     partition_by_area(np.linspace(1, 2, 6000), 8)
-    assert not sizes._remembered
+    assert not kept
+    assert sizes._memory._size == 0
 
 
 @given(limits | tied, st.integers(1, 5), st.integers(0, 10**6))

@@ -255,6 +255,23 @@ def test_a_pattern_winds_where_rows_along_the_boundary_cost_too_much() -> None:
     assert any('With align "none" and boundary "trim"' in note for note in whole.notes)
 
 
+def test_what_a_ledge_costs_is_borne_beside_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A tower of rounded plan with a setback: much at few triangles, little on the average."""
+    t = 2 * np.pi * np.arange(64) / 64
+    way = np.column_stack([np.cos(t), np.sin(t)])
+    corners = np.sign(way) * np.sqrt(abs(way))
+    size = np.r_[np.full(11, 12.0), 11, 10, np.full(11, 9.0)]
+    height = np.r_[np.linspace(0, 20, 11), 20, 20, np.linspace(20, 40, 11)]
+    rings = np.stack([*(np.multiply.outer(size, c) for c in corners.T), np.tile(height, (64, 1)).T], axis=-1)
+    cmap = conformal_map(surface_from_mesh(grid(rings)), BoundaryCondition("straight"))
+    pattern = lay_pattern(cmap, PatternSettings("hex"))
+    assert [feature.straight for feature in pattern.features] == [True, True]
+    assert choose.MOST_PREDICTED < pattern.distortion < 0.3
+    monkeypatch.setattr(choose, "MOST_ON_AVERAGE", 0.0)
+    spread = lay_pattern(cmap, PatternSettings("hex"))
+    assert [feature.straight for feature in spread.features] == [False, True]
+
+
 def test_corners_that_no_lines_of_the_pattern_have_are_named_with_the_least_they_cost(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -12,13 +12,14 @@ from scipy.spatial import KDTree
 
 from hexwrap_solver.arrays import Ragged
 from hexwrap_solver.errors import NotAdaptedError, PatternError
+from hexwrap_solver.geometry import lengths
 from hexwrap_solver.panels.polygons import fan_areas
 from hexwrap_solver.pattern import lay_pattern
 from hexwrap_solver.pattern.lattice import LATTICES
-from hexwrap_solver.pattern.lay_pattern import mean_edge
+from hexwrap_solver.pattern.lay_pattern import area_vectors, mean_edge
 from hexwrap_solver.pattern.place.choose import PlacementFamily, place_lattice
 from hexwrap_solver.pattern.place.placement import BEARABLE
-from hexwrap_solver.pattern.place.size import width_per_cell
+from hexwrap_solver.pattern.place.size import FREE, width_per_cell
 from hexwrap_solver.pattern.types import Pattern, PatternSettings
 from tests.solver.conformal.test_conformal_map import ring_with_corners
 from tests.solver.pattern import annuli
@@ -177,7 +178,8 @@ def test_the_mean_edge_is_that_of_the_cells_wherever_they_stand():
     vertices = np.concatenate([square, 3 * square + [5, 0, 0]])
     faces = Ragged(np.arange(8), np.array([0, 4, 8]))
     for offset in (0.0, 1e6, 1e10):
-        assert mean_edge(vertices + offset, faces) == pytest.approx(2.8, rel=1e-12)
+        area = lengths(area_vectors(faces, vertices + offset))
+        assert mean_edge(vertices + offset, faces, area) == pytest.approx(2.8, rel=1e-12)
 
 
 def short_ring(height):
@@ -221,7 +223,8 @@ def test_whole_cells_of_the_default_size_leave_a_tenth_bare_at_most(kind, inner)
     assert bare < 0.125  # the tenth is a forecast
     assert pattern.n_cells < 3300
     trimmed = lay_pattern(cmap, PatternSettings(kind=kind, align="none", boundary="trim"))
-    assert trimmed.edge_length > 0.95 * pattern.edge_length
+    # whole cells may be larger by FREE, where that fits
+    assert trimmed.edge_length * (1 + FREE) > 0.95 * pattern.edge_length
 
 
 @pytest.mark.parametrize("kind", ["hex", "triangle", "quad"])

@@ -50,6 +50,16 @@ def straight() -> Surface:
     return tube(np.ones(17), 4.0)
 
 
+def gherkin() -> Surface:
+    """Open below, pointed above."""
+    t = np.linspace(0.12, 1, 24)
+    below = tube(6 * np.sin(np.pi * t[:-1]), 25 * (t[-2] - t[0]), 30)
+    tip, rim = len(below.vertices), np.arange(22 * 30, 23 * 30)
+    fan = np.stack([rim, np.roll(rim, -1), np.full(30, tip)], axis=1)
+    apex = [[0, 0, 25 * (t[-1] - t[0])]]
+    return surface_of(np.concatenate([below.vertices, apex]), np.concatenate([below.faces, fan]))
+
+
 def slivers() -> Surface:
     """The waist, its vertices shifted along the rings until many triangles are nearly flat."""
     regular = waist()

@@ -183,3 +183,12 @@ def test_a_mesh_whose_triangles_break_is_split():
     assert vertex_areas(finer).sum() == pytest.approx(vertex_areas(surface).sum())
     sums = energy.angle_sums(found.corners)
     assert sums[300] == pytest.approx(2 * np.pi + 2 * SIXTH, abs=1e-8)
+
+
+def test_singularities_that_shut_each_other_off_are_told():
+    """As on an icosahedron whose vertices are all singular."""
+    surface = shapes.waist()
+    ring = np.unique(surface.faces[(surface.faces == 600).any(axis=1)])
+    leaves = ring[ring != 600]
+    with pytest.raises(ConvergenceError, match="too coarse"):
+        branches(surface, 600, np.append(leaves, 340), tuple(surface.loops))

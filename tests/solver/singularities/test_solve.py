@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from hexwrap_solver.arrays import no_progress
+from hexwrap_solver.arrays import Ragged, no_progress
 from hexwrap_solver.conformal import conformal_map
 from hexwrap_solver.conformal.types import BoundaryCondition
 from hexwrap_solver.errors import ConvergenceError, SingularitiesError
@@ -19,7 +19,8 @@ from hexwrap_solver.pipeline import SolveSettings, solve
 from hexwrap_solver.singularities import solve as module
 from hexwrap_solver.singularities.place import Proposals
 from hexwrap_solver.singularities.types import Proposal, SingularityAt, SingularitySettings
-from hexwrap_solver.surface import with_openings
+from hexwrap_solver.surface import surface_from_mesh, with_openings
+from hexwrap_solver.surface.types import SentMesh, SurfaceSettings
 from tests.solver.singularities import shapes
 
 SIDES = {"hex": 6, "quad": 4, "triangle": 3}
@@ -195,16 +196,32 @@ def plain():
     return solved(lobed(), mode="straight", around=24)
 
 
-def test_says_what_singularities_would_bring(plain, found):
-    said = [note for note in plain.quality.notes if "would leave about" in note]
+FORESEEN = r"(\d+) .* would leave less than ([\d.]+)% .* ask for singularities (\d+) "
+
+
+def test_what_singularities_would_leave_of_a_pointed_body_is_told_as_a_bound():
+    """Cells grow at its tip as much as they like, which no patch of the coarse model shows."""
+    surface = shapes.gherkin()
+    plain = solved(surface, mode="auto")
+    said = [re.search(FORESEEN, note) for note in plain.quality.notes if "would leave less than" in note]
     assert len(said) == 1
-    told, asked = re.search(r"(\d+) heptagons would .* ask for singularities (\d+),", said[0]).groups()
+    then = solved(surface, count=int(said[0][3])).quality
+    assert 1 - then.coverage < float(said[0][2]) / 100
+    assert then.bare < 0.05 < plain.quality.bare
+
+
+def test_says_what_singularities_would_bring(plain, found):
+    said = [note for note in plain.quality.notes if "would leave less than" in note]
+    assert len(said) == 1
+    told, most, asked = re.search(FORESEEN, said[0]).groups()
     assert told == asked
-    assert len(solved(lobed(), count=int(asked), around=24).map.cones) == int(told)
+    then = solved(lobed(), count=int(asked), around=24)
+    assert 0 < len(then.map.cones) <= int(told)
+    assert 1 - then.quality.coverage < float(most) / 100
     assert found.quality.coverage > plain.quality.coverage
-    assert not any("would leave about" in note for note in found.quality.notes)
+    assert not any("would leave less than" in note for note in found.quality.notes)
     even = solved(shapes.straight(), mode="straight", around=16)
-    assert not any("would leave about" in note for note in even.quality.notes)
+    assert not any("would leave less than" in note for note in even.quality.notes)
 
 
 def test_the_curve_of_sizes_counts_no_singularities(found):
@@ -369,6 +386,22 @@ def test_without_singularities_loops_keep_the_curvatures_that_were_chosen():
     for loop, angles, quanta in zip(surface.loops, cmap.boundary_angles, (2, -2, -6), strict=True):
         assert np.ptp(cmap.log_scale[loop]) < 1e-9
         assert (np.pi - angles).sum() == pytest.approx(quanta * np.pi / 3, abs=1e-7)
+
+
+def test_a_box_of_eight_vertices_has_places_for_small_cells():
+    """All its vertices lie on creases, from which singularities keep away where they can."""
+    corner = np.array([[x, y, z] for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))], dtype=float)
+    quads = [[3, 2, 1, 0], [4, 5, 6, 7], *([k, (k + 1) % 4, (k + 1) % 4 + 4, k + 4] for k in range(4))]
+    sent = SentMesh(corner, Ragged.from_table(np.array(quads)))
+    surface = surface_from_mesh(sent, SurfaceSettings(caps="keep"))
+
+    def seated(kind):
+        cells = PatternSettings(kind=kind, edge_length=0.02)
+        return module.seated(surface, BoundaryCondition(), SingularitySettings(), cells, 11).placing
+
+    assert seated("quad").proposal.index.tolist() == [1] * 8
+    with pytest.raises(SingularitiesError, match="8 vertices for them to stand at"):
+        seated("hex")
 
 
 def test_openings_that_are_cut_are_wall_for_singularities():

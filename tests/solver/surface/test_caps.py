@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -66,6 +68,29 @@ def moved(sent: SentMesh, matrix: Floats) -> SentMesh:
 
 def heights(surface: Surface) -> list[float]:
     return sorted(float(surface.vertices[loop][:, 2].mean()) for loop in surface.loops)
+
+
+def house(pitch: float, depth: float = 16.0) -> SentMesh:
+    """10 wide, its walls 6 high, the ridge above the middle; pitch in degrees."""
+    profile = [(0, 0), (10, 0), (10, 6), (5, 6 + 5 * np.tan(np.deg2rad(pitch))), (0, 6)]
+    points = [(x, y, z) for y in (0.0, depth) for x, z in profile]
+    ends = [[0, 1, 2, 4], [2, 3, 4], [5, 9, 7, 6], [7, 9, 8]]
+    around = [[(i + 1) % 5, i, i + 5, (i + 1) % 5 + 5] for i in range(5)]
+    lengths = [len(face) for face in ends + around]
+    values = np.array([v for face in ends + around for v in face])
+    return SentMesh(np.array(points), Ragged(values, np.cumsum([0, *lengths])))
+
+
+@pytest.mark.parametrize("pitch", [20.0, 40.0, 60.0])
+def test_a_house_loses_its_floor_and_keeps_its_roof(pitch: float) -> None:
+    surface = surface_from_mesh(house(pitch))
+    assert len(surface.loops) == 1
+    assert surface.vertices[surface.loops[0], 2].max() == 0
+    assert "A flat cap at the bottom" in surface.repairs[0]
+
+
+def test_a_hall_as_long_as_a_bar_is_open_at_its_ends() -> None:
+    assert len(surface_from_mesh(house(40.0, depth=100.0)).loops) == 2
 
 
 @pytest.mark.parametrize("bottom", [True, False])
@@ -184,3 +209,75 @@ def test_a_mass_that_is_inside_out_loses_the_same_caps() -> None:
     one, other = surface_from_mesh(outward), surface_from_mesh(inward)
     assert one.repairs == other.repairs
     assert len(other.loops) == 2
+
+
+def plate(lift: Floats, thickness: float, windows: bool = False) -> SentMesh:
+    """A square of 12 x 12 quads, 20 wide, lifted (13, 13), with four windows or none, as a mass."""
+    x, y = np.meshgrid(np.linspace(-10, 10, 13), np.linspace(-10, 10, 13), indexing="ij")
+    upper = np.stack([x, y, lift], axis=2).reshape(-1, 3)
+    i, j = np.divmod(np.arange(144), 12)
+    quads = np.stack([13 * i + j, 13 * (i + 1) + j, 13 * (i + 1) + j + 1, 13 * i + j + 1], axis=1)
+    if windows:
+        quads = quads[~(np.isin(i, (3, 8)) & np.isin(j, (3, 8)))]
+    edges = np.concatenate([quads[:, [k, (k + 1) % 4]] for k in range(4)])
+    inner = {(b, a) for a, b in edges.tolist()}
+    a, b = np.array([e for e in edges.tolist() if tuple(e) not in inner]).T
+    n = len(upper)
+    reveals = np.stack([b, a, a + n, b + n], axis=1)
+    faces = np.concatenate([quads, quads[:, ::-1] + n, reveals])
+    return SentMesh(np.concatenate([upper, upper - [0, 0, thickness]]), Ragged.from_table(faces))
+
+
+SQUARES = np.add.outer(np.linspace(-1, 1, 13) ** 2, np.linspace(-1, 1, 13) ** 2)
+
+
+@pytest.mark.parametrize("rise", [0.0, 4.0])
+@pytest.mark.parametrize("windows", [False, True])
+def test_of_a_plate_one_side_is_left_with_its_windows(rise: float, windows: bool) -> None:
+    """The upper side of a slab or a shell; of one that stands, the larger side."""
+    sent = plate(-rise * SQUARES, 0.3, windows)
+    surface = surface_from_mesh(sent)
+    assert len(surface.loops) == (5 if windows else 1)
+    used = surface.input_vertex
+    assert used.max() < 169, "the upper ones come first"
+    told = re.compile(r"plate, 0\.(3|2\d+) thick, of which the top is panelized")
+    assert any(map(told.search, surface.repairs))
+    standing = surface_from_mesh(moved(sent, np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]])))
+    assert len(standing.faces) == len(surface.faces)
+    if not windows:
+        assert surface_from_mesh(sent, SurfaceSettings(caps="keep")).loops == ()
+
+
+def test_a_thin_tower_is_no_plate() -> None:
+    """A slab 20 wide and 1.5 deep: its walls are wanted all around."""
+    surface = surface_from_mesh(
+        moved(plate(0 * SQUARES, 1.5), np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]]))
+    )
+    assert len(surface.loops) == 2
+
+
+def test_of_a_thick_tower_with_windows_the_outside_is_left() -> None:
+    """Bent to a tube the plate goes all around: its reveals join the sides into one surface with handles."""
+    sent = plate(0 * SQUARES, 0.3, windows=True)
+    x, y, z = sent.vertices.T
+    angle, radius = np.pi * (x + 10) / 10, 8 + z
+    bent = np.stack([radius * np.cos(angle), radius * np.sin(angle), y], axis=1)
+    quads = sent.faces.values.reshape(-1, 4)
+    quads = quads[~(np.abs(x)[quads] == 10).all(axis=1)]  # where the ends meet
+    surface = surface_from_mesh(SentMesh(bent, Ragged.from_table(quads)))
+    assert len(surface.loops) == 6
+    np.testing.assert_allclose(np.linalg.norm(surface.vertices[:, :2], axis=1), 8)
+    assert any("thick, of which the outside is panelized" in note for note in surface.repairs)
+
+
+@pytest.mark.parametrize(("height", "rims"), [(30.0, [4, 4]), (0.5, [4])])
+def test_a_box_without_a_floor_loses_its_roof_unless_that_is_most_of_it(
+    height: float, rims: list[int]
+) -> None:
+    """Its walls touch the boundary, too, but each only a side of it. Of a canopy the fascia would be left."""
+    x, y, z = np.array([[0, 0, 0], [20, 0, 0], [20, 14, 0], [0, 14, 0]]).T
+    vertices = np.concatenate([np.stack([x, y, z], axis=1), np.stack([x, y, z + height], axis=1)])
+    quads = np.array([[0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7], [4, 5, 6, 7]])
+    surface = surface_from_mesh(SentMesh(vertices.astype(float), Ragged.from_table(quads)))
+    assert [len(loop) for loop in surface.loops] == rims
+    assert ("A flat cap at the top" in "".join(surface.repairs)) == (len(rims) == 2)

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from hexwrap_solver.surface import Surface, surface_from_mesh
 from hexwrap_solver.surface.orient import INWARD, inward_note
+from hexwrap_solver.surface.pieces import pieces
 from hexwrap_solver.surface.topology import edge_lengths, face_normals
 from hexwrap_solver.surface.types import SentMesh, Triangles
 from tests.solver.surface.shapes import mesh, triangles, tube, twisted
@@ -193,6 +194,22 @@ def test_edges_without_length_are_welded() -> None:
     same_shape(surface, surface_from_mesh(mesh(vertices, faces)))
 
 
+@pytest.mark.parametrize("apart", [False, True], ids=["shared vertices", "own vertices"])
+def test_a_mesh_with_two_sides_is_one_sheet(apart: bool) -> None:
+    """Every face again, seen from behind; of a box, so that no diagonal of a quad is the better one."""
+    ring = np.array([[0, 0], [4, 0], [4, 4], [0, 4]], dtype=float)
+    vertices = np.array([[x, y, z] for z in (0, 4, 8) for x, y in ring], dtype=float)
+    quads = tube(3, 4)[1]
+    behind = quads[:, ::-1] + len(vertices) * apart
+    both = mesh(np.tile(vertices, (1 + apart, 1)), np.concatenate([quads, behind]))
+    (piece,) = pieces(both)
+    assert len(piece.faces) == 2 * len(quads)
+    assert piece.loops == 2
+    surface = surface_from_mesh(both)
+    np.testing.assert_array_equal(surface.faces, surface_from_mesh(mesh(vertices, quads)).faces)
+    assert "8 faces with the same corners as another one were left out." in surface.repairs
+
+
 def test_duplicates_and_strays_are_left_out() -> None:
     vertices, quads = tube()
     points = np.concatenate([[[9.0, 9.0, 9.0]], vertices])
@@ -208,8 +225,8 @@ def test_duplicates_and_strays_are_left_out() -> None:
     assert surface.input_vertex[0] == 1
     assert surface.repairs == (
         "1 vertex that no face uses was left out.",
+        "2 faces with the same corners as another one were left out.",
         "1 triangle without three different corners was left out.",
-        "4 triangles with the same corners as another one were left out.",
     )
 
 
@@ -326,3 +343,66 @@ def test_what_the_intake_hands_on_is_what_follows_from_the_surface(kind: str) ->
     assert {tuple(sorted(e)) for e in surface.faces[:, [0, 1]].tolist()} <= set(
         zip(low.tolist(), high.tolist(), strict=True)
     )
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e4])
+def test_t_junctions_are_closed(scale: float) -> None:
+    """Every edge that a vertex stands on without being its end is divided there: the tube is whole again."""
+    vertices, quads = tube(6, 12)
+    vertices, faces = vertices * scale, triangles(quads).tolist()
+    for k in range(0, len(faces), 5):  # a third vertex on the first edge of every fifth triangle alone
+        a, b, c = faces[k]
+        vertices = np.append(vertices, [(vertices[a] + vertices[b]) / 2], axis=0)
+        faces[k] = [a, len(vertices) - 1, c]
+        faces.append([len(vertices) - 1, b, c])
+    surface = surface_from_mesh(mesh(vertices, faces))
+    assert sorted(map(len, surface.loops)) == [12, 15]  # 3 of the 24 vertices stand on the boundary
+    assert "21 open edges were divided at vertices of others." in surface.repairs
+
+
+def test_one_edge_is_divided_at_any_number_of_vertices() -> None:
+    """Of a square tower the lower half has a quad to each side, the upper one forty."""
+    corners = np.array([[0, 0], [9, 0], [9, 9], [0, 9]], dtype=float)
+    fine = np.concatenate(
+        [np.linspace(a, b, 40, endpoint=False) for a, b in zip(corners, np.roll(corners, -1, 0), strict=True)]
+    )
+    levels = [(corners, 0.0), (corners, 9.0), (fine, 9.0), (fine, 18.0)]
+    vertices = np.concatenate([np.column_stack([plan, np.full(len(plan), z)]) for plan, z in levels])
+    faces = []
+    for first, n in ((0, 4), (8, 160)):
+        k, j = first + np.arange(n), first + (np.arange(n) + 1) % n
+        faces += np.stack([k, j, j + n, k + n], axis=1).tolist()
+    surface = surface_from_mesh(mesh(vertices, faces))
+    assert sorted(map(len, surface.loops)) == [4, 160]
+
+
+def test_tiny_triangles_are_no_copies_of_each_other() -> None:
+    """A cone in rings down to less than the tolerance; its skirt has a vertex on each of its edges."""
+    n = 24
+    angle = 2 * np.pi * np.arange(n) / n
+    way = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
+    radius = np.geomspace(3e-7, 10, 40)
+    rim = 10 * np.stack([way, (way + np.roll(way, -1, axis=0)) / 2], axis=1).reshape(-1, 3)
+    skirt = np.concatenate([rim, rim - [0, 0, 5]])
+    vertices = np.concatenate([[[0, 0, 10]], *(r * way + [0, 0, 10 - r] for r in radius), skirt])
+    k, j = np.arange(n), (np.arange(n) + 1) % n
+    faces = np.column_stack([0 * k, 1 + k, 1 + j]).tolist()
+    for row in range(len(radius) - 1):
+        a = 1 + row * n
+        faces += np.column_stack([a + k, a + n + k, a + n + j, a + j]).tolist()
+    a, k, j = 1 + len(radius) * n, np.arange(2 * n), (np.arange(2 * n) + 1) % (2 * n)
+    faces += np.column_stack([a + k, a + 2 * n + k, a + 2 * n + j, a + j]).tolist()
+    surface = surface_from_mesh(mesh(vertices, faces))
+    assert len(surface.loops) == 1
+    assert not any("left out" in note and "within" in note for note in surface.repairs)
+
+
+def test_faces_nearly_on_top_of_others_count_once() -> None:
+    """A part copied with rounding errors, quads cut along the other diagonal: vertices are within the
+    tolerance of those of the closed surface, where there is no open edge to weld them to."""
+    vertices, quads = tube()
+    copy = vertices + 1e-12
+    faces = [*quads.tolist(), *np.roll(quads[7:16] + len(vertices), 1, axis=1).tolist()]
+    surface = surface_from_mesh(mesh(np.concatenate([vertices, copy]), faces))
+    same_shape(surface, surface_from_mesh(mesh(vertices, quads)))
+    assert any("within 1e-06 of the model's size of others were left out" in note for note in surface.repairs)

@@ -101,3 +101,34 @@ def test_a_seam_closes_within_the_tolerance() -> None:
     whole, _, joint = joined(torn, 1e-3)
     assert joint.gap == pytest.approx(5e-4 * np.sqrt(3))
     assert [piece.loops for piece in pieces(whole)] == [2]
+
+
+@pytest.mark.parametrize("sheet", ["floor", "fin"])
+def test_a_sheet_welded_to_a_tube_does_not_cut_it(sheet: str) -> None:
+    """Three faces meet all around: the walls run straight on, the floor or fin is left out."""
+    vertices, quads = tube(9, 24)
+    at = 3 * 24 + np.arange(24)
+    if sheet == "floor":
+        vertices = np.append(vertices, [vertices[at].mean(axis=0)], axis=0)
+        more = [[a, b, 9 * 24] for a, b in zip(at, np.roll(at, -1), strict=True)]
+    else:
+        vertices = np.concatenate([vertices, vertices[at] * [1.2, 1.2, 1]])
+        out = 9 * 24 + np.arange(24)
+        more = np.stack([at, np.roll(at, -1), np.roll(out, -1), out], axis=1).tolist()
+    sent = mesh(vertices, [*quads.tolist(), *more])
+    whole, left = pieces(sent)
+    np.testing.assert_array_equal(whole.faces, np.arange(len(quads)))
+    assert (whole.loops, len(left.faces)) == (2, 24)
+    assert len(surface_from_mesh(only(sent, whole.faces)).loops) == 2
+
+
+def test_cones_that_meet_at_their_tips_are_alike() -> None:
+    """Quads of the pinched ring have an edge without length: they tell nothing about what is straight."""
+    i, j = np.divmod(np.arange(40 * 31), 31)
+    angle, v = np.pi * i / 20, j / 30
+    vertices = np.stack([(3 - 6 * v) * np.cos(angle), (3 - 6 * v) * np.sin(angle), 20 * v], axis=1)
+    a = np.flatnonzero(j < 30)
+    b = (a + 31) % len(vertices)
+    upper, lower = pieces(mesh(vertices, np.stack([a, b, b + 1, a + 1], axis=1)))[:2]
+    assert upper.loops == lower.loops == 1
+    assert upper.area == pytest.approx(lower.area)

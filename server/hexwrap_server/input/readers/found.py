@@ -9,11 +9,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hexwrap_solver.arrays import Ints
-from hexwrap_solver.errors import SurfaceError
 from hexwrap_solver.surface import NurbsSurface, SentMesh
 from hexwrap_solver.surface.brep import Brep
 from hexwrap_solver.surface.checks import check_arrays
-from hexwrap_solver.surface.pieces import only, pieces
+from hexwrap_solver.surface.pieces import Piece, only, pieces
 from hexwrap_solver.surface.triangulate import cut_polygons
 
 #: A piece of an object with less than this part of its largest piece's area is a stray.
@@ -52,7 +51,8 @@ class FileContent:
     these. notes: what was changed in reading.
 
     mesh, owner: where the objects are faces (m,) of one table of vertices, the whole table; its vertices keep
-    their numbers, independent of the choice. is_whole: the mesh is one object, and known to be one piece.
+    their numbers, independent of the choice. whole: the mesh, where it is one object and known to be one
+    piece.
     """
 
     objects: tuple[Found, ...]
@@ -61,26 +61,33 @@ class FileContent:
     others: Counter[str] = field(default_factory=Counter)
     mesh: SentMesh | None = None
     owner: Ints | None = None
-    is_whole: bool = False
+    whole: Piece | None = None
     odd_unit: str = ""
     notes: tuple[str, ...] = ()
+
+    def noted(self, sentence: str) -> FileContent:
+        """With one more note, before the others."""
+        return replace(self, notes=(sentence, *self.notes))
 
 
 def of_mesh(mesh: SentMesh, names: Sequence[tuple[str, str]] = (), owner: Ints | None = None) -> FileContent:
     """The content of a file that is one table of vertices and faces.
 
     names: (name, layer) of each object, owner: (m,) the object of each face; without, the pieces of the mesh
-    that do not hang together are its objects, but for strays. Polygons are cut into triangles.
+    that do not hang together are its objects, but for strays. Polygons are cut into triangles, and edges
+    that were written as faces left out. Raises SurfaceError.
     """
+    real = np.flatnonzero(mesh.faces.lengths > 2)
+    if 0 < len(real) < mesh.faces.n_rows and mesh.faces.values.max() < len(mesh.vertices):
+        content = of_mesh(only(mesh, real), names, None if owner is None else owner[real])
+        left = mesh.faces.n_rows - len(real)
+        return content.noted(f"Faces with fewer than three corners were left out, {left:,} in all.")
     if mesh.vertices.ndim == 2 and mesh.vertices.shape[1] == 3:
         faces, row = cut_polygons(mesh.vertices, mesh.faces)
         if faces is not mesh.faces:
             content = of_mesh(replace(mesh, faces=faces), names, None if owner is None else owner[row])
-            return replace(content, notes=(_cut(int((np.bincount(row) > 1).sum())),))
-    try:
-        check_arrays(mesh)
-    except SurfaceError:  # reported when the mesh is taken in
-        return FileContent((_object("0", "", mesh),), mesh=mesh, owner=_none(mesh), is_whole=True)
+            return content.noted(_cut(int((np.bincount(row) > 1).sum())))
+    check_arrays(mesh)
     if owner is not None and len(names) > 1:
         parts = [only(mesh, np.flatnonzero(owner == i)) for i in range(len(names))]
         objects = [
@@ -93,7 +100,9 @@ def of_mesh(mesh: SentMesh, names: Sequence[tuple[str, str]] = (), owner: Ints |
     name = names[0][0] if names else ""
     if len(large) < 2:
         whole = _object("0", name, mesh)
-        return FileContent((whole,), mesh=mesh, owner=_none(mesh), is_whole=len(found) == 1)
+        return FileContent(
+            (whole,), mesh=mesh, owner=_none(mesh), whole=found[0] if len(found) == 1 else None
+        )
     owner = _none(mesh)
     for i, piece in enumerate(large):
         owner[piece.faces] = i

@@ -48,8 +48,13 @@ def read_off(data: bytes) -> FileContent:
     points = points.reshape(-1, wide)
     lengths = np.array([int(row[0]) for row in face_rows], dtype=np.int64)
     corners = [x for row in face_rows for x in row[1 : 1 + int(row[0])]]
-    faces = Ragged(integers(corners, "faces of the OFF file"), np.append(0, np.cumsum(lengths)))
-    return of_mesh(SentMesh(points[:, :3] / points[:, 3:] if homogeneous else points, faces))
+    index = integers(corners, "faces of the OFF file")
+    from_one = bool(len(index)) and index.min() == 1 and index.max() == n
+    faces = Ragged(index - from_one, np.append(0, np.cumsum(lengths)))
+    content = of_mesh(SentMesh(points[:, :3] / points[:, 3:] if homogeneous else points, faces))
+    if not from_one:
+        return content
+    return content.noted("The faces of the OFF file count vertices from 1, not from 0, and were read so.")
 
 
 def _counts(lines: list[list[bytes]]) -> tuple[int, int, list[list[bytes]]]:

@@ -32,6 +32,8 @@ def read_stl(data: bytes) -> FileContent:
     if announced < 0:
         raise UnreadableFileError("The file is not an STL file: it is shorter than the header of one.")
     held = (len(data) - HEADER) // _TRIANGLE.itemsize
+    if announced == 0 == held:
+        raise UnreadableFileError("The STL file holds no mesh: it has no facets.")
     if held < announced or announced == 0:
         raise UnreadableFileError(
             f"The STL file announces {announced} triangles but holds {held}: it is truncated or damaged, so "

@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import breadth_first_order, connected_components
 
 from hexwrap_solver.arrays import Bools, Ints, Ragged
+from hexwrap_solver.geometry import orbits
 from hexwrap_solver.pattern.lattice import Lattice
 from hexwrap_solver.pattern.lay.edges import PatternEdges
 
@@ -36,7 +37,7 @@ class Cells:
 
     def neighbours(self) -> Ragged:
         """The cell across each side, −1 where there is none."""
-        across = np.where(self.twin >= 0, self.corner.row[self.twin], -1)
+        across = np.where(self.twin >= 0, self.corner.row.take(self.twin, mode="wrap"), -1)
         return Ragged(across, self.corner.offsets)
 
     def part(self, keep: Bools) -> Cells:
@@ -86,54 +87,68 @@ def whole_cells(lattice: Lattice, edges: PatternEdges) -> WholeCells:
     a disk with boundary loops inside that no edge of the pattern meets; see ``enclosed_loops``. By how much
     it turns altogether tells the index of what it encloses: (order − k)/order of a full turn.
     """
-    heads, gluings, backs = edges.head.ravel(), edges.gluing.ravel(), edges.back.ravel()
-    start = np.flatnonzero(heads >= 0)
-    node, slot = start // edges.width, start % edges.width
-    products = np.zeros((1, 4), dtype=np.int64)  # of the gluings met: few walks meet any
-    product = np.zeros(len(start), dtype=np.int64)  # which of them each walk has met, 0: none
-    walk, turned = np.arange(len(start)), np.zeros(len(start), dtype=np.int64)
-    first, visits = start, []
-    closed, total = np.zeros(len(start), dtype=bool), np.zeros(len(start), dtype=np.int64)
-
-    def meet(which: Ints, isometry: Ints) -> None:
-        nonlocal products, product
-        if len(which):
-            met = lattice.compose(products[product[which]], isometry)
-            product = product.copy()
-            product[which] = len(products) + np.arange(len(which))
-            products = np.concatenate([products, met])
-
-    for _ in range(lattice.sides + lattice.sides // lattice.order * MOST_EXTRA):
-        visits.append((walk, node, slot, product))
-        at = edges.number(node, slot)
-        gluing, back, node = gluings.take(at), backs.take(at), heads.take(at)
-        glued = np.flatnonzero(gluing)
-        meet(glued, edges.isometries[gluing[glued]])
-        slot, inner, passed = edges.clockwise(node, back % edges.width)
-        seam = np.flatnonzero(passed & (edges.around.take(node) != lattice.directions))
-        meet(seam, edges.seam[node[seam]])
-        turned = turned + lattice.directions // 2 - inner
-        number = edges.number(node, slot)
-        at_first = number == first
-        closed[walk[at_first]] = products[:, 3].take(product[at_first]) == 0
-        total[walk[at_first]] = turned[at_first]
+    following, turn, glued = _following(lattice, edges)
+    heads = edges.head.ravel()
+    start = np.flatnonzero(following >= 0)
+    walk, first, at, visits = np.arange(len(start)), start, start, []
+    lengths = np.zeros(len(start), dtype=np.int64)
+    for step in range(lattice.sides + lattice.sides // lattice.order * MOST_EXTRA):
+        visits.append((walk, at))
+        at = following.take(at)
+        lengths[walk.compress(at == first)] = step + 1
         # Each cell once, from its lowest side on; a walk that comes to a lower one is another's, or none.
-        going = (heads.take(number) >= 0) & (number > first)
-        walk, first, node, slot, product, turned = (
-            x[going] for x in (walk, first, node, slot, product, turned)
-        )
+        going = (heads.take(at) >= 0) & (at > first)
+        walk, first, at = (x.compress(going) for x in (walk, first, at))
         if not len(walk):
             break
-    kept = [closed[walk] for walk, *_ in visits]
-    walk, node, slot, product = (
-        np.concatenate([visit[i][keep] for visit, keep in zip(visits, kept, strict=True)]) for i in range(4)
-    )
-    sorted_by_walk = np.argsort(walk, kind="stable")
-    lengths = np.bincount(walk, minlength=len(start))[closed]
-    offsets = np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
-    index = (lattice.directions - total[closed]) // lattice.steps_per_turn
-    isometry = products[product[sorted_by_walk]]
-    return WholeCells(Ragged(node[sorted_by_walk], offsets), slot[sorted_by_walk], isometry, index)
+    closed, begin = lengths > 0, np.cumsum(lengths) - lengths
+    side = np.empty(int(lengths.sum()), dtype=np.int64)
+    for step, (walk, at) in enumerate(visits):
+        kept = closed.take(walk)
+        side[begin.take(walk.compress(kept)) + step] = at.compress(kept)
+    corner = Ragged(side // edges.width, np.append(begin[closed], len(side)))
+    isometry, around = _beside_first(lattice, edges, side, corner, glued.take(side))
+    turned = np.add.reduceat(turn.take(side), corner.offsets[:-1])
+    index = (lattice.directions - turned) // lattice.steps_per_turn
+    cells = WholeCells(corner, side % edges.width, isometry, index)
+    return cells.part(around == 0)
+
+
+def _beside_first(
+    lattice: Lattice, edges: PatternEdges, side: Ints, corner: Ragged, glued: Bools
+) -> tuple[Ints, Ints]:
+    """(sides, 4) from the corner of each side to that of the first one of its cell, and (cells,) how often
+    the walk goes around the surface. side: their edges; glued: whether a gluing or a seam comes after."""
+    isometry, around = np.zeros((len(side), 4), dtype=np.int64), np.zeros(corner.n_rows, dtype=np.int64)
+    cells = np.unique(corner.row[glued])  # few
+    at, end = corner.offsets[cells], corner.offsets[cells + 1]
+    product = np.zeros((len(cells), 4), dtype=np.int64)
+    while len(cells):
+        isometry[at] = product
+        tail, slot = side[at] // edges.width, side[at] % edges.width
+        product = lattice.compose(product, edges.isometry(tail, slot))
+        node = edges.head[tail, slot]
+        seam = (edges.back[tail, slot] % edges.width == 0) & (edges.around[node] != lattice.directions)
+        product[seam] = lattice.compose(product[seam], edges.seam[node[seam]])
+        at = at + 1
+        done = at == end
+        around[cells[done]] = product[done, 3]
+        cells, at, end, product = cells[~done], at[~done], end[~done], product[~done]
+    return isometry, around
+
+
+def _following(lattice: Lattice, edges: PatternEdges) -> tuple[Ints, Ints, Bools]:
+    """By number of a directed edge: (n·width,) the next one around the cell on its left, −1 without a head;
+    by how many directions that turns left; and whether a gluing, or a singularity's seam, lies between."""
+    at = np.flatnonzero(edges.head.ravel() >= 0)
+    node, back = edges.head.ravel().take(at), edges.back.ravel().take(at) % edges.width
+    slot, inner, passed = edges.clockwise(node, back)
+    following, turn = np.full(edges.head.size, -1, dtype=np.int64), np.zeros(edges.head.size, dtype=np.int64)
+    following[at], turn[at] = edges.number(node, slot), lattice.directions // 2 - inner
+    seam = passed & (edges.around.take(node) != lattice.directions)
+    glued = np.zeros(edges.head.size, dtype=bool)
+    glued[at] = seam | (edges.gluing.ravel().take(at) > 0)
+    return following, turn, glued
 
 
 def sides_by_edge(edges: PatternEdges, cells: WholeCells) -> Ints:
@@ -150,13 +165,18 @@ def only_whole_cells(edges: PatternEdges, cells: WholeCells) -> Cells:
 
 def largest_part(cells: Cells) -> Bools:
     """(c,) the largest edge-connected part."""
-    row = cells.corner.row
-    side = np.flatnonzero(cells.twin >= 0)
-    graph = coo_array((np.ones(len(side)), (row[side], row[cells.twin[side]])), shape=(cells.n, cells.n))
-    parts, part = connected_components(graph, directed=False)
-    if parts <= 1:
-        return np.ones(cells.n, dtype=bool)
+    graph = graph_of(cells.neighbours())
+    if len(breadth_first_order(graph, 0, return_predecessors=False)) == cells.n:
+        return np.ones(cells.n, dtype=bool)  # as nearly always
+    _, part = connected_components(graph, directed=False)
     return np.asarray(part == np.argmax(np.bincount(part)))
+
+
+def graph_of(neighbours: Ragged) -> csr_array:
+    """Of the cells, joined across edges, both ways. neighbours: as of ``Cells``."""
+    inner, n = neighbours.values >= 0, neighbours.n_rows
+    offsets = np.append(0, np.cumsum(inner))[neighbours.offsets]
+    return csr_array((np.ones(offsets[-1]), neighbours.values[inner], offsets), shape=(n, n))
 
 
 def manifold_corners(cells: Cells) -> tuple[Ints, Ints]:
@@ -164,14 +184,10 @@ def manifold_corners(cells: Cells) -> tuple[Ints, Ints]:
 
     Cells that touch at a point, but at no edge there, get a vertex each, so that boundaries are simple loops.
     """
-    size = len(cells.twin)
-    side = np.flatnonzero(cells.twin >= 0)
-    after = cells.corner.next()[cells.twin[side]]
-    graph = coo_array((np.ones(len(side)), (side, after)), shape=(size, size))
-    n, vertex = connected_components(graph, directed=False)
+    vertex, n = orbits(np.where(cells.twin >= 0, cells.corner.next().take(cells.twin, mode="wrap"), -1))
     point = np.zeros(n, dtype=np.int64)
     point[vertex] = cells.corner.values
-    return vertex.astype(np.int64), point
+    return vertex, point
 
 
 def awkward_cells(corner: Ragged, twin: Ints) -> Bools:

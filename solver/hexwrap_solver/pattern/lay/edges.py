@@ -16,7 +16,7 @@ import numpy as np
 from hexwrap_solver.arrays import Bools, Floats, Ints
 from hexwrap_solver.domain.locate import runs
 from hexwrap_solver.pattern.lay.layout import Layout
-from hexwrap_solver.pattern.lay.nodes import Nodes, edge_distances
+from hexwrap_solver.pattern.lay.nodes import Nodes
 from hexwrap_solver.pattern.lay.trace import trace
 from hexwrap_solver.tolerances import ANGLE, TINY
 
@@ -293,7 +293,8 @@ def _best_incidence(layout: Layout, nodes: Nodes, node: Ints, direction: Ints) -
     inward = 1j * along / np.maximum(abs(along), TINY)
     heading = lattice.headings[way][:, None]
     into = heading.real * inward.real + heading.imag * inward.imag
-    at_edge = abs(edge_distances(corners, lattice.stand(nodes.point[seen]))) <= 4 * layout.tolerance
+    off_edge = abs(layout.edge_distances(nodes.face[seen], lattice.stand(nodes.point[seen]))).T
+    at_edge = off_edge <= 4 * layout.tolerance
     score = np.where(at_edge, into, 1.0).min(axis=1)
     best = np.lexsort((-score, line))[np.cumsum(count) - count]
     outward = at_edge & (into < -1e-6) & (layout.across[nodes.face[seen]] < 0)

@@ -9,6 +9,8 @@ from scipy.spatial import cKDTree
 
 from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged
 from hexwrap_solver.conformal.types import ConformalMap
+from hexwrap_solver.geometry import sums_to_root
+from hexwrap_solver.pattern.lay.cells import graph_of
 from hexwrap_solver.pattern.lay.layout import Layout
 
 
@@ -96,19 +98,16 @@ def azimuth(cmap: ConformalMap, centers: Floats) -> Floats:
 
 def rows_from(neighbours: Ragged, first: Bools) -> Ints:
     """(c,) number of steps from cell to cell across edges to the nearest of the first cells, −1: none."""
-    row, seen = np.where(first, 0, -1), np.zeros(len(first), dtype=np.int64)
-    frontier = np.flatnonzero(first)
-    level = 0
-    while len(frontier):
-        level += 1
-        starts, lengths = neighbours.offsets[frontier], neighbours.lengths[frontier]
-        entry = np.repeat(starts - np.cumsum(lengths) + lengths, lengths) + np.arange(lengths.sum())
-        reached = neighbours.values.take(entry).astype(np.int64)
-        reached = reached[(reached >= 0) & (row.take(reached) < 0)]
-        row[reached] = level
-        seen[reached] = np.arange(len(reached))  # the last one that comes to a cell stands for all
-        frontier = reached[seen.take(reached) == np.arange(len(reached))]
-    return row
+    n, begin = len(first), np.flatnonzero(first)
+    graph = graph_of(neighbours)
+    # From one more cell, a step before the first ones.
+    indices, offsets = np.append(graph.indices, begin), np.append(graph.indptr, graph.nnz + len(begin))
+    before = csr_array((np.ones(len(indices)), indices, offsets), shape=(n + 1, n + 1))
+    up = breadth_first_order(before, n)[1].astype(np.int64)
+    up[up < 0] = n  # not reached
+    steps = np.append(up[:-1] < n, False).astype(np.int64)
+    steps[begin] = 1
+    return sums_to_root(steps, up, n)[:-1] - 1
 
 
 def places(ring: Ints, turn: Floats) -> Ints:

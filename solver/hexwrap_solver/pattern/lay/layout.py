@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
-from hexwrap_solver.arrays import Complexes, Ints
+import numpy as np
+
+from hexwrap_solver.arrays import Complexes, Floats, Ints
 from hexwrap_solver.pattern.lattice import Lattice
+from hexwrap_solver.tolerances import TINY
 
 
 @dataclass(frozen=True)
@@ -28,6 +32,26 @@ class Layout:
     cones: Ints
     lattice: Lattice
     tolerance: float
+
+    @cached_property
+    def sides(self) -> tuple[tuple[Floats, ...], ...]:
+        """Per edge of the triangles, (m,) each: where it begins, x and y, and its unit direction, u and v."""
+        found = []
+        for c in range(3):
+            begin = self.corners[:, c]
+            along = self.corners[:, (c + 1) % 3] - begin
+            along = along / np.maximum(abs(along), TINY)
+            found.append(tuple(map(np.ascontiguousarray, (begin.real, begin.imag, along.real, along.imag))))
+        return tuple(found)
+
+    def edge_distances(self, face: Ints, place: Complexes) -> Floats:
+        """(3, k) signed distances of places from the edges of triangles, positive inside."""
+        px, py = np.ascontiguousarray(place.real), np.ascontiguousarray(place.imag)
+        distance = np.empty((3, len(face)))
+        for c, side in enumerate(self.sides):
+            x, y, u, v = (part.take(face) for part in side)
+            np.subtract(u * (py - y), v * (px - x), out=distance[c])
+        return distance
 
     def into(self, crossing: Ints) -> Ints:
         """(…, 4) isometries that carry coordinates of a face to those of the face across: the inverses."""

@@ -8,12 +8,11 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints
+from hexwrap_solver.arrays import Bools, Floats, Ints
 from hexwrap_solver.domain.locate import runs
 from hexwrap_solver.errors import PatternError
 from hexwrap_solver.pattern.lattice import Lattice
 from hexwrap_solver.pattern.lay.layout import Layout
-from hexwrap_solver.tolerances import TINY
 
 #: Incidences are told apart by one integer each.
 MOST_KEYS = 1 << 62
@@ -51,13 +50,14 @@ class Nodes:
     def near_edges(self, layout: Layout, distance: float) -> Bools:
         """(k, 3) which edges of its triangle each incidence lies on."""
         place = layout.lattice.stand(self.point)
-        return np.asarray(abs(edge_distances(layout.corners[self.face], place)) <= distance)
+        return np.asarray(abs(layout.edge_distances(self.face, place)) <= distance).T
 
     def find(self, face: Ints, point: Ints) -> Ints:
         """Position of an incidence, −1 where there is none."""
         key = _key(face, point, self._low, self._span)
         at = np.minimum(np.searchsorted(self._keys, key), max(len(self._keys) - 1, 0))
-        found = ((point >= self._low) & (point < self._low + self._span)).all(axis=-1)
+        (low_a, low_b), (a, b) = self._low, np.moveaxis(point, -1, 0)
+        found = (a >= low_a) & (a < low_a + self._span[0]) & (b >= low_b) & (b < low_b + self._span[1])
         return (
             np.where(found & (self._keys[at] == key), at, -1) if len(self._keys) else np.full(len(face), -1)
         )
@@ -72,38 +72,30 @@ def lattice_points_in_triangles(triangles: Floats, tolerance: float) -> tuple[In
 
     triangles: (m, 3, 2) in lattice coordinates. Row by row, so that slivers cost no more than their rows.
     """
-    a, b = triangles[..., 0], triangles[..., 1]
-    first_row = np.ceil(b.min(axis=1) - tolerance).astype(np.int64)
-    rows = np.maximum(np.floor(b.max(axis=1) + tolerance).astype(np.int64) - first_row + 1, 0)
+    a, b = np.ascontiguousarray(triangles.T)  # each (3, m)
+    first_row = np.ceil(b.min(axis=0) - tolerance).astype(np.int64)
+    rows = np.maximum(np.floor(b.max(axis=0) + tolerance).astype(np.int64) - first_row + 1, 0)
     owner, step = runs(rows)
     row = first_row[owner] + step
     low = np.full(len(owner), np.inf)
     high = np.full(len(owner), -np.inf)
     for c in range(3):
-        a0, b0 = a[owner, c], b[owner, c]
-        rise = b[owner, (c + 1) % 3] - b0
-        run = a[owner, (c + 1) % 3] - a0
-        steep = np.where(rise == 0, 1.0, rise)
+        rise, run = b[(c + 1) % 3] - b[c], a[(c + 1) % 3] - a[c]
+        flat = rise == 0
+        a0, b0, run, steep = (part.take(owner) for part in (a[c], b[c], run, np.where(flat, np.inf, rise)))
+        rise = rise.take(owner)
         for margin in (-tolerance, tolerance):  # a shallow edge stays within tolerance of the row for a while
-            t = np.where(rise == 0, 0.0, np.clip((row + margin - b0) / steep, 0, 1))
+            t = np.minimum(np.maximum((row + margin - b0) / steep, 0.0), 1.0)
             meets = abs(b0 + t * rise - row) <= 1.5 * tolerance
             at = a0 + t * run
-            low = np.where(meets, np.minimum(low, at), low)
-            high = np.where(meets, np.maximum(high, at), high)
+            np.minimum(low, at, out=low, where=meets)
+            np.maximum(high, at, out=high, where=meets)
     met = low <= high
     owner, row = owner[met], row[met]
     first = np.ceil(low[met] - tolerance).astype(np.int64)
     count = np.maximum(np.floor(high[met] + tolerance).astype(np.int64) - first + 1, 0)
     span, step = runs(count)
     return owner[span], np.stack([first[span] + step, row[span]], axis=1)
-
-
-def edge_distances(corners: Complexes, place: Complexes) -> Floats:
-    """(k, 3) signed distances of a place from the three edges of its triangle, positive inside."""
-    along = np.roll(corners, -1, axis=1) - corners
-    offset = place[:, None] - corners
-    cross = along.real * offset.imag - along.imag * offset.real
-    return np.asarray(cross / np.maximum(abs(along), TINY))
 
 
 def find_nodes(layout: Layout) -> Nodes:
@@ -120,14 +112,27 @@ def find_nodes(layout: Layout) -> Nodes:
     empty = np.zeros(0, dtype=np.int64)
     found = Nodes(face, point, empty, empty, empty, empty, empty, keys, low, span)
     first, second, step = _same_place(layout, found)
-    graph = coo_array((np.ones(len(first)), (first, second)), shape=(len(face), len(face)))
-    n, part = connected_components(graph, directed=False)
-    node = part.astype(np.int64)
+    node, n = _joined(first, second, len(face))
     incidence = np.argsort(node, kind="stable")
-    starts = np.searchsorted(node[incidence], np.arange(n + 1))
+    starts = np.append(0, np.cumsum(np.bincount(node, minlength=n)))
     own = incidence[starts[:-1]]
     isometry = _seen_from(own, first, second, layout.isometries[step], lattice, len(face))
     return Nodes(face, point, node, isometry, own, starts, incidence, keys, low, span)
+
+
+def _joined(first: Ints, second: Ints, k: int) -> tuple[Ints, int]:
+    """(k,) number of the part of a graph that each of k is in, in the order of their lowest, and how many
+    there are. Few are joined to others."""
+    some = np.zeros(k, dtype=bool)
+    some[first] = some[second] = True
+    place, members = np.cumsum(some) - 1, np.flatnonzero(some)
+    graph = coo_array((np.ones(len(first)), (place[first], place[second])), shape=(len(members),) * 2)
+    parts, part = connected_components(graph, directed=False)
+    lowest, least = np.arange(k), np.full(parts, k)
+    np.minimum.at(least, part, members)
+    lowest[members] = least[part]
+    leads = lowest == np.arange(k)
+    return (np.cumsum(leads) - 1).take(lowest), int(np.count_nonzero(leads))
 
 
 def _points_in_faces(layout: Layout) -> tuple[Ints, Ints]:
@@ -139,7 +144,7 @@ def _points_in_faces(layout: Layout) -> tuple[Ints, Ints]:
     wanted = lattice.is_node(point)
     face, point = face[wanted], point[wanted]
     if far:
-        inside = (edge_distances(layout.corners[face], lattice.stand(point)) >= -tolerance).all(axis=1)
+        inside = (layout.edge_distances(face, lattice.stand(point)) >= -tolerance).all(axis=0)
         face, point = face[inside], point[inside]
     return face, point
 

@@ -14,7 +14,6 @@ import numpy as np
 
 from hexwrap_solver.arrays import Bools, Complexes, Ints
 from hexwrap_solver.pattern.lay.layout import Layout
-from hexwrap_solver.pattern.lay.nodes import edge_distances
 from hexwrap_solver.tolerances import TINY
 
 
@@ -63,18 +62,19 @@ def _trace(layout: Layout, face: Ints, origin: Complexes, target: Ints, *, pass_
     touched = np.zeros(len(face), dtype=bool)
     active = np.arange(len(face))
     for _ in range(len(layout.corners) + 3):  # a straight line as short as these meets no triangle twice
-        corners = layout.corners[face[active]]
-        goal = lattice.stand(target[active])
-        beyond = edge_distances(corners, goal) < -tolerance
-        moving = beyond.any(axis=1)
-        active, corners, goal, beyond = active[moving], corners[moving], goal[moving], beyond[moving]
+        goal = lattice.stand(target.take(active, axis=0))
+        one, other, third = layout.edge_distances(face.take(active), goal) < -tolerance
+        moving = np.flatnonzero(one | other | third)
+        active, goal = active.take(moving), goal.take(moving)
+        one, other, third = (beyond.take(moving) for beyond in (one, other, third))
         if not len(active):
             break
-        edge = np.argmax(beyond, axis=1)
-        two = np.flatnonzero(beyond.sum(axis=1) >= 2)
+        edge = np.where(one, 0, np.where(other, 1, 2))
+        two = np.flatnonzero(one & other | other & third | third & one)
         if len(two):
-            begin = origin[active[two]]
-            pick, tie = _which_edge(corners[two], begin, goal[two], beyond[two], tolerance, pass_left)
+            begin, corners = origin[active[two]], layout.corners[face[active[two]]]
+            beyond = np.stack([one[two], other[two], third[two]], axis=1)
+            pick, tie = _which_edge(corners, begin, goal[two], beyond, tolerance, pass_left)
             edge[two] = pick
             touched[active[two]] |= tie
         at = face[active]
@@ -86,6 +86,8 @@ def _trace(layout: Layout, face: Ints, origin: Complexes, target: Ints, *, pass_
         face[active] = across
         glued = np.flatnonzero(crossing)
         moved, crossing = active[glued], crossing[glued]
+        if not len(moved):
+            continue
         isometry[moved] = lattice.compose(isometry[moved], layout.isometries[crossing])
         into = layout.into(crossing)
         target[moved] = lattice.apply(into, target[moved])

@@ -168,11 +168,16 @@ class Straightening:
 
 
 def place_by_sides(
-    straightening: Straightening, settings: PatternSettings, spread: float | None = None
+    straightening: Straightening,
+    settings: PatternSettings,
+    spread: float | None = None,
+    *,
+    gathered: bool = False,
 ) -> Placement:
     """Scale, centre and lines whose deformation distorts least, then that deformation.
 
-    spread: relative freedom of the size, instead of what goes with the size asked for.
+    spread: relative freedom of the size, instead of what goes with the size asked for. gathered: where little
+    of the surface bears what it costs, see ``deform``.
     """
     frame, lines = replace(straightening.frame, around=settings.around), straightening.lines
     system, strain = straightening.system, straightening.strain
@@ -185,7 +190,8 @@ def place_by_sides(
     for trial in _best_of(trials, strain)[:most]:
         rest = trial.scale * (cmap.uv - (cmap.deck.apex or 0)) + trial.origin
         glued = Glued.by_sheets(cmap, trial.motion)
-        place, distortion = deform(system, glued, trial.scale, rest, lines.depths(trial.depth, trial.motion))
+        depth = lines.depths(trial.depth, trial.motion)
+        place, distortion = deform(system, glued, trial.scale, rest, depth, gathered=gathered)
         tried.append((distortion, trial, place))
         if tried[-1][0] < ENOUGH:
             break

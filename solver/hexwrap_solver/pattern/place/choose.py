@@ -40,16 +40,17 @@ from hexwrap_solver.pattern.place.placement import (
     is_straight,
     quantized,
 )
+from hexwrap_solver.pattern.place.seat import seated
 from hexwrap_solver.pattern.place.sheet import as_sheet, place_on_sheet
 from hexwrap_solver.pattern.place.sides import has_corners, is_polygon
 from hexwrap_solver.pattern.place.size import FREE, mean_stretch, size_spread, wanted_edge
 from hexwrap_solver.pattern.types import PatternSettings
 from hexwrap_solver.words import place
 
-#: Features are made straight where that costs no more than this at all but one triangle of a hundred, as
-#: predicted, and than that at the worst; above FINE, a number of cells around at which they cost less than
-#: half as much is told.
-P99, MOST_PREDICTED, MOST_DISTORTED, FINE = 0.99, 0.15, 1.5, 0.005
+#: Features are made straight where that costs no more than MOST_PREDICTED at all but one triangle of a
+#: hundred, or MOST_ON_AVERAGE over the surface, as predicted, and than MOST_DISTORTED at the worst; above
+#: FINE, a number of cells around at which they cost less than half as much is told.
+P99, MOST_PREDICTED, MOST_ON_AVERAGE, MOST_DISTORTED, FINE = 0.99, 0.15, 0.08, 1.5, 0.005
 #: Where one leans by more than this (radians), a pattern that winds along with them is compared.
 LEANING = np.deg2rad(2.0)
 #: Features are given up, the costliest first, in this many rounds.
@@ -76,6 +77,17 @@ class _Way:
     @property
     def cost(self) -> float:
         return float(np.quantile(self.ratio, P99))
+
+    @cached_property
+    def mean(self) -> float:
+        """Over the surface."""
+        area = self.straightening.frame.cmap.surface.areas
+        return float(area @ np.minimum(self.ratio, MOST_DISTORTED) / area.sum())
+
+    @property
+    def bearable(self) -> bool:
+        """Where little is distorted, or much of a small part: cells of ledges, say."""
+        return self.cost <= MOST_PREDICTED or self.mean <= MOST_ON_AVERAGE
 
     @property
     def features(self) -> FeatureLines:
@@ -116,24 +128,23 @@ class PlacementFamily:
     def at(self, settings: PatternSettings) -> Placement:
         """settings: those it was made for, but for the size."""
         cmap, lattice, loops = self.cmap, self.lattice, self.loops
-        along, sentences = self._along_features(settings)
+        along, sentences, proposed = self._along_features(settings)
         if cmap.kind == "net":
             placement = place_on_net(cmap, lattice, settings, loops)
         elif along is not None:
             placement = along
-        elif self.is_cylinder and not any(has_corners(cmap, lattice, loop) for loop in loops):
-            placement = place_on_cylinder(cmap, lattice, settings, loops)
-        elif loops:
+        elif loops and not (self.is_cylinder and self._are_lines):
             placement = self._by_sides(settings)
         else:
-            placement = self._freely(settings)
+            placement = self._seated(settings)
         corners = self._corner_notes(placement.straight)
         if len(sentences) > MOST_NAMED:
             sentences = [
                 *sentences[:MOST_NAMED],
                 f"The same holds of {len(sentences) - MOST_NAMED} further folds.",
             ]
-        return replace(placement, notes=(*self.notes, *corners, *sentences, *placement.notes))
+        told = (*self.notes, *corners, *sentences, *proposed, *placement.notes)
+        return replace(placement, notes=told, proposes=bool(proposed))
 
     @cached_property
     def chains(self) -> list[Chain]:
@@ -142,19 +153,18 @@ class PlacementFamily:
             return []
         return chains_of(self.cmap, self.cmap.surface.features, self.features)
 
-    def _along_features(self, settings: PatternSettings) -> tuple[Placement | None, list[str]]:
-        """With lattice lines on as many features as bearable deformations allow, None if on none; and why not
-        on others."""
+    def _along_features(self, settings: PatternSettings) -> tuple[Placement | None, list[str], list[str]]:
+        """With lattice lines on as many features as bearable deformations allow, None if on none; why not on
+        others; and what would suit them better."""
+        proposed: list[str] = []
         if not self.features:
-            return None, []
+            return None, [], proposed
         if not is_straight(self.lattice, edge_angle(self.lattice, self.shape)):
-            return None, [
-                "At this rotation no line of the pattern can follow a fold: cells are cut where it falls."
-            ]
+            why = "At this rotation no line of the pattern can follow a fold: cells are cut where it falls."
+            return None, [why], proposed
         if self.cmap.kind == "net":
-            return None, [
-                "On this domain no line of the pattern follows a fold: cells are cut where it falls."
-            ]
+            why = "On this domain no line of the pattern follows a fold: cells are cut where it falls."
+            return None, [why], proposed
         chains = narrow(self.chains, self.cmap)
         straight = {chain.feature for chain in chains}
         sentences = [self._wide_note(chain) for chain in self.chains if chain.feature not in straight]
@@ -176,27 +186,31 @@ class PlacementFamily:
             chains.sort(key=lambda chain: chain.feature)
         for _ in range(MOST_GIVEN_UP):
             if not chains:
-                return None, sentences
+                return None, sentences, proposed
             aligned = self._way(chains, self.loops, settings)
             winding = self._winding(chains, aligned, settings)
             way = aligned
             if winding is not None and aligned.cost > MOST_PREDICTED and settings.boundary == "trim":
                 way = winding
-            if way.cost <= MOST_PREDICTED:
-                placed = place_by_sides(way.straightening, settings)
+            if way.bearable:
+                much = way.cost > MOST_PREDICTED
+                placed = place_by_sides(way.straightening, settings, gathered=much)
                 if placed.distortion <= MOST_DISTORTED:
-                    return replace(placed, straight=way.features.straight), [
-                        *sentences,
-                        *self._winding_notes(aligned, winding, taken=way is winding),
-                        *self._number_notes(way, settings, placed.around),
-                        *(self._third_note(c) for c in chains if c.feature not in way.features.straight),
-                    ]
+                    if way is winding:
+                        sentences.append(self._winding_note(aligned, way, taken=True))
+                    elif winding is not None:
+                        proposed = [self._winding_note(aligned, winding, taken=False)]
+                    elif not proposed:
+                        proposed = self._number_notes(way, settings, placed.around)
+                    followed = way.features.straight
+                    sentences += [self._third_note(c) for c in chains if c.feature not in followed]
+                    return replace(placed, straight=followed), sentences, proposed
             left = self._without_worst(chains, aligned.ratio)
             if winding is not None and winding.cost <= MOST_PREDICTED:
-                sentences += self._winding_notes(aligned, winding, taken=False)
+                proposed = [self._winding_note(aligned, winding, taken=False)]
             sentences += [self._costly_note(chain, aligned) for chain in chains if chain not in left]
             chains = left
-        return None, sentences
+        return None, sentences, proposed
 
     def _way(self, chains: list[Chain], loops: list[int], settings: PatternSettings) -> _Way:
         straightening = self._straightened(chains, loops)
@@ -215,17 +229,15 @@ class PlacementFamily:
         winding = self._way(chains, [], settings)
         return winding if winding.cost < 0.5 * aligned.cost else None
 
-    def _winding_notes(self, aligned: _Way, winding: _Way | None, *, taken: bool) -> list[str]:
-        if winding is None:
-            return []
+    def _winding_note(self, aligned: _Way, winding: _Way, *, taken: bool) -> str:
         lean = np.rad2deg(abs(aligned.features.lean))
         angle = f"{lean.max():.1f}°" if np.ptp(lean) < 0.1 else f"{lean.min():.1f}° to {lean.max():.1f}°"
         cost = cost_of(aligned.cost)
         said = f"The folds lean by {angle}: to follow them from rows along the boundary would {cost}"
         way = f"winds along with them, at {winding.cost:.2g}, and is cut at its ends."
         if taken:
-            return [f"{said}, so that the pattern {way}"]
-        return [f'{said}. With align "none" and boundary "trim" the pattern {way}']
+            return f"{said}, so that the pattern {way}"
+        return f'{said}. With align "none" and boundary "trim" the pattern {way}'
 
     def _number_notes(self, way: _Way, settings: PatternSettings, around: int) -> list[str]:
         """Which number of cells around would suit the features better than the size asked for."""
@@ -235,8 +247,8 @@ class PlacementFamily:
         if free.around == around or free.cost > 0.5 * way.cost:
             return []
         return [
-            f"{free.around} cells around, instead of {around}, would fit the folds better: a distortion of "
-            f"about {free.cost:.2g} instead of {way.cost:.2g}."
+            f"{free.around} cells around, instead of {around}, would fit the folds better: a "
+            f"distortion of about {free.cost:.2g} instead of {way.cost:.2g}."
         ]
 
     def _wide_note(self, chain: Chain) -> str:
@@ -269,6 +281,8 @@ class PlacementFamily:
 
     def _corner_notes(self, straight: frozenset[int]) -> list[str]:
         """Where folds that are not followed meet others at angles that no lines of the pattern have."""
+        if not self.chains:
+            return []
         vertex, least = least_where_they_meet(self.cmap, self.lattice, self.chains)
         missed = [chain.vertex for chain in self.chains if chain.feature not in straight]
         bad = (least > MOST_PREDICTED) & np.isin(vertex, np.concatenate([vertex[:0], *missed]))
@@ -335,6 +349,24 @@ class PlacementFamily:
         return [
             Straightening.of(self.cmap, self.lattice, self.shape, self.cone_index, [loop]) for loop in loops
         ]
+
+    @cached_property
+    def _are_lines(self) -> bool:
+        """The loops to align."""
+        return not any(has_corners(self.cmap, self.lattice, loop) for loop in self.loops)
+
+    def _seated(self, settings: PatternSettings) -> Placement:
+        """Without corners to align: where whole cells cover most."""
+        cmap, lattice, loops = self.cmap, self.lattice, self.loops
+
+        def make(one: PatternSettings) -> Placement:
+            return place_on_cylinder(cmap, lattice, one, loops) if loops else self._freely(one)
+
+        asked = settings.around is not None or settings.edge_length is not None
+        if asked or settings.boundary != "whole" or len(loops) == len(cmap.surface.loops):
+            return make(settings)
+        edge = wanted_edge(cmap, lattice, settings, edge_angle(lattice, settings)) * mean_stretch(cmap)
+        return seated(cmap, lattice, settings, edge, make, loops=loops)
 
     def _freely(self, settings: PatternSettings) -> Placement:
         """Aligned nowhere."""

@@ -24,7 +24,7 @@ from hexwrap_solver.pattern.place.sides import is_line
 from hexwrap_solver.pattern.place.size import edges_around, fitting_number, size_spread
 from hexwrap_solver.pattern.place.target import Target
 from hexwrap_solver.pattern.types import PatternSettings
-from hexwrap_solver.tolerances import ANGLE
+from hexwrap_solver.tolerances import ANGLE, TINY
 
 
 def place_on_cylinder(
@@ -51,7 +51,7 @@ def place_on_cylinder(
     if len(loops) == 2:
         # By which factors heights must change for a whole number of rows to fit between the loops.
         between = (abs(height[1] - height[0]) * abs(lattice.position(options)) / abs(t)).tolist()
-        stretches = np.array([rows.nearest_height(one) / one for one in between])
+        stretches = np.array([max(rows.nearest_height(one) / one, TINY) for one in between])
         pick = int(np.argmin(abs(np.log(stretches)).round(9)))  # of equal ones that nearest in size
         if max(stretches[pick], 1 / stretches[pick]) - 1 > BEARABLE:
             loops, notes = loops[:1], [_unbearable(cmap, lattice, target.angle, float(stretches[pick]))]
@@ -100,8 +100,9 @@ def _unrolled(cmap: ConformalMap, anchor: int, loops: list[int]) -> tuple[Comple
 
 def _unbearable(cmap: ConformalMap, lattice: Lattice, angle: float, stretch: float) -> str:
     enough, _ = fitting_number(cmap, lattice, angle)
-    return (
-        f"To align both loops at this size would {'stretch' if stretch > 1 else 'flatten'} the rows by "
-        f"{max(stretch, 1 / stretch) - 1:.0%}, more than {BEARABLE:.0%}, so that only one is aligned; with "
-        f"{enough} cells around both would be."
-    )
+    if stretch <= TINY:
+        why = "No row of this size fits between both loops"
+    else:
+        change = f"{'stretch' if stretch > 1 else 'flatten'} the rows by {max(stretch, 1 / stretch) - 1:.0%}"
+        why = f"To align both loops at this size would {change}, more than {BEARABLE:.0%}"
+    return f"{why}, so that only one is aligned; with {enough} cells around both would be."

@@ -26,6 +26,8 @@ SIZE = 0.1
 
 #: Rounds of reweighting, by which the sum of squares nears one of fourth powers, and its least weight: what
 #: the triangles at corners bear is spread over more of them (worst ratios of 0.04 for 0.18, 0.21 for 0.6).
+#: Gathered, it nears one of powers of 3/2 over the surface: what the cells beside a fold bear is not spread,
+#: so that others stay regular (a tower with setbacks is covered to 92 % instead of 86 %).
 ROUNDS, FLOOR = 4, 1e-2
 #: Below this worst ratio of singular values − 1, a round that gains nothing is the last one.
 FINE = 0.03
@@ -37,18 +39,33 @@ REST = 1e-9
 
 
 def deform(
-    system: System, glued: Glued, scale: complex, rest: Complexes, depth: Floats
+    system: System,
+    glued: Glued,
+    scale: complex,
+    rest: Complexes,
+    depth: Floats,
+    *,
+    gathered: bool = False,
 ) -> tuple[Complexes, float]:
     """(n,) vertices in lattice units, on the lines of the system, and what ``distortion_of`` says of them.
 
     glued: with the rotations of the system's. rest: (n,) where the vertices would stand undeformed, with
-    scale = ∂W/∂z. depth: (n, 2) of the lines.
+    scale = ∂W/∂z. depth: (n, 2) of the lines. gathered: where little of the surface bears it, instead of
+    spread until no triangle bears much.
     """
     change, freedom = system.change, system.freedom
     shift = change.of_shift(glued.shift)
     fixed = freedom.place_on_lines(depth)
     start = freedom.basis.T @ _parts(rest - fixed)  # the basis is orthonormal
     angles, sizes = change.of(fixed, shift)
+    if gathered:
+        part = weight = system.cmap.surface.areas / system.cmap.surface.areas.sum()
+        for _ in range(ROUNDS):
+            place = fixed + system.solve(weight, -angles, scale - sizes, start)
+            bent, kept = change.strains(place, shift)
+            weight = part / np.sqrt(bent / abs(scale) + FLOOR)
+            weight /= weight.mean()
+        return place, _worst(bent, kept)
     even = np.sqrt(change.area / change.area.sum())
     weight, best, least = even, rest, np.inf
     for _ in range(ROUNDS):

@@ -18,7 +18,7 @@ from hexwrap_solver.tolerances import RELATIVE
 
 #: A feature that strays more from its own straight line than this part of the circumference is not made
 #: straight.
-WIDE = 0.02
+WIDE = 0.05
 
 #: Creases that were only seen on the mesh count where they are longer than this many cells, and where all of
 #: them together leave as many between them: others are roughness, or a coarse mesh of a round surface.

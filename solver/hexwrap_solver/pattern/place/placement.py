@@ -38,6 +38,7 @@ class Placement:
     lattice. rotation: angle from the boundary direction to an edge. around: cells once around (middle ring on
     cones, longest loop on nets). distortion: worst ratio of singular values − 1 of the stretch. step: around
     is one of its multiples. motion: on sheets, what g is. straight: features that lie on lattice lines.
+    proposes: whether a note says what would suit features better.
     """
 
     place: Complexes
@@ -50,6 +51,7 @@ class Placement:
     step: int = 1
     motion: Isometry | None = None
     straight: frozenset[int] = frozenset()
+    proposes: bool = False
 
     @classmethod
     def on_sheet(

@@ -15,6 +15,7 @@ from hexwrap_solver.pattern.place.size import face_areas
 from hexwrap_solver.pattern.place.target import boundary_direction
 from hexwrap_solver.pattern.types import PatternSettings
 from hexwrap_solver.surface.projection import parameter_corners
+from hexwrap_solver.surface.types import Surface
 
 #: Directions whose mean is shorter than this (1: all agree) have none worth following.
 AGREEMENT = 0.2
@@ -57,15 +58,20 @@ def with_rotation(
     return replace(settings, rotation=float(np.rad2deg(angle))), [sentence]
 
 
-def parameter_directions(cmap: ConformalMap, direction: int) -> Complexes:
-    """(m,) unit directions in the domain along which the parameter u (0) or v (1) grows, the other fixed."""
-    surface = cmap.surface
+def check_parameters(surface: Surface) -> None:
+    """Raises PatternError where the surface is not a NURBS surface."""
     if surface.nurbs is None or surface.parameters is None:
         raise PatternError(
             "Only a NURBS surface has u and v directions to follow: give rotation as edge, vertex or "
             "degrees.",
             field=("rotation",),
         )
+
+
+def parameter_directions(cmap: ConformalMap, direction: int) -> Complexes:
+    """(m,) unit directions in the domain along which the parameter u (0) or v (1) grows, the other fixed."""
+    surface = cmap.surface
+    check_parameters(surface)
     parameters = parameter_corners(surface, np.arange(len(surface.faces)))
     other, own = parameters[..., 1 - direction], parameters[..., direction]
     z = cmap.corners()

@@ -6,9 +6,10 @@ from math import log
 
 import numpy as np
 
-from hexwrap_solver.conformal.types import ConformalMap
+from hexwrap_solver.arrays import Floats
 from hexwrap_solver.errors import PatternError
 from hexwrap_solver.pattern.types import PatternSettings
+from hexwrap_solver.surface.types import Surface
 from hexwrap_solver.words import box
 
 #: Ratios of units that are mistaken for each other: metric ones, inches and feet.
@@ -19,36 +20,41 @@ USUAL = 1 / 50
 PINCHED = 8.0
 #: Larger ratios are not reported.
 MANY = 1_000_000
+#: An edge so many times as long as usual, or a part as small of it, is not proposed.
+FAR = 100.0
 
 
-def check_edge(cmap: ConformalMap, settings: PatternSettings) -> None:
+def check_edge(surface: Surface, settings: PatternSettings) -> None:
     """Raises PatternError for an edge longer than the model."""
     edge = settings.edge_length
-    if edge is not None and edge > _diagonal(cmap):
+    if edge is not None and edge > _diagonal(surface):
         raise PatternError(
-            f"An edge length of {edge:g}{unit(cmap)} is larger than the model, {model(cmap)}: did you mean "
-            f"{_meant(cmap, edge):g}?",
-            field=("pattern", "edge_length"),
+            f"An edge length of {edge:g}{unit(surface)} is larger than the model, {model(surface)}: did you "
+            f"mean {_meant(surface, edge):g}?",
+            field=("edge_length",),
         )
 
 
-def too_many(cmap: ConformalMap, settings: PatternSettings, cells: float) -> PatternError:
-    """Why that many cells would be needed, and what to do."""
+def too_many(
+    surface: Surface, settings: PatternSettings, cells: float, log_scale: Floats | None = None
+) -> PatternError:
+    """Why that many cells would be needed, and what to do. log_scale: of the map, where there is one."""
     edge, limit = settings.edge_length, settings.max_cells
     data: dict[str, object] = {"cells": int(cells), "limit": limit}
-    if edge is not None and edge * _nearest(cmap, edge) != edge:
+    if edge is not None and edge * _nearest(surface, edge) != edge:
         return PatternError(
-            f"The model is {model(cmap)}, so that about {cells:,.0f} cells with edges of "
-            f"{edge:g}{unit(cmap)} would be needed, over the limit of {limit:,}: did you mean "
-            f"{_meant(cmap, edge):g}?",
+            f"The model is {model(surface)}, so that about {cells:,.0f} cells with edges of "
+            f"{edge:g}{unit(surface)} would be needed, over the limit of {limit:,}: did you mean "
+            f"{_meant(surface, edge):g}?",
             data=data,
-            field=("pattern", "edge_length"),
+            field=("edge_length",),
         )
-    narrow = int(np.argmax(cmap.log_scale))
-    shrunk = float(np.exp(cmap.log_scale[narrow] - np.median(cmap.log_scale)))
+    scale = np.zeros(len(surface.vertices)) if log_scale is None else log_scale
+    narrow = int(np.argmax(scale))
+    shrunk = float(np.exp(scale[narrow] - np.median(scale)))
     if shrunk > PINCHED:
-        place = ", ".join(f"{x:.4g}" for x in _rounded(cmap, narrow))
-        vertex = int(cmap.surface.input_vertex[narrow])
+        place = ", ".join(f"{x:.4g}" for x in _rounded(surface, narrow))
+        vertex = int(surface.input_vertex[narrow])
         times = f"{shrunk:,.0f} times" if shrunk < MANY else f"more than {MANY:,} times"
         return PatternError(
             f"The surface is pinched at ({place}): a map that keeps angles makes cells there {times} smaller "
@@ -64,33 +70,35 @@ def too_many(cmap: ConformalMap, settings: PatternSettings, cells: float) -> Pat
     )
 
 
-def _rounded(cmap: ConformalMap, vertex: int) -> list[float]:
+def _rounded(surface: Surface, vertex: int) -> list[float]:
     """Where a vertex is, without digits that do not matter."""
-    grain = 1e-6 * _diagonal(cmap)
-    place: list[float] = (np.round(cmap.surface.vertices[vertex] / grain) * grain + 0.0).tolist()
+    grain = 1e-6 * _diagonal(surface)
+    place: list[float] = (np.round(surface.vertices[vertex] / grain) * grain + 0.0).tolist()
     return place
 
 
-def unit(cmap: ConformalMap) -> str:
+def unit(surface: Surface) -> str:
     """The unit behind a number, with a blank before it, or nothing."""
-    return f" {cmap.surface.unit}" if cmap.surface.unit else ""
+    return f" {surface.unit}" if surface.unit else ""
 
 
-def model(cmap: ConformalMap) -> str:
+def model(surface: Surface) -> str:
     """Size of the bounding box in words."""
-    return box(np.ptp(cmap.surface.vertices, axis=0).tolist()) + unit(cmap)
+    return box(np.ptp(surface.vertices, axis=0).tolist()) + unit(surface)
 
 
-def _diagonal(cmap: ConformalMap) -> float:
-    return float(np.linalg.norm(np.ptp(cmap.surface.vertices, axis=0)))
+def _diagonal(surface: Surface) -> float:
+    return float(np.linalg.norm(np.ptp(surface.vertices, axis=0)))
 
 
-def _meant(cmap: ConformalMap, edge: float) -> float:
-    return float(f"{edge * _nearest(cmap, edge):.4g}")
+def _meant(surface: Surface, edge: float) -> float:
+    """In another unit; or the usual length, where that is as senseless."""
+    meant, usual = edge * _nearest(surface, edge), USUAL * _diagonal(surface)
+    return float(f"{meant if 1 / FAR < meant / usual < FAR else usual:.4g}")
 
 
-def _nearest(cmap: ConformalMap, edge: float) -> float:
+def _nearest(surface: Surface, edge: float) -> float:
     """The ratio of units that makes the edge length the most usual."""
-    usual = USUAL * _diagonal(cmap)
+    usual = USUAL * _diagonal(surface)
     ratios = (1.0, *RATIOS, *(1 / ratio for ratio in RATIOS))
     return min(ratios, key=lambda ratio: abs(log(edge * ratio / usual)))

@@ -8,6 +8,7 @@ import numpy as np
 
 from hexwrap_solver.arrays import Floats
 from hexwrap_solver.conformal.types import ConformalMap
+from hexwrap_solver.geometry import plane_areas
 from hexwrap_solver.pattern.lattice import Isometry, Lattice
 from hexwrap_solver.pattern.place.placement import is_disk, main_loops
 from hexwrap_solver.pattern.place.sense import too_many
@@ -36,9 +37,7 @@ EDGES_PER_CELL = 4.0
 
 def face_areas(cmap: ConformalMap) -> tuple[Floats, Floats]:
     """(m,) areas of the triangles on the surface and in the domain."""
-    p, q, r = cmap.corners().T
-    in_domain = abs(((q - p).conj() * (r - p)).imag) / 2
-    return cmap.surface.areas, in_domain
+    return cmap.surface.areas, plane_areas(cmap.corners())
 
 
 def mean_stretch(cmap: ConformalMap) -> float:
@@ -169,7 +168,8 @@ def edges_around(cmap: ConformalMap, settings: PatternSettings, edge: float) -> 
     """
     edges = cmap.circumference / edge
     if not edges <= EDGES_PER_CELL * settings.max_cells:
-        raise too_many(cmap, settings, min(edges / EDGES_PER_CELL, sys.float_info.max))
+        cells = min(edges / EDGES_PER_CELL, sys.float_info.max)
+        raise too_many(cmap.surface, settings, cells, cmap.log_scale)
     return edges
 
 

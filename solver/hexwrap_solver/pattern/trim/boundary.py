@@ -9,11 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints
 from hexwrap_solver.domain.locate import runs
+from hexwrap_solver.geometry import orbits
 from hexwrap_solver.pattern.lay.edges import PatternEdges
 from hexwrap_solver.pattern.lay.layout import Layout
 from hexwrap_solver.pattern.lay.nodes import Nodes
@@ -86,9 +85,7 @@ def boundary_of(surface: Surface, layout: Layout) -> Boundary:
 def _in_cycles(following: Ints, priority: Ints) -> tuple[Ints, Ints]:
     """Order of the elements of a permutation, cycle after cycle, each from its element of least priority on
     and sorted by that; and (b,) which cycle each element then is of."""
-    b = len(following)
-    graph = coo_array((np.ones(b), (np.arange(b), following)), shape=(b, b))
-    n, cycle = connected_components(graph, directed=False)
+    cycle, n = orbits(following)
     least = np.full(n, np.iinfo(np.int64).max)
     np.minimum.at(least, cycle, priority)
     first = priority == least[cycle]
