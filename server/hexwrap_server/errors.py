@@ -81,55 +81,38 @@ class FormError(HexwrapError):
         return error
 
 
-class NotJsonError(FormError):
-    slug = "not-json"
-    title = "The body is not JSON"
-    status = 400
+class NotJsonError(FormError, slug="not-json", title="The body is not JSON", status=400): ...
 
 
-class UploadError(FormError):
-    slug = "upload"
-    title = "The upload cannot be read"
+class UploadError(FormError, slug="upload", title="The upload cannot be read"): ...
 
 
-class TooManyVerticesError(FormError):
-    slug = "too-many-vertices"
-    title = "The surface has too many vertices"
+class TooManyVerticesError(
+    FormError, slug="too-many-vertices", title="The surface has too many vertices"
+): ...
 
 
-class FileTypeError(SurfaceError):
-    slug = "file-type"
-    title = "The file type is not known"
+class FileTypeError(SurfaceError, slug="file-type", title="The file type is not known"): ...
 
 
-class UnreadableFileError(SurfaceError):
-    slug = "unreadable-file"
-    title = "The file cannot be read"
+class UnreadableFileError(SurfaceError, slug="unreadable-file", title="The file cannot be read"): ...
 
 
-class SeveralObjectsError(SurfaceError):
-    slug = "several-objects"
-    title = "The file holds more than one surface"
+class SeveralObjectsError(
+    SurfaceError, slug="several-objects", title="The file holds more than one surface"
+): ...
 
 
-class NoObjectError(SurfaceError):
-    slug = "no-such-object"
-    title = "The file does not hold the object"
+class NoObjectError(SurfaceError, slug="no-such-object", title="The file does not hold the object"): ...
 
 
-class DrawingError(HexwrapError):
-    slug = "drawing"
-    title = "The drawing cannot be read"
+class DrawingError(HexwrapError, slug="drawing", title="The drawing cannot be read"): ...
 
 
-class NotMadeError(HexwrapError):
-    slug = "not-made"
-    title = "The file needs a stage that was left out"
+class NotMadeError(HexwrapError, slug="not-made", title="The file needs a stage that was left out"): ...
 
 
-class SheetError(HexwrapError):
-    slug = "sheet"
-    title = "The panels do not fit on the sheets"
+class SheetError(HexwrapError, slug="sheet", title="The panels do not fit on the sheets"): ...
 
 
 class HttpError(HexwrapError):
@@ -212,31 +195,19 @@ class WorkError(HexwrapError):
     """The work ended without a result, and not because of what was asked."""
 
 
-class TimeLimitError(WorkError):
-    slug = "time-limit"
-    title = "The work took too long"
+class TimeLimitError(WorkError, slug="time-limit", title="The work took too long"): ...
 
 
-class MemoryLimitError(WorkError):
-    slug = "memory-limit"
-    title = "The work needed too much memory"
+class MemoryLimitError(WorkError, slug="memory-limit", title="The work needed too much memory"): ...
 
 
-class AttemptsError(WorkError):
-    slug = "too-many-attempts"
-    title = "The job was given up"
+class AttemptsError(WorkError, slug="too-many-attempts", title="The job was given up"): ...
 
 
-class WorkerDiedError(WorkError):
-    slug = "worker-died"
-    title = "The worker process died"
-    status = 503
+class WorkerDiedError(WorkError, slug="worker-died", title="The worker process died", status=503): ...
 
 
-class ClusterError(WorkError):
-    slug = "cluster"
-    title = "The cluster could not run the job"
-    status = 503
+class ClusterError(WorkError, slug="cluster", title="The cluster could not run the job", status=503): ...
 
 
 class ShuttingDownError(WorkError):
@@ -248,10 +219,7 @@ class ShuttingDownError(WorkError):
         super().__init__(detail)
 
 
-class InternalError(WorkError):
-    slug = "internal"
-    title = "A fault in hexwrap"
-    status = 500
+class InternalError(WorkError, slug="internal", title="A fault in hexwrap", status=500): ...
 
 
 class StorageError(WorkError):

@@ -35,6 +35,12 @@ class HexwrapError(Exception):
     slug: ClassVar[str] = "error"
     title: ClassVar[str] = "The request cannot be carried out"
 
+    def __init_subclass__(cls, **facts: str | int) -> None:
+        """facts: what holds of all errors of the class, such as its slug and title."""
+        super().__init_subclass__()
+        for name, value in facts.items():
+            setattr(cls, name, value)
+
     def __init__(
         self,
         detail: str,
@@ -67,51 +73,33 @@ def _rebuild(kind: type[HexwrapError], detail: str, state: dict[str, object]) ->
     return error
 
 
-class SurfaceError(HexwrapError):
-    slug = "surface"
-    title = "The surface cannot be used"
+class SurfaceError(HexwrapError, slug="surface", title="The surface cannot be used"): ...
 
 
-class RequestError(HexwrapError):
-    slug = "request"
-    title = "The request cannot be met on this surface"
+class RequestError(HexwrapError, slug="request", title="The request cannot be met on this surface"): ...
 
 
-class SettingError(RequestError, ValueError):
-    slug = "setting"
-    title = "Two settings contradict each other"
+class SettingError(RequestError, ValueError, slug="setting", title="Two settings contradict each other"): ...
 
 
-class GaussBonnetError(RequestError):
-    slug = "gauss-bonnet"
-    title = "The boundary angles do not add up"
+class GaussBonnetError(RequestError, slug="gauss-bonnet", title="The boundary angles do not add up"): ...
 
 
-class BoundaryError(RequestError):
-    slug = "boundary"
-    title = "A boundary condition cannot be used"
+class BoundaryError(RequestError, slug="boundary", title="A boundary condition cannot be used"): ...
 
 
-class SingularitiesError(RequestError):
-    slug = "singularities"
-    title = "The singularities do not suit the surface"
+class SingularitiesError(
+    RequestError, slug="singularities", title="The singularities do not suit the surface"
+): ...
 
 
-class NotAdaptedError(RequestError):
-    slug = "not-adapted"
-    title = "The cone angle does not fit the pattern"
+class NotAdaptedError(RequestError, slug="not-adapted", title="The cone angle does not fit the pattern"): ...
 
 
-class PatternError(RequestError):
-    slug = "pattern"
-    title = "The pattern does not fit"
+class PatternError(RequestError, slug="pattern", title="The pattern does not fit"): ...
 
 
-class PanelsError(RequestError):
-    slug = "panels"
-    title = "The panels cannot be made"
+class PanelsError(RequestError, slug="panels", title="The panels cannot be made"): ...
 
 
-class ConvergenceError(HexwrapError):
-    slug = "no-convergence"
-    title = "The computation did not converge"
+class ConvergenceError(HexwrapError, slug="no-convergence", title="The computation did not converge"): ...

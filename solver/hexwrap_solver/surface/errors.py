@@ -29,92 +29,67 @@ from __future__ import annotations
 from hexwrap_solver.errors import SurfaceError
 
 
-class EmptySurfaceError(SurfaceError):
-    slug = "empty-surface"
-    title = "The surface is empty"
+class EmptySurfaceError(SurfaceError, slug="empty-surface", title="The surface is empty"): ...
 
 
-class ShapeError(SurfaceError):
-    slug = "malformed-surface"
-    title = "The surface's arrays have the wrong shape"
+class ShapeError(
+    SurfaceError, slug="malformed-surface", title="The surface's arrays have the wrong shape"
+): ...
 
 
-class NonFiniteError(SurfaceError):
-    slug = "not-finite"
-    title = "The surface has coordinates that are not finite numbers"
+class NonFiniteError(
+    SurfaceError, slug="not-finite", title="The surface has coordinates that are not finite numbers"
+): ...
 
 
-class IndexRangeError(SurfaceError):
-    slug = "index-out-of-range"
-    title = "A face points at a vertex that was not sent"
+class IndexRangeError(
+    SurfaceError, slug="index-out-of-range", title="A face points at a vertex that was not sent"
+): ...
 
 
-class PolygonSizeError(SurfaceError):
-    slug = "polygon-size"
-    title = "A face is neither triangle nor quad"
+class PolygonSizeError(SurfaceError, slug="polygon-size", title="A face is neither triangle nor quad"): ...
 
 
-class DegeneratePolygonError(SurfaceError):
-    slug = "degenerate-face"
-    title = "A face has no area"
+class DegeneratePolygonError(SurfaceError, slug="degenerate-face", title="A face has no area"): ...
 
 
-class FlatSurfaceError(SurfaceError):
-    slug = "no-extent"
-    title = "The surface has no area"
+class FlatSurfaceError(SurfaceError, slug="no-extent", title="The surface has no area"): ...
 
 
-class NonManifoldEdgeError(SurfaceError):
-    slug = "non-manifold-edge"
-    title = "More than two faces share an edge"
+class NonManifoldEdgeError(
+    SurfaceError, slug="non-manifold-edge", title="More than two faces share an edge"
+): ...
 
 
-class SeveralComponentsError(SurfaceError):
-    slug = "several-components"
-    title = "The surface is in several pieces"
+class SeveralComponentsError(
+    SurfaceError, slug="several-components", title="The surface is in several pieces"
+): ...
 
 
-class NotOrientableError(SurfaceError):
-    slug = "not-orientable"
-    title = "The surface has only one side"
+class NotOrientableError(SurfaceError, slug="not-orientable", title="The surface has only one side"): ...
 
 
-class HandlesError(SurfaceError):
+class HandlesError(SurfaceError, slug="handles", title="The surface has handles"):
     """edges: a loop to cut along; data: loops, Euler characteristic, genus and the loop's length."""
 
-    slug = "handles"
-    title = "The surface has handles"
 
-
-class DrawnLineError(SurfaceError):
+class DrawnLineError(
+    SurfaceError, slug="feature-line", title="A line drawn on the surface cannot be followed"
+):
     """data["line"], data["point"]: the numbers of the line and of its point."""
 
-    slug = "feature-line"
-    title = "A line drawn on the surface cannot be followed"
+
+class NurbsDataError(SurfaceError, slug="nurbs-data", title="The NURBS data define no surface"): ...
 
 
-class NurbsDataError(SurfaceError):
-    slug = "nurbs-data"
-    title = "The NURBS data define no surface"
+class NotClosedError(SurfaceError, slug="nurbs-not-closed", title="The NURBS surface does not close up"): ...
 
 
-class NotClosedError(SurfaceError):
-    slug = "nurbs-not-closed"
-    title = "The NURBS surface does not close up"
+class PoleError(SurfaceError, slug="nurbs-pole", title="The NURBS surface shrinks to a point"): ...
 
 
-class PoleError(SurfaceError):
-    slug = "nurbs-pole"
-    title = "The NURBS surface shrinks to a point"
-
-
-class TrimError(SurfaceError):
+class TrimError(SurfaceError, slug="brep-trim", title="A face of the polysurface has a faulty boundary"):
     """data["face"] is the face's number in the Brep."""
 
-    slug = "brep-trim"
-    title = "A face of the polysurface has a faulty boundary"
 
-
-class TooFineError(SurfaceError):
-    slug = "mesh-too-fine"
-    title = "The mesh would have too many vertices"
+class TooFineError(SurfaceError, slug="mesh-too-fine", title="The mesh would have too many vertices"): ...
