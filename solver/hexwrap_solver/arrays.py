@@ -27,6 +27,13 @@ def runs(counts: Ints) -> tuple[Ints, Ints]:
     return owner, np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts)
 
 
+def positions(numbers: Ints, n: int) -> Ints:
+    """(n,) where each of 0 … n − 1 stands among the numbers (k,), −1 where it does not."""
+    found = np.full(n, -1, dtype=np.int64)
+    found[numbers] = np.arange(len(numbers))
+    return found
+
+
 @dataclass(frozen=True)
 class Ragged:
     """Rows of different lengths, stored flat (polygons with mixed numbers of corners).

@@ -6,6 +6,7 @@ from typing import TypeVar
 
 import numpy as np
 from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
 
 from hexwrap_solver.arrays import Complexes, Floats, Ints
 
@@ -117,6 +118,19 @@ def stable_order(key: Ints, n: int) -> Ints:
         return np.sort(key * k + np.arange(k)) % k
     matrix = csr_array((np.ones(k, dtype=np.int8), key, np.arange(k + 1)), shape=(k, n))
     return np.asarray(matrix.tocsc().indices, dtype=np.int64)
+
+
+def linked(one: Ints, other: Ints, n: int) -> tuple[int, Ints]:
+    """How many parts n elements are in if the pairs (k,) belong together, and (n,) the number of each one's
+    part, in the order of their lowest elements."""
+    graph = csr_array((np.ones(len(one), dtype=np.int8), (one, other)), shape=(n, n))
+    count, part = connected_components(graph, directed=False)
+    return int(count), np.asarray(part, dtype=np.int64)
+
+
+def pair_key(one: Ints, other: Ints, n: int) -> Ints:
+    """(k,) one number for each pair of numbers below n, in either order."""
+    return np.asarray(np.minimum(one, other) * n + np.maximum(one, other))
 
 
 def orbits(following: Ints) -> tuple[Ints, int]:

@@ -17,9 +17,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.csgraph import breadth_first_order, connected_components
+from scipy.sparse.csgraph import breadth_first_order
 
-from hexwrap_solver.arrays import Bools, Ints
+from hexwrap_solver.arrays import Bools, Ints, positions
+from hexwrap_solver.geometry import linked
 from hexwrap_solver.surface.topology import half_edges, next_half_edge
 from hexwrap_solver.surface.types import Surface
 
@@ -174,14 +175,10 @@ def _fans(start: Ints, left: Ints, twin: Ints, open_twin: Ints) -> Ints:
     fan = np.zeros(len(start), dtype=np.int64)
     if not len(near):
         return fan
-    place = np.full(len(start), -1, dtype=np.int64)
-    place[near] = np.arange(len(near))
+    place = positions(near, len(start))
     crossed = near[open_twin[near] >= 0]
     other = next_half_edge(open_twin[crossed])
-    graph = sparse.coo_matrix(
-        (np.ones(len(crossed), dtype=np.int8), (place[crossed], place[other])), shape=(len(near), len(near))
-    )
-    count, label = connected_components(graph, directed=False)
+    count, label = linked(place[crossed], place[other], len(near))
     right = twin[left]
     right = np.stack([next_half_edge(right), right], axis=1).ravel()  # at the start and at the end
     _, first = np.unique(start[right], return_index=True)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints
+from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints, positions
 from hexwrap_solver.conformal.types import Targets
 from hexwrap_solver.surface.topology import edge_lengths
 from hexwrap_solver.surface.types import Surface
@@ -195,8 +195,7 @@ def _unknowns(targets: Targets) -> tuple[Ints, int]:
         free = free.copy()
         free[np.flatnonzero(free)[int(free.sum()) // 2]] = False
     n_free = int(free.sum())
-    dof = np.full(len(free), -1, dtype=np.int64)
-    dof[free] = np.arange(n_free)
+    dof = positions(np.flatnonzero(free), len(free))
     tied = targets.shared > 0
     dof[tied] = n_free + targets.shared[tied] - 1
     return dof, n_free + max(len(targets.shared_angle) - 1, 0)

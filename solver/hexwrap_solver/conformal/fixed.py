@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexwrap_solver.arrays import Floats, Ints, Progress, no_progress
+from hexwrap_solver.arrays import Floats, Ints, Progress, no_progress, positions
 from hexwrap_solver.conformal.energy import Corners, Energy
 from hexwrap_solver.conformal.newton import Rules, descend, largest
 from hexwrap_solver.linalg.factor import Factorisation
@@ -109,8 +109,7 @@ class _Fixed:
         return _solved(self.factorisation, *self.energy.hessian(point.corners), point.gradient, point.corners)
 
     def local_direction(self, point: _Point, among: Ints) -> Floats | None:
-        local = np.full(len(point.x), -1)
-        local[among] = np.arange(len(among))
+        local = positions(among, len(point.x))
         rows, columns = local[self.energy.rows], local[self.energy.columns]
         inside = (rows >= 0) & (columns >= 0)
         part = Factorisation(self.energy.points[among], rows[inside], columns[inside])

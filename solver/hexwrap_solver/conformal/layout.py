@@ -9,7 +9,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
 
-from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints
+from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints, positions
 from hexwrap_solver.conformal.cut import Cut, cut_open
 from hexwrap_solver.conformal.energy import Corners
 from hexwrap_solver.conformal.net import Net
@@ -100,8 +100,7 @@ class FaceTree:
         found, before = breadth_first_order(graph, 0, directed=rounding is None)
         order, parent = found.astype(np.int64), before.astype(np.int64)
         parent[0] = 0
-        place = np.empty(m, dtype=np.int64)
-        place[order] = np.arange(m)
+        place = positions(order, m)
         across = neighbour.reshape(-1, 3).T
         corner = np.where(across[0] == parent, 0, np.where(across[1] == parent, 1, 2))
         there = twin[3 * np.arange(m) + corner] - 3 * parent

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints
+from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints, positions
 from hexwrap_solver.surface.topology import next_half_edge
 
 #: Two images of an edge are one where they differ by less, relative to the domain's size.
@@ -89,8 +89,7 @@ class Net:
 
     def restricted(self, keep: Bools) -> Net:
         """The net of some faces, keep (m,); what lay across to others is boundary then."""
-        new = np.full(len(keep) + 1, -1, dtype=np.int64)  # the last one stands for −1
-        new[np.flatnonzero(keep)] = np.arange(int(keep.sum()))
+        new = positions(np.flatnonzero(keep), len(keep) + 1)  # the last one stands for −1
         across = new[self.across[keep]]
         return replace(
             self,

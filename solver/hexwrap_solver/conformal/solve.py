@@ -79,8 +79,7 @@ def check_cones(surface: Surface, cones: Cones) -> None:
     """Raises SingularitiesError for cones on the boundary, two at one vertex, and angles of 0 or less."""
     sent = surface.input_vertex[cones.vertex]
     inner = np.ones(len(surface.vertices), dtype=bool)
-    for loop in surface.loops:
-        inner[loop] = False
+    inner[surface.boundary] = False
     outside = np.flatnonzero(~inner[cones.vertex])
     if len(outside):
         raise SingularitiesError(

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.linalg.blas import dgemv, dsyrk, dtrsm, dtrsv
 from scipy.linalg.lapack import dpotrf
 
-from hexwrap_solver.arrays import Floats, Ints
+from hexwrap_solver.arrays import Floats, Ints, positions
 from hexwrap_solver.errors import ConvergenceError
 from hexwrap_solver.linalg.dissection import Dissection, dissect
 from hexwrap_solver.linalg.workspace import borrow
@@ -65,8 +65,7 @@ class Factorisation:
         self.n = len(points)
         tree = dissect(points, rows, columns)
         self._order = tree.order
-        place = np.zeros(self.n, dtype=np.int64)
-        place[tree.order] = np.arange(self.n)
+        place = positions(tree.order, self.n)
         one, other = place[rows], place[columns]
         low, high = np.minimum(one, other), np.maximum(one, other)
         self._fronts, visits, stacks = _analyse(tree, low, high)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hexwrap_solver.arrays import Floats, Ints
+from hexwrap_solver.arrays import Floats, Ints, positions
 from hexwrap_solver.panels.polygons import Outlines
 
 #: Figures (relative to the mean edge, or radians) that differ by less are the same.
@@ -32,9 +32,7 @@ def congruence_classes(shapes: list[Outlines]) -> Ints:
         key[one.row[~alike]] = used + _numbered(_least_rotation(letter[:, ~alike]))
         used = int(key.max()) + 1
     _, first, member = np.unique(key, return_index=True, return_inverse=True)
-    rank = np.zeros(len(first), dtype=np.int64)
-    rank[np.argsort(first)] = np.arange(len(first))
-    return np.asarray(rank[member])
+    return positions(np.argsort(first), len(first))[member]
 
 
 def _letters(figures: list[Floats]) -> Ints:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hexwrap_solver.arrays import Bools, Floats, Ints, Progress, Ragged, no_progress
+from hexwrap_solver.arrays import Bools, Floats, Ints, Progress, Ragged, no_progress, positions
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.errors import ConvergenceError, PanelsError
 from hexwrap_solver.geometry import normalize
@@ -404,8 +404,7 @@ def _spare(groups: list[_Group], planes: Separation, settings: PanelSettings) ->
 def _partners(at: Ints, edges: HalfEdges) -> Ints:
     """Positions of the twins among the half-edges ``at`` of the regular cells, −1 where they are not among
     them."""
-    position = np.full(len(edges.twin), -1, dtype=np.int64)
-    position[at] = np.arange(len(at))
+    position = positions(at, len(edges.twin))
     twin = edges.twin[at]
     return np.where(twin >= 0, position[twin], -1)
 

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints, Ragged, runs
+from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints, Ragged, positions, runs
 from hexwrap_solver.geometry import dot, normalize
 from hexwrap_solver.panels.limits import inscribed
 from hexwrap_solver.panels.polygons import area_vectors, means
@@ -294,16 +294,14 @@ def places_of(pattern: Pattern, made: Ints, bends: Bends | None) -> tuple[Ints, 
     begins, −1 along hinges."""
     row = pattern.faces.row
     corner = pattern.faces.within
-    panel = np.full(pattern.n_cells, -1, dtype=np.int64)
-    panel[made] = np.arange(len(made))
+    panel = positions(made, pattern.n_cells)
     if bends is not None:
         panel[bends.other] = bends.panel
         for cell, side, begin in (
             (made[bends.panel], bends.side[:, 0], np.zeros_like(bends.hinge)),
             (bends.other, bends.side[:, 1], bends.hinge),
         ):
-            first = np.full(pattern.n_cells, -1)
-            first[cell] = np.arange(len(cell))
+            first = positions(cell, pattern.n_cells)
             at = np.flatnonzero(first[row] >= 0)
             which, count = first[row[at]], pattern.faces.lengths[row[at]]
             within = (corner[at] - side[which] - 1) % count
@@ -343,8 +341,7 @@ def bent_singles(pattern: Pattern, pieces: FoldPieces, shapes: Ragged, center: F
     Each end of a hinge is where both halves still reach.
     """
     k = len(face)
-    row = np.full(pattern.n_cells, -1, dtype=np.int64)
-    row[face] = np.arange(k)
+    row = positions(face, pattern.n_cells)
     first = np.flatnonzero(pieces.mate > np.arange(len(pieces.mate)))
     cell, side = (
         table[np.stack([first, pieces.mate[first]], axis=1)] for table in (pieces.cell, pieces.side)

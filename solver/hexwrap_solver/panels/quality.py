@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hexwrap_solver.arrays import Bools, Floats, Ints, Progress, no_progress
+from hexwrap_solver.arrays import Bools, Floats, Ints, Progress, no_progress, positions
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.geometry import cross_first
 from hexwrap_solver.panels.congruence import congruence_classes
@@ -136,8 +136,7 @@ def _surface_distances(surface: Surface, pattern: Pattern, panels: Panels) -> Fl
 
 def _facing(pattern: Pattern, edges: HalfEdges, panels: Panels) -> Facing:
     """Of flat panels, corners in step with those of their cells."""
-    panel = np.full(pattern.n_cells, -1, dtype=np.int64)
-    panel[panels.face] = np.arange(panels.n_panels)
+    panel = positions(panels.face, pattern.n_cells)
     normal = np.zeros((pattern.n_cells, 3))
     normal[panels.face] = panels.normal
     return facing_edges(edges, panel, pattern.faces.within, normal)

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hexwrap_solver.arrays import Floats, Ints, Ragged
+from hexwrap_solver.arrays import Floats, Ints, Ragged, positions
 from hexwrap_solver.errors import PanelsError
 from hexwrap_solver.panels.facing import widths
 from hexwrap_solver.panels.fewest import Fewest, Joints, fewest_lengths
@@ -201,8 +201,7 @@ def _joints(fitted: FittedPanels) -> Joints:
     """The joints of the regular panels, measured on their polygons."""
     facing, regular = fitted.facing, fitted.regular
     assert facing is not None
-    position = np.full(len(regular), -1, dtype=np.int64)
-    position[regular] = np.arange(int(regular.sum()))
+    position = positions(np.flatnonzero(regular), len(regular))
     return Joints(
         position[facing.left],
         position[facing.right],

@@ -6,6 +6,7 @@ import numpy as np
 
 from hexwrap_solver.arrays import Bools, Ints, Ragged
 from hexwrap_solver.conformal.types import ConformalMap
+from hexwrap_solver.geometry import pair_key
 from hexwrap_solver.pattern.lay.cells import Cells
 from hexwrap_solver.pattern.place.choose import PlacementFamily
 from hexwrap_solver.pattern.place.deform import derivatives
@@ -73,7 +74,7 @@ def _cut_along(chain: Ints, corner: Ints, shape: Ragged, whole: Bools) -> int:
     size = int(corner.max()) + 1
     pairs = np.minimum(chain[1:], chain[:-1]) * size + np.maximum(chain[1:], chain[:-1])
     following = corner[shape.next()]
-    side = np.minimum(corner, following) * size + np.maximum(corner, following)
+    side = pair_key(corner, following, size)
     rows = np.unique(shape.row[np.isin(side, pairs)])
     return int((~whole[rows]).sum())
 

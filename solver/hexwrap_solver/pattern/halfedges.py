@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexwrap_solver.arrays import Bools, Ints, Ragged
-from hexwrap_solver.geometry import stable_order
+from hexwrap_solver.geometry import pair_key, stable_order
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class HalfEdges:
         """faces: rows of vertices 0 … n − 1. Twins are found through these."""
         start = faces.values.astype(np.int64)
         end = start[faces.next()]
-        key = np.minimum(start, end) * n + np.maximum(start, end)
+        key = pair_key(start, end, n)
         order = stable_order(key, n * n)
         ordered = key.take(order)
         same: Bools = ordered[1:] == ordered[:-1]

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints, Progress, Ragged, no_progress
+from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints, Progress, Ragged, no_progress, positions
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.domain.interpolate import surface_weights
 from hexwrap_solver.domain.lift import points_at
@@ -228,9 +228,7 @@ def layout_of(cmap: ConformalMap, lattice: Lattice, placement: Placement) -> Lay
 
 def _corner_of(faces: Ints, vertex: Ints) -> Ints:
     """(k,) a corner 3·face + c at each vertex."""
-    corner = np.zeros(int(faces.max()) + 1, dtype=np.int64)
-    corner[faces.ravel()] = np.arange(faces.size)
-    return corner[vertex]
+    return positions(faces.ravel(), int(faces.max()) + 1)[vertex]
 
 
 def check_count(cmap: ConformalMap, corners: Complexes, lattice: Lattice, settings: PatternSettings) -> None:
@@ -478,9 +476,7 @@ def _at_first_loop(
     edge = np.flatnonzero(neighbours.values < 0)
     tail, head = faces.values[edge], faces.values[following[edge]]
     n = int(faces.values.max()) + 1
-    at = np.zeros(n, dtype=np.int64)
-    at[tail] = np.arange(len(edge))  # boundaries are simple loops
-    which, loops = orbits(at[head])
+    which, loops = orbits(positions(tail.astype(np.int64), n)[head])  # boundaries are simple loops
     gained = np.rint(np.bincount(which, weights=sheet[following[edge]] - sheet[edge]))
     euler = n - (len(faces.values) + len(edge)) // 2 + faces.n_rows
     if sorted(gained[gained != 0]) != [-1, 1] or euler != 2 - loops:

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from hexwrap_solver.arrays import Bools, Complexes, Ints, Ragged, runs
-from hexwrap_solver.geometry import outline_area
+from hexwrap_solver.arrays import Bools, Complexes, Ints, Ragged, positions, runs
+from hexwrap_solver.geometry import outline_area, pair_key
 from hexwrap_solver.pattern.lattice import Lattice
 from hexwrap_solver.pattern.lay.cells import Cells
 from hexwrap_solver.pattern.types import FoldPieces, PatternFeature
@@ -44,8 +44,7 @@ def fold_pieces(
     order = np.lexsort((side, -np.round(abs(step[side]), 6), ~mated, shape.row[side]))
     first = order[np.unique(shape.row[side][order], return_index=True)[1]]
     cell, chosen = shape.row[side][first], side[first]
-    number = np.full(len(shape.values), -1, dtype=np.int64)
-    number[chosen] = np.arange(len(chosen))
+    number = positions(chosen, len(shape.values))
     mate = np.where(mated[first], number[np.maximum(other[first], 0)], -1)
     mate[(mate >= 0) & (mate[mate] != np.arange(len(mate)))] = -1
     return FoldPieces(cell, chosen - shape.offsets[cell], mate, _from_the_fold(shape, place, step, chosen))
@@ -57,7 +56,7 @@ def _along(features: tuple[PatternFeature, ...], start: Ints, end: Ints) -> Bool
     a = np.concatenate([none, *(f.vertices[:-1] for f in features), *(f.vertices[-1:] for f in features)])
     b = np.concatenate([none, *(f.vertices[1:] for f in features), *(f.vertices[:1] for f in features)])
     size = int(max(start.max(initial=0), a.max(initial=0))) + 1
-    one, two = (np.minimum(x, y) * size + np.maximum(x, y) for x, y in ((start, end), (a, b)))
+    one, two = (pair_key(x, y, size) for x, y in ((start, end), (a, b)))
     return np.isin(one, two)
 
 

@@ -15,7 +15,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from hexwrap_solver.arrays import Complexes, Floats, Ints, Progress, no_progress
+from hexwrap_solver.arrays import Complexes, Floats, Ints, Progress, no_progress, positions
 from hexwrap_solver.conformal.energy import Corners, corner_angles, opposite_lengths, total
 from hexwrap_solver.conformal.layout import FaceTree, develop
 from hexwrap_solver.conformal.types import Targets
@@ -248,8 +248,7 @@ class Chart:
             here = np.unique(self.tree.parent[here])
             here = here[~needed[here]]
         face = np.flatnonzero(needed)
-        new = np.full(len(needed), -1)
-        new[face] = np.arange(len(face))
+        new = positions(face, len(needed))
         twin = self.cut.twin.reshape(-1, 3)[face].ravel()
         inside = (twin >= 0) & (new[twin // 3] >= 0)
         return face, FaceTree.of(np.where(inside, 3 * new[twin // 3] + twin % 3, -1))

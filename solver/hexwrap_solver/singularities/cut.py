@@ -36,8 +36,7 @@ def branches(surface: Surface, root: int, leaves: Ints, loops: tuple[Ints, ...])
     n = len(surface.vertices)
     ends = np.zeros(n, dtype=bool)
     ends[leaves] = True
-    for loop in surface.loops:
-        ends[loop] = True
+    ends[surface.boundary] = True
     tail, head = half_edges(surface.faces)
     inner = surface.twin >= 0
     inner &= ~(ends[tail])  # paths end where they come to one

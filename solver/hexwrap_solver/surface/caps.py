@@ -15,11 +15,10 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from hexwrap_solver.arrays import Bools, Floats, Ints
-from hexwrap_solver.geometry import angles_between, dot, face_normals, normalize
+from hexwrap_solver.geometry import angles_between, dot, face_normals, linked, normalize
 from hexwrap_solver.surface.orient import is_inside_out
 from hexwrap_solver.surface.topology import boundary_loops, face_graph, half_edges, sum_rows
 from hexwrap_solver.surface.types import Triangles
@@ -129,9 +128,7 @@ def _smooth(mesh: Triangles) -> tuple[Ints, Floats]:
     h = np.flatnonzero(mesh.twin > np.arange(3 * m))
     one, two = h // 3, mesh.twin[h] // 3
     smooth = angles_between(normal[one], normal[two]) <= SHARP
-    graph = coo_array((np.ones(int(smooth.sum()), dtype=np.int8), (one[smooth], two[smooth])), shape=(m, m))
-    count, label = connected_components(graph, directed=False)
-    region = np.asarray(label, dtype=np.int64)
+    count, region = linked(one[smooth], two[smooth], m)
     return region, sum_rows(area2, region, count)
 
 
@@ -253,8 +250,7 @@ def _is_tube(faces: Ints) -> bool:
     edges, uses = np.unique(edges, axis=0, return_counts=True)
     ends, at = np.unique(edges[uses == 1], return_inverse=True)
     at = at.reshape(-1, 2)
-    graph = coo_array((np.ones(len(at), dtype=np.int8), (at[:, 0], at[:, 1])), shape=(len(ends), len(ends)))
-    loops = connected_components(graph, directed=False)[0] if len(ends) else 0
+    loops = linked(at[:, 0], at[:, 1], len(ends))[0] if len(ends) else 0
     return bool(loops == 2 and len(np.unique(faces)) - len(edges) + len(faces) == 0)
 
 

@@ -23,8 +23,7 @@ def saddle_share(surface: Surface) -> float:
     area = np.linalg.norm(normal[:, 0], axis=1) / 2
     at, n = surface.faces.ravel(), len(surface.vertices)
     defect = 2 * np.pi - np.bincount(at, weights=angle.ravel(), minlength=n)
-    for loop in surface.loops:
-        defect[loop] = 0.0
+    defect[surface.boundary] = 0.0
     around = np.bincount(at, weights=np.repeat(area, 3), minlength=n)
     density = np.divide(defect, around, out=np.zeros(n), where=around > 0)
     return float(area[density[surface.faces].sum(axis=1) * area < -ROUNDING].sum() / area.sum())

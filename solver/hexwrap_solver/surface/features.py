@@ -6,11 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from hexwrap_solver.arrays import Bools, Floats, Ints
-from hexwrap_solver.geometry import angles_between, face_normals, normalize
+from hexwrap_solver.geometry import angles_between, face_normals, linked, normalize
 from hexwrap_solver.surface.closest import TriangleTree
 from hexwrap_solver.surface.topology import half_edges
 from hexwrap_solver.surface.types import Feature, Triangles
@@ -103,8 +101,7 @@ def chained(vertices: Floats, edges: Ints, fold: Floats, stops: Bools) -> tuple[
     label = np.arange(2 * k)
     label[two] = one
     tail, head = label[0::2], label[1::2]
-    graph = coo_array((np.ones(k, dtype=np.int8), (tail, head)), shape=(2 * k, 2 * k))
-    _, part = connected_components(graph, directed=False)
+    _, part = linked(tail, head, 2 * k)
     ends = np.bincount(label, minlength=2 * k)
     beside = _neighbours(tail, head, 2 * k)
     by_chain = np.argsort(part[tail], kind="stable")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hexwrap_solver.arrays import Bools, Floats, Ints
-from hexwrap_solver.geometry import dot
+from hexwrap_solver.geometry import dot, pair_key
 from hexwrap_solver.surface.topology import half_edges, next_half_edge, twins
 
 #: Flips to Delaunay end long before on meshes that are not torture.
@@ -34,14 +34,14 @@ def diagonal(faces: Ints, h: Ints, twin: Ints) -> tuple[Ints, Ints]:
 def joins_new(faces: Ints, h: Ints, twin: Ints, n: int) -> Bools:
     """Whether flipping h joins two vertices that neither an edge nor an earlier flip of h joins."""
     c, d = diagonal(faces, h, twin)
-    key = np.minimum(c, d) * n + np.maximum(c, d)
+    key = pair_key(c, d, n)
     ends = np.zeros(n, dtype=bool)
     ends[c] = ends[d] = True
     start, end = half_edges(faces)
     near = ends[start]
     near[near] = ends[end[near]]
     start, end = start[near], end[near]
-    taken = np.isin(key, np.minimum(start, end) * n + np.maximum(start, end))
+    taken = np.isin(key, pair_key(start, end, n))
     once = np.zeros(len(h), dtype=bool)
     once[np.unique(key, return_index=True)[1]] = True
     return np.asarray(~taken & once & (c != d))
@@ -81,7 +81,7 @@ def flip_to_delaunay(
     vertices that have moved or are new since the faces were last Delaunay; None: all.
     """
     faces, n = faces.copy(), len(vertices)
-    kept = None if keep is None or len(keep) == 0 else keep.min(axis=1) * n + keep.max(axis=1)
+    kept = None if keep is None or len(keep) == 0 else pair_key(keep[:, 0], keep[:, 1], n)
     twin = twins(faces, n)
     changed = np.arange(len(faces)) if around is None else np.flatnonzero(around[faces].any(axis=1))
     waiting = np.zeros(0, dtype=np.int64)
@@ -93,7 +93,7 @@ def flip_to_delaunay(
         h = np.flatnonzero(looked_at)
         if kept is not None:
             start, end = faces.ravel()[h], faces.ravel()[next_half_edge(h)]
-            h = h[~np.isin(np.minimum(start, end) * n + np.maximum(start, end), kept)]
+            h = h[~np.isin(pair_key(start, end, n), kept)]
         angle = angle_sums_opposite(vertices, faces, h, twin[h])
         order = np.argsort(-angle, kind="stable")
         waiting = h[order[: int((angle > np.pi + SLACK).sum())]]

@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array, csr_array
+from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spanning_tree
 
 from hexwrap_solver.arrays import Floats, Ints
+from hexwrap_solver.geometry import linked
 from hexwrap_solver.surface.checks import LISTED
 from hexwrap_solver.surface.errors import (
     HandlesError,
@@ -111,19 +112,14 @@ def loops_of(vertices: Floats, faces: Ints, twin: Ints, names: SentNames) -> tup
         raise _handles(vertices, faces, twin, len(loops), euler, names)
     if len(loops) == 2:
         return tuple(loops)
-    length = [
-        float(np.linalg.norm(vertices[loop] - vertices[np.roll(loop, -1)], axis=1).sum()) for loop in loops
-    ]
-    return tuple(loops[i] for i in np.argsort(-np.array(length), kind="stable"))
+    length = np.array([_length(vertices, loop) for loop in loops])
+    return tuple(loops[i] for i in np.argsort(-length, kind="stable"))
 
 
 def _umbrellas(twin: Ints) -> tuple[int, Ints]:
     """Fans of faces around vertices: their number, and the fan of every corner."""
     h = np.flatnonzero(twin >= 0)
-    k = len(twin)
-    joined = coo_array((np.ones(len(h), dtype=np.int8), (h, next_half_edge(twin[h]))), shape=(k, k))
-    count, label = connected_components(joined, directed=False)
-    return int(count), label.astype(np.int64)
+    return linked(h, next_half_edge(twin[h]), len(twin))
 
 
 def apart(faces: Ints, n: int, twin: Ints) -> tuple[Ints, Ints]:
@@ -207,8 +203,7 @@ def _disks(tail: Ints, head: Ints, twin: Ints) -> Ints:
     """(n,) a number of the boundary loop through each vertex."""
     n = int(tail.max()) + 1
     h = np.flatnonzero(twin < 0)
-    graph = coo_array((np.ones(len(h), dtype=np.int8), (tail[h], head[h])), shape=(n, n))
-    return connected_components(graph, directed=False)[1].astype(np.int64)
+    return linked(tail[h], head[h], n)[1]
 
 
 def _to_root(vertex: int, before: Ints) -> list[int]:
@@ -218,8 +213,8 @@ def _to_root(vertex: int, before: Ints) -> list[int]:
     return way
 
 
-def _count(k: int, one: str, many: str | None = None) -> str:
-    return f"{k} {one if k == 1 else many or one + 's'}"
+def _count(k: int, one: str) -> str:
+    return f"{k} {one}{'s' * (k != 1)}"
 
 
 def _enumerate(items: Sequence[object], most: int = 4) -> str:

@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
-from hexwrap_solver.arrays import Bools, Ints, Ragged
+from hexwrap_solver.arrays import Bools, Ints, Ragged, positions
 from hexwrap_solver.errors import SurfaceError
+from hexwrap_solver.geometry import pair_key
 from hexwrap_solver.surface.caps import caps_of, kept
 from hexwrap_solver.surface.checks import LISTED, check_arrays, check_extent
 from hexwrap_solver.surface.degenerate import flat, repair_flat
@@ -133,8 +134,7 @@ def _build(
 
     origin = np.concatenate([np.arange(n), _untouching(draft, n)])  # of the mesh's vertices
     index = np.flatnonzero(_mark(draft.faces, len(origin)))
-    new = np.full(len(origin), -1, dtype=np.int64)
-    new[index] = np.arange(len(index))
+    new = positions(index, len(origin))
     faces, index = new[draft.faces], origin[index]
     loops = loops_of(
         vertices[index], faces, draft.mesh.twin, SentNames(index, draft.polygon, vertices[index])
@@ -169,13 +169,12 @@ def _features(surface: Surface, sent: SentMesh, settings: SurfaceSettings) -> tu
     else:
         edges, fold = folds(surface, np.deg2rad(asked))
     rim = np.zeros(len(surface.vertices), dtype=bool)
-    for loop in surface.loops:
-        rim[loop] = True
+    rim[surface.boundary] = True
     # Edges of the boundary are not creases; nor are edges that a repair has taken out of the mesh.
     low, high = surface.edge_ends
     n = len(surface.vertices)
     inside = (low * n + high)[np.diff(surface.edge_groups[1]) == 2]
-    named = edges.min(axis=1) * n + edges.max(axis=1)
+    named = pair_key(edges[:, 0], edges[:, 1], n)
     keep = np.searchsorted(inside, named, side="right") > np.searchsorted(inside, named)  # inside ascends
     keep[keep] = ~lie_along(surface.vertices, edges[keep], wanted.without)
     chains = chained(surface.vertices, edges[keep], fold[keep], rim)

@@ -6,12 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged
-from hexwrap_solver.geometry import dot, face_areas, normalize
+from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged, positions
+from hexwrap_solver.geometry import dot, face_areas, linked, normalize
 from hexwrap_solver.surface.duplicates import equal_faces
 from hexwrap_solver.surface.topology import face_graph, half_edges
 from hexwrap_solver.surface.triangulate import triangulate
@@ -79,10 +78,8 @@ def pieces(mesh: SentMesh) -> list[Piece]:
     kept = start != end
     rim, start, end = rim[kept], start[kept], end[kept]
     n = len(mesh.vertices)
-    joined = coo_array((np.ones(len(rim), dtype=np.int8), (start, end)), shape=(n, n))
-    _, loop = connected_components(joined, directed=False)
-    rank = np.zeros(count, dtype=np.int64)
-    rank[np.argsort(-area, kind="stable")] = np.arange(count)
+    _, loop = linked(start, end, n)
+    rank = positions(np.argsort(-area, kind="stable"), count)
     largest = np.full(n, count)
     np.minimum.at(largest, welded.faces, rank[piece][:, None])
     attached = np.bincount(piece, (largest[welded.faces] < rank[piece][:, None]).any(axis=1), count) > 0
@@ -235,9 +232,7 @@ def _overlap(vertices: Floats, faces: Ints, rim: Ints, h: Ints, v: Ints) -> Bool
     along, inward = normalize(vertices[end] - vertices[start]), _inward(vertices, faces, rim)
     covers = np.zeros(len(h), dtype=bool)
     for side in (start, end):
-        at = np.full(len(vertices), -1, dtype=np.int64)
-        at[side] = np.arange(len(rim))
-        other = at[v]
+        other = positions(side, len(vertices))[v]
         parallel = np.abs(dot(along[other], along[h])) > ALIGNED
         covers |= (other >= 0) & parallel & (dot(inward[other], inward[h]) > ALIGNED)
     return covers

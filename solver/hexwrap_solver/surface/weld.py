@@ -7,11 +7,10 @@ parts of strongly graded meshes stay as they are.
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from hexwrap_solver.arrays import Floats, Ints
+from hexwrap_solver.geometry import linked
 from hexwrap_solver.surface.topology import half_edges
 from hexwrap_solver.surface.types import Triangles
 
@@ -32,10 +31,10 @@ def weldings(mesh: Triangles, tolerance: float) -> list[Ints]:
     collapsed = _collapse(mesh)
     rim = _open_vertices(relabelled(mesh, collapsed))
     equal = _equal(mesh.vertices, rim)
-    exact = _merge(collapsed, *equal)
+    exact = merged(collapsed, *equal)
     if len(equal[0]):
         rim = _open_vertices(relabelled(mesh, exact))
-    near = _undo_collapses(_merge(exact, *_close(mesh.vertices, rim, tolerance)), exact, mesh.faces)
+    near = _undo_collapses(merged(exact, *_close(mesh.vertices, rim, tolerance)), exact, mesh.faces)
     ways = [near]
     for way in (exact, collapsed):
         if not np.array_equal(way, ways[-1]):
@@ -53,25 +52,23 @@ def relabelled(mesh: Triangles, label: Ints) -> Triangles:
 def coincident(vertices: Floats, tolerance: float) -> Ints:
     """(n,) the lowest of the vertices that stand within the tolerance of each other, open or not."""
     every = np.arange(len(vertices), dtype=np.int64)
-    return _merge(every, *_close(vertices, every, tolerance))
+    return merged(every, *_close(vertices, every, tolerance))
 
 
 def _collapse(mesh: Triangles) -> Ints:
     resolution = ULPS * np.finfo(float).eps * float(np.abs(mesh.vertices).max())
     none = (mesh.lengths <= resolution).ravel()
     start, end = half_edges(mesh.faces)
-    return _merge(np.arange(len(mesh.vertices), dtype=np.int64), start[none], end[none])
+    return merged(np.arange(len(mesh.vertices), dtype=np.int64), start[none], end[none])
 
 
-def _merge(label: Ints, a: Ints, b: Ints) -> Ints:
+def merged(label: Ints, a: Ints, b: Ints) -> Ints:
     """Joins the classes of a[k] and b[k]; classes are named by their lowest vertex."""
     if len(a) == 0:
         return label
     n = len(label)
-    pairs = coo_array((np.ones(len(a), dtype=np.int8), (label[a], label[b])), shape=(n, n))
-    _, group = connected_components(pairs, directed=False)
-    lowest = np.zeros(int(group.max()) + 1, dtype=np.int64)
-    lowest[group[::-1]] = np.arange(n - 1, -1, -1)
+    _, group = linked(label[a], label[b], n)
+    _, lowest = np.unique(group, return_index=True)
     return lowest[group][label]
 
 

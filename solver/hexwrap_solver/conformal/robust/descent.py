@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexwrap_solver.arrays import Floats, Ints, Progress
+from hexwrap_solver.arrays import Floats, Ints, Progress, positions
 from hexwrap_solver.conformal import newton
 from hexwrap_solver.conformal.energy import Energy, total
 from hexwrap_solver.conformal.newton import Rules, largest
@@ -129,8 +129,7 @@ class _Laplacian:
         mesh, dof, n = energy.mesh, energy.plain.dof, energy.plain.n_dof
         points = energy.plain.points
         if among is not None:
-            local = np.full(n + 1, -1)
-            local[among] = np.arange(len(among))
+            local = positions(among, n + 1)
             dof, n, points = local[dof], len(among), points[among]
         ends = dof[mesh.origin]
         low, high = np.minimum(ends[::2], ends[1::2]), np.maximum(ends[::2], ends[1::2])

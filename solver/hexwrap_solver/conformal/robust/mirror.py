@@ -23,7 +23,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexwrap_solver.arrays import Bools, Floats, Ints
+from hexwrap_solver.arrays import Bools, Floats, Ints, positions
 from hexwrap_solver.surface.topology import next_half_edge
 from hexwrap_solver.surface.types import Surface
 
@@ -107,14 +107,14 @@ def mirror_mesh(surface: Surface, log_length: Floats, winding: Ints) -> MirrorMe
     boundary = np.flatnonzero(twin < 0)
     outside = name[boundary] + 1
 
-    origin, following, previous, around = (np.zeros(size, dtype=np.int64) for _ in range(4))
+    origin, following, around = (np.zeros(size, dtype=np.int64) for _ in range(3))
     origin[name] = faces.ravel()
     origin[outside] = np.roll(faces, -1, axis=1).ravel()[boundary]
     following[name] = name[next_half_edge(np.arange(faces.size))]
     at_origin = np.zeros(n, dtype=np.int64)
     at_origin[origin[outside]] = outside
     following[outside] = at_origin[faces.ravel()[boundary]]
-    previous[following] = np.arange(size)
+    previous = positions(following, size)
     outer = np.zeros(size, dtype=bool)
     outer[outside] = True
     around[name] = winding

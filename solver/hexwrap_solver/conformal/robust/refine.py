@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints
+from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints, positions
 from hexwrap_solver.conformal.energy import corner_angles, opposite_lengths
 from hexwrap_solver.conformal.robust.retriangulate import flatten_out
 from hexwrap_solver.conformal.types import Targets
@@ -132,8 +132,7 @@ def _subdivide(faces: Ints, point: Ints, vertices: Floats) -> tuple[Ints, Ints]:
 
 def _extend(loop: Ints, h: Ints, new: Ints, tail: Ints, inner: Bools) -> Ints:
     """A loop with its new vertices, each after the start of the boundary edge that it splits."""
-    place = np.full(max(int(loop.max()), int(tail.max())) + 1, -1, dtype=np.int64)
-    place[loop] = np.arange(len(loop))
+    place = positions(loop, max(int(loop.max()), int(tail.max())) + 1)
     here = ~inner & (place[tail[h]] >= 0)
     return np.insert(loop, place[tail[h[here]]] + 1, new[here])
 
@@ -206,8 +205,7 @@ def _chords(surface: Surface, targets: Targets, winding: Ints) -> Ints:
     tail, head = half_edges(faces)
     found = [np.zeros(0, dtype=np.int64)]
     for loop in surface.loops:
-        place = np.full(n, -1, dtype=np.int64)
-        place[loop] = np.arange(len(loop))
+        place = positions(loop, n)
         at = np.full(n, -1, dtype=np.int64)
         boundary = np.flatnonzero((twin < 0) & (place[tail] >= 0))
         at[tail[boundary]] = boundary

@@ -8,8 +8,8 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import breadth_first_order, connected_components
 
-from hexwrap_solver.arrays import Bools, Ints, Ragged
-from hexwrap_solver.geometry import orbits
+from hexwrap_solver.arrays import Bools, Ints, Ragged, positions
+from hexwrap_solver.geometry import orbits, pair_key
 from hexwrap_solver.pattern.lattice import Lattice
 from hexwrap_solver.pattern.lay.edges import PatternEdges
 
@@ -45,7 +45,7 @@ class Cells:
         if keep.all():
             return self
         side = np.repeat(keep, self.corner.lengths)
-        renumber = np.where(side, np.cumsum(side) - 1, -1)
+        renumber = positions(np.flatnonzero(side), len(side))
         twin = self.twin[side]
         return Cells(
             self.corner.take(keep),
@@ -150,9 +150,7 @@ def _following(lattice: Lattice, edges: PatternEdges) -> tuple[Ints, Ints, Bools
 
 def sides_by_edge(edges: PatternEdges, cells: WholeCells) -> Ints:
     """(n·width,) the side that runs along each directed edge, −1 where there is none."""
-    side = np.full(edges.head.size, -1, dtype=np.int64)
-    side[edges.number(cells.corner.values.astype(np.int64), cells.slot)] = np.arange(len(cells.slot))
-    return side
+    return positions(edges.number(cells.corner.values.astype(np.int64), cells.slot), edges.head.size)
 
 
 def only_whole_cells(edges: PatternEdges, cells: WholeCells) -> Cells:
@@ -193,7 +191,7 @@ def awkward_cells(corner: Ragged, twin: Ints) -> Bools:
     """
     values = corner.values.astype(np.int64)
     n, following = int(values.max()) + 1, values.take(corner.next())
-    at, pairs = corner.row * n + values, np.minimum(values, following) * n + np.maximum(values, following)
+    at, pairs = corner.row * n + values, pair_key(values, following, n)
     if _different(at) == len(at) and 2 * _different(pairs) == len(twin) + np.count_nonzero(twin < 0):
         return np.zeros(corner.n_rows, dtype=bool)  # as nearly always, and seen in a quarter of the time
     _, visit, visits = np.unique(at, return_inverse=True, return_counts=True)

@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from hexwrap_solver.arrays import Bools, Floats, Ints, runs
 from hexwrap_solver.errors import PatternError
+from hexwrap_solver.geometry import linked
 from hexwrap_solver.pattern.lattice import Lattice
 from hexwrap_solver.pattern.lay.layout import Layout
 
@@ -111,27 +110,12 @@ def find_nodes(layout: Layout) -> Nodes:
     empty = np.zeros(0, dtype=np.int64)
     found = Nodes(face, point, empty, empty, empty, empty, empty, keys, low, span)
     first, second, step = _same_place(layout, found)
-    node, n = _joined(first, second, len(face))
+    n, node = linked(first, second, len(face))
     incidence = np.argsort(node, kind="stable")
     starts = np.append(0, np.cumsum(np.bincount(node, minlength=n)))
     own = incidence[starts[:-1]]
     isometry = _seen_from(own, first, second, layout.isometries[step], lattice, len(face))
     return Nodes(face, point, node, isometry, own, starts, incidence, keys, low, span)
-
-
-def _joined(first: Ints, second: Ints, k: int) -> tuple[Ints, int]:
-    """(k,) number of the part of a graph that each of k is in, in the order of their lowest, and how many
-    there are. Few are joined to others."""
-    some = np.zeros(k, dtype=bool)
-    some[first] = some[second] = True
-    place, members = np.cumsum(some) - 1, np.flatnonzero(some)
-    graph = coo_array((np.ones(len(first)), (place[first], place[second])), shape=(len(members),) * 2)
-    parts, part = connected_components(graph, directed=False)
-    lowest, least = np.arange(k), np.full(parts, k)
-    np.minimum.at(least, part, members)
-    lowest[members] = least[part]
-    leads = lowest == np.arange(k)
-    return (np.cumsum(leads) - 1).take(lowest), int(np.count_nonzero(leads))
 
 
 def _points_in_faces(layout: Layout) -> tuple[Ints, Ints]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints
+from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints, positions
 from hexwrap_solver.pattern.lay.edges import PatternEdges
 from hexwrap_solver.pattern.lay.layout import Layout
 from hexwrap_solver.pattern.lay.nodes import Nodes
@@ -52,7 +52,7 @@ class HalfEdges:
 
     def without(self, gone: Bools) -> HalfEdges:
         keep = ~gone
-        renumber = np.where(keep, np.cumsum(keep) - 1, -1)
+        renumber = positions(np.flatnonzero(keep), len(keep))
         part = {k: v[keep] for k, v in vars(self).items() if k != "twin"}
         return HalfEdges(**part, twin=renumber[self.twin[keep]])
 
@@ -133,8 +133,7 @@ def _among_nodes(edges: PatternEdges, near: Bools, key: Floats) -> HalfEdges:
     tail, slot = number // edges.width, number % edges.width
     kept = near[edges.head[tail, slot]]
     number, tail, slot = number[kept], tail[kept], slot[kept]
-    position = np.full(edges.head.size, -1, dtype=np.int64)
-    position[number] = np.arange(len(number))
+    position = positions(number, edges.head.size)
     twin = position[edges.back[tail, slot]]
     no = np.zeros(len(number), dtype=bool)
     isometry = edges.isometry(tail, slot)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints, runs
+from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints, positions, runs
 from hexwrap_solver.geometry import orbits
 from hexwrap_solver.pattern.lay.edges import PatternEdges
 from hexwrap_solver.pattern.lay.layout import Layout
@@ -51,12 +51,10 @@ def boundary_of(surface: Surface, layout: Layout) -> Boundary:
     faces, m = surface.faces, len(surface.faces)
     face, edge = np.nonzero(layout.across < 0)
     b = len(face)
-    number = np.full(3 * m, -1, dtype=np.int64)
-    number[3 * face + edge] = np.arange(b)
+    number = positions(3 * face + edge, 3 * m)
     inner = surface.twin[3 * face + edge] >= 0
-    place = np.full(len(surface.vertices), -1, dtype=np.int64)
+    place = positions(surface.boundary, len(surface.vertices))
     of_vertex = np.zeros(len(surface.vertices), dtype=np.int64)
-    place[surface.boundary] = np.arange(len(surface.boundary))
     of_vertex[surface.boundary] = np.repeat(
         np.arange(len(surface.loops)), [len(loop) for loop in surface.loops]
     )
@@ -66,8 +64,7 @@ def boundary_of(surface: Surface, layout: Layout) -> Boundary:
     order, loop = _in_cycles(following, np.where(inner, len(place) + np.arange(b), place[tail]))
     renumber = np.argsort(order)
     face, edge = face[order], edge[order]
-    number = np.full(faces.shape, -1, dtype=np.int64)
-    number[face, edge] = np.arange(b)
+    number = positions(3 * face + edge, faces.size).reshape(faces.shape)
     return Boundary(
         face,
         edge,

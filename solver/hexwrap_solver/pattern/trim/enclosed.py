@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from hexwrap_solver.arrays import Bools, Complexes, Ints
+from hexwrap_solver.geometry import linked
 from hexwrap_solver.pattern.lattice import Lattice
 from hexwrap_solver.pattern.lay.edges import PatternEdges
 from hexwrap_solver.pattern.lay.layout import Layout
@@ -50,8 +49,7 @@ def around_enclosed(
     stopped = found.exit >= 0
     hit = boundary.loop[boundary.number[found.face[stopped], found.exit[stopped]]]
     mine = boundary.loop[edge]
-    graph = coo_array((np.ones(len(hit)), (mine[stopped], hit)), shape=(loops, loops))
-    group = connected_components(graph, directed=False)[1]
+    _, group = linked(mine[stopped], hit, loops)
     near = lattice.carry(lattice.invert(found.isometry), place)[arrived]
     arrival, mine = arrival[arrived], mine[arrived]
     heading = np.angle(near - lattice.stand(found.target[arrived]))

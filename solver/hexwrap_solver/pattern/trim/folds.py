@@ -17,7 +17,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged
+from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged, positions
+from hexwrap_solver.geometry import pair_key
 from hexwrap_solver.pattern.lattice import Lattice
 from hexwrap_solver.pattern.lay.cells import Cells
 from hexwrap_solver.pattern.lay.layout import Layout
@@ -103,8 +104,7 @@ def _on_features(
     features: FeatureEdges, boundary: Boundary, on: BoundaryPoints, faces: Ints
 ) -> tuple[Ints, Ints, Ints, Floats]:
     """The points on each feature, in its order."""
-    by_half_edge = np.full(faces.size, -1, dtype=np.int64)
-    by_half_edge[features.half_edge] = np.arange(len(features.half_edge))
+    by_half_edge = positions(features.half_edge, faces.size)
     half_edge = 3 * boundary.face[on.edge] + boundary.edge[on.edge]
     which = by_half_edge[half_edge]
     inside = np.flatnonzero((which >= 0) & (on.t > 0))
@@ -132,7 +132,7 @@ def sewn(lattice: Lattice, cells: Cells, seam: Seams) -> Cells:
     open_side = np.flatnonzero(cells.twin < 0)
     a, b = corner[open_side], following[open_side]
     size = int(corner.max(initial=0)) + 1
-    pair = np.minimum(a, b) * size + np.maximum(a, b)
+    pair = pair_key(a, b, size)
     _, group, members = np.unique(pair, return_inverse=True, return_counts=True)
     order = np.argsort(group, kind="stable")
     two = order[members[group[order]] == 2].reshape(-1, 2)
@@ -158,7 +158,7 @@ def without_ends(lattice: Lattice, cells: Cells) -> tuple[Cells, Bools]:
         had[cells.corner.row[tip]] = True
         keep = ~tip
         keep[following[tip]] = False
-        renumber = np.where(keep, np.cumsum(keep) - 1, -1)
+        renumber = positions(np.flatnonzero(keep), len(keep))
         row, twin, isometry = cells.corner.row[keep], cells.twin[keep], cells.isometry[keep]
         corner = Ragged.of(cells.corner.values[keep], np.bincount(row, minlength=cells.n))
         frame = lattice.invert(isometry[corner.offsets[row]])  # the first corner may have gone

@@ -11,7 +11,7 @@ import shapely
 from scipy.spatial import cKDTree
 
 from hexwrap_solver.arrays import Bools, Floats, Ints
-from hexwrap_solver.geometry import dot, face_normals
+from hexwrap_solver.geometry import dot, face_normals, pair_key
 from hexwrap_solver.surface.brep.plane import triangulated
 from hexwrap_solver.surface.brep.pull import Patch, free
 from hexwrap_solver.surface.brep.sizes import Field, Sizes, bilinear
@@ -391,8 +391,7 @@ def _third(h: Ints) -> Ints:
 def _halved_lines(lines: Ints, start: Ints, end: Ints, new: Ints) -> tuple[Ints, Ints]:
     """Lines that were split are replaced by their halves; and the new vertices on them."""
     n = int(new.max(initial=0)) + 1
-    key = np.minimum(start, end) * n + np.maximum(start, end)
-    own = lines.min(axis=1) * n + lines.max(axis=1)
+    key, own = pair_key(start, end, n), pair_key(lines[:, 0], lines[:, 1], n)
     order = np.argsort(key)
     place = np.minimum(np.searchsorted(key[order], own), len(key) - 1)
     hit = key[order][place] == own

@@ -6,14 +6,13 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from hexwrap_solver.arrays import Floats, Ints
 from hexwrap_solver.geometry import dot
 from hexwrap_solver.surface.brep.curves import evaluate_curve, places
 from hexwrap_solver.surface.brep.types import Brep, Edge, Face, Trim
+from hexwrap_solver.surface.weld import merged
 from hexwrap_solver.tolerances import TINY
 
 #: Each step between two places of a curve is sampled at this many points.
@@ -80,12 +79,7 @@ def _one_vertex(brep: Brep, tolerance: float) -> Brep:
     pairs = ends[pairs.reshape(-1, 2)]
     keep = [frozenset(pair) not in short for pair in pairs.tolist()]
     pairs = pairs[np.array(keep, dtype=bool)]
-    n = len(brep.vertices)
-    graph = coo_array((np.ones(len(pairs), dtype=np.int8), pairs.T), shape=(n, n))
-    _, group = connected_components(graph, directed=False)
-    lowest = np.zeros(int(group.max()) + 1, dtype=np.int64)
-    lowest[group[::-1]] = np.arange(n - 1, -1, -1)
-    return _renamed(brep, lowest[group])
+    return _renamed(brep, merged(np.arange(len(brep.vertices)), *pairs.T))
 
 
 def _length(edge: Edge) -> float:

@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 import shapely
 
-from hexwrap_solver.arrays import Floats, Ints
+from hexwrap_solver.arrays import Floats, Ints, positions
 from hexwrap_solver.geometry import angles_between, dot, normalize, quarter_turn
 from hexwrap_solver.surface.brep.curves import corners, curvature, evaluate_curve, places
 from hexwrap_solver.surface.brep.face import Outline, Piece, key_of, piece_of, polygon_of
@@ -383,8 +383,7 @@ def _compacted(mesh: BrepMesh) -> BrepMesh:
     a, b, c = mesh.faces.T
     keep = (a != b) & (b != c) & (c != a)
     used = np.unique(mesh.faces[keep])
-    new = np.full(len(mesh.vertices), -1, dtype=np.int64)
-    new[used] = np.arange(len(used))
+    new = positions(used, len(mesh.vertices))
     return replace(
         mesh,
         vertices=mesh.vertices[used],
