@@ -56,21 +56,6 @@ def straight(surface: Surface) -> Targets:
     return targets(surface, [np.full(len(loop), np.pi) for loop in surface.loops])
 
 
-def prescribed(surface: Surface, boundary_angles: Sequence[Floats]) -> Targets:
-    """Angle sums given for each loop, aligned with surface.loops."""
-    return targets(surface, list(boundary_angles))
-
-
-def isometric(surface: Surface) -> Targets:
-    """u = 0 on all loops; their curvatures are what comes out."""
-    return targets(surface, ["isometric"] * len(surface.loops))
-
-
-def constant_on_loops(surface: Surface, curvatures: Sequence[float], cones: Cones | None = None) -> Targets:
-    """u constant on each loop: 0 on loop 0, and on the others what gives them their curvature Σκ."""
-    return targets(surface, [float(K) for K in curvatures], cones)
-
-
 def cone_angle(boundary_angles: Floats) -> float:
     """Σκ = Σ(π − Θ) over a loop."""
     return float((np.pi - boundary_angles).sum())

@@ -14,6 +14,7 @@ from hexwrap_solver.conformal.cut import Cut, cut_open
 from hexwrap_solver.conformal.energy import Corners
 from hexwrap_solver.conformal.net import Net
 from hexwrap_solver.conformal.types import Deck, Unrolled
+from hexwrap_solver.geometry import sums_to_root
 from hexwrap_solver.surface.topology import next_half_edge
 from hexwrap_solver.surface.types import Surface
 from hexwrap_solver.tolerances import is_zero
@@ -130,23 +131,12 @@ def develop(tree: FaceTree, lengths: Floats, metric: Corners) -> Complexes:
 
 
 def _summed_along(tree: FaceTree, steps: Numbers) -> Numbers:
-    """(m,) sums of the steps on the way from the root to each face, by pointer jumping: after k rounds every
-    face knows the sum of 2^k steps, so rounds and rounding errors grow with log(depth).
-
-    steps: (m,) per face, from its parent to it; the root's is ignored.
-    """
-    up = tree.up.copy()
-    total = steps[tree.order]
-    total[0] = 0
-    first = 1  # the faces before it know their way to the root: parents stand before their children
-    while first < len(up):
-        rest = slice(first, None)
-        above = up[rest]
-        total[rest] += total[above]
-        up[rest] = up[above]
-        first = int(np.searchsorted(up, 1))
-    result = np.empty_like(total)
-    result[tree.order] = total
+    """(m,) sums of the steps on the way from the root to each face. steps: (m,) per face, from its parent to
+    it; the root's is ignored."""
+    ordered = steps[tree.order]
+    ordered[0] = 0
+    result = np.empty_like(ordered)
+    result[tree.order] = sums_to_root(ordered, tree.up, 0)
     return result
 
 

@@ -14,38 +14,26 @@ the same, within 1 %, at 2.5. Positions on the catenoid are nearer to the smooth
 
 from __future__ import annotations
 
-from typing import Literal
-
 import numpy as np
 
 from hexwrap_solver.arrays import Floats, Ints
 from hexwrap_solver.conformal.types import ConformalMap
 
-Interpolation = Literal["projective", "linear"]
 
-DEFAULT: Interpolation = "projective"
-
-
-def surface_weights(
-    cmap: ConformalMap, face: Ints, barycentric: Floats, kind: Interpolation = DEFAULT
-) -> Floats:
+def surface_weights(cmap: ConformalMap, face: Ints, barycentric: Floats) -> Floats:
     """(k, 3) barycentric weights on the surface of points given in the domain.
 
     face: (k,) faces of cmap.surface. barycentric: (k, 3) weights of the points in the domain's triangles.
     """
-    return _weigh(cmap, face, barycentric, 1.0, kind)
+    return _weigh(cmap, face, barycentric, 1.0)
 
 
-def domain_weights(
-    cmap: ConformalMap, face: Ints, barycentric: Floats, kind: Interpolation = DEFAULT
-) -> Floats:
+def domain_weights(cmap: ConformalMap, face: Ints, barycentric: Floats) -> Floats:
     """(k, 3) barycentric weights in the domain of points given on the surface; inverse of surface_weights."""
-    return _weigh(cmap, face, barycentric, -1.0, kind)
+    return _weigh(cmap, face, barycentric, -1.0)
 
 
-def _weigh(cmap: ConformalMap, face: Ints, barycentric: Floats, sign: float, kind: Interpolation) -> Floats:
-    if kind == "linear":
-        return barycentric
+def _weigh(cmap: ConformalMap, face: Ints, barycentric: Floats, sign: float) -> Floats:
     exponent = sign * cmap.log_scale[cmap.surface.faces[face]]
     weighted = barycentric * np.exp(exponent - exponent.max(axis=1, keepdims=True))
     return np.asarray(weighted / weighted.sum(axis=1, keepdims=True))

@@ -8,7 +8,7 @@ import numpy as np
 
 from hexwrap_solver.arrays import Floats
 from hexwrap_solver.geometry import dot
-from hexwrap_solver.surface.errors import NurbsDataError
+from hexwrap_solver.surface.errors import NurbsDataError, TooFineError
 from hexwrap_solver.surface.nurbs import Jet, evaluate
 from hexwrap_solver.surface.nurbs_checks import spans
 from hexwrap_solver.surface.types import MeshSettings, NurbsSurface
@@ -36,11 +36,20 @@ def check_settings(settings: MeshSettings) -> None:
 
 def bounded(settings: MeshSettings, nurbs: NurbsSurface) -> MeshSettings:
     """The same sizes where they mean something (see LEAST_SIZE)."""
-    diagonal = float(np.linalg.norm(np.ptp(nurbs.control_points[..., :3].reshape(-1, 3), axis=0)))
-    low, high = LEAST_SIZE * diagonal, GREATEST_SIZE * diagonal
+    low, high = LEAST_SIZE * nurbs.size, GREATEST_SIZE * nurbs.size
     asked = settings.max_edge, settings.tolerance
     edge, height = (None if size is None else min(max(size, low), high) for size in asked)
     return replace(settings, max_edge=edge, tolerance=height)
+
+
+def check_number(number: float, most: int) -> None:
+    """Of the vertices that a mesh would have. Raises TooFineError."""
+    if number > most:
+        raise TooFineError(
+            f"The mesh would have about {number:.3g} vertices, more than the {most} allowed: ask for longer "
+            "edges or a larger tolerance.",
+            data={"vertices": int(min(number, 1e18))},
+        )
 
 
 @dataclass(frozen=True)

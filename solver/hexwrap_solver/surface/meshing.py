@@ -11,13 +11,14 @@ from __future__ import annotations
 import numpy as np
 
 from hexwrap_solver.arrays import Floats, Ints
-from hexwrap_solver.surface.errors import NurbsDataError, TooFineError
+from hexwrap_solver.surface.errors import NurbsDataError
 from hexwrap_solver.surface.flips import flip_to_delaunay
 from hexwrap_solver.surface.mesh_sizes import (
     DEFAULT_VERTICES,
     ROW,
     Sample,
     bounded,
+    check_number,
     check_settings,
     edge_length,
     pairs,
@@ -88,7 +89,7 @@ def _mesh(
     heights, spacing = _rows(sample, h)
     fractions = _around(nurbs, sample, heights, spacing)
     counts = np.array([len(row) for row in fractions])
-    _allow(int(counts.sum()), settings.max_vertices)
+    check_number(int(counts.sum()), settings.max_vertices)
     faces = _join(counts, np.concatenate(fractions))
     low, high = sample.s[0], sample.s[-1]
     s = low + (high - low) * np.concatenate(fractions)
@@ -101,16 +102,7 @@ def _mesh(
 
 def _check_number(sample: Sample, h: Floats, most: int) -> None:
     density = sample.speed * sample.rise / (ROW * h**2)
-    _allow(float(np.trapezoid(np.trapezoid(density, sample.s, axis=1), sample.t)), most)
-
-
-def _allow(number: float, most: int) -> None:
-    if number > most:
-        raise TooFineError(
-            f"The mesh would have about {number:.3g} vertices, more than the {most} allowed: ask for longer "
-            "edges or a larger tolerance.",
-            data={"vertices": int(min(number, 1e18))},
-        )
+    check_number(float(np.trapezoid(np.trapezoid(density, sample.s, axis=1), sample.t)), most)
 
 
 def _rows(sample: Sample, h: Floats) -> tuple[Floats, Floats]:

@@ -31,10 +31,10 @@ def checked(nurbs: NurbsSurface) -> tuple[NurbsSurface, list[str]]:
     Raises NurbsDataError, NonFiniteError, FlatSurfaceError, NotClosedError, HandlesError, PoleError.
     """
     check_data(nurbs)
-    size = float(np.linalg.norm([np.ptp(x) for x in nurbs.control_points[..., :3].reshape(-1, 3).T]))
+    size = nurbs.size
     check_extent(size)
     gap = [end_gap(nurbs, direction) for direction in (0, 1)]
-    collapsed = [_collapsed(nurbs, direction, TOLERANCE * size) for direction in (0, 1)]
+    pole = [any(collapsed(nurbs, d, end, TOLERANCE * size) for end in (0, 1)) for d in (0, 1)]
     for direction in (0, 1):
         if nurbs.closed[direction] and gap[direction] > TOLERANCE * size:
             raise NotClosedError(
@@ -43,8 +43,8 @@ def checked(nurbs: NurbsSurface) -> tuple[NurbsSurface, list[str]]:
                 field=("closed", direction),
             )
     closed = [gap[d] <= TOLERANCE * size for d in (0, 1)]
-    if any(collapsed):
-        at = NAMES[collapsed.index(True)]
+    if any(pole):
+        at = NAMES[pole.index(True)]
         raise PoleError(
             f"The NURBS surface shrinks to a point at an end of {at}: a tube is open there, so trim the tip "
             "off along a parameter line."
@@ -144,7 +144,6 @@ def end_gap(nurbs: NurbsSurface, direction: int) -> float:
 
 def closed_within(nurbs: NurbsSurface, tolerance: float) -> tuple[bool, bool]:
     """Whether the two ends of u, of v are one line, to within the tolerance and not shrunk to a point."""
-    size = float(np.linalg.norm([np.ptp(x) for x in nurbs.control_points[..., :3].reshape(-1, 3).T]))
     found = []
     for direction in (0, 1):
         width = domain(nurbs, direction)
@@ -152,29 +151,27 @@ def closed_within(nurbs: NurbsSurface, tolerance: float) -> tuple[bool, bool]:
         across = _line(nurbs, direction, (width[0] + width[1]) / 2)
         gap = float(np.linalg.norm(low - high, axis=1).max())
         depth = float(np.linalg.norm(low - across, axis=1).max())
-        found.append(gap <= max(tolerance, TOLERANCE * size) and depth > 10 * gap)
+        found.append(gap <= max(tolerance, TOLERANCE * nurbs.size) and depth > 10 * gap)
     return found[0], found[1]
 
 
 def collapsed(nurbs: NurbsSurface, direction: int, end: int, tolerance: float) -> bool:
     """Whether the parameter line at the lower (0) or upper end (1) of direction is a point."""
-    return float(np.ptp(_line(nurbs, direction, domain(nurbs, direction)[end]), axis=0).max()) <= tolerance
+    return _extent(nurbs, direction, domain(nurbs, direction)[end]) <= tolerance
 
 
 def check_pinches(nurbs: NurbsSurface) -> None:
     """Raises PoleError where a parameter line between the ends of the surface shrinks to a point."""
-    size = float(np.linalg.norm([np.ptp(x) for x in nurbs.control_points[..., :3].reshape(-1, 3).T]))
+    size = nurbs.size
     for direction in (0, 1):
         at = spans(nurbs, direction, PER_SPAN)
         extents = np.array([_extent(nurbs, direction, x) for x in at])
         inner = np.arange(1, len(at) - 1)
         narrow = inner[(extents[inner] <= extents[inner - 1]) & (extents[inner] <= extents[inner + 1])]
         for k in narrow[extents[narrow] < NARROW * size]:
-            x = (
-                at[k]
-                if extents[k] <= TOLERANCE * size
-                else _narrowest(nurbs, direction, at[k - 1], at[k + 1])
-            )
+            x = at[k]
+            if extents[k] > TOLERANCE * size:
+                x = _narrowest(nurbs, direction, at[k - 1], at[k + 1])
             line = _line(nurbs, direction, x)
             if float(np.ptp(line, axis=0).max()) <= TOLERANCE * size:
                 tip = place(line.mean(axis=0))
@@ -198,8 +195,3 @@ def _narrowest(nurbs: NurbsSurface, direction: int, low: float, high: float) -> 
         options={"xatol": RELATIVE * (high - low), "maxiter": 100},
     )
     return float(found.x)
-
-
-def _collapsed(nurbs: NurbsSurface, direction: int, tolerance: float) -> bool:
-    """Whether a parameter line at an end of direction is a point."""
-    return any(collapsed(nurbs, direction, end, tolerance) for end in (0, 1))

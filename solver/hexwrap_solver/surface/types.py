@@ -177,6 +177,11 @@ class NurbsSurface:
     control_points: Floats
     closed: tuple[bool, bool]
 
+    @property
+    def size(self) -> float:
+        """Bounding diagonal of the control points."""
+        return float(np.linalg.norm(np.ptp(self.control_points[..., :3].reshape(-1, 3), axis=0)))
+
     @cached_property
     def spline(self) -> scipy.interpolate.NdBSpline:
         """Of homogeneous coordinates (x·w, y·w, z·w, w)."""

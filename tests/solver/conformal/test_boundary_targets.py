@@ -67,7 +67,7 @@ def test_every_target_satisfies_gauss_bonnet() -> None:
     inside = len(TOWER.vertices) - len(loops[0]) - len(loops[1])
     straight = boundary.straight(TOWER)
     assert straight.angle.sum() == pytest.approx(2 * np.pi * inside + np.pi * (len(loops[0]) + len(loops[1])))
-    tied = boundary.constant_on_loops(TOWER, (np.pi / 3, -np.pi / 3))
+    tied = boundary.targets(TOWER, (np.pi / 3, -np.pi / 3))
     free = tied.angle[tied.shared < 0].sum()
     loop_0 = len(loops[0]) * np.pi - np.pi / 3  # Σκ = K
     assert free + tied.shared_angle[1] + loop_0 == pytest.approx(np.pi * len(TOWER.faces))

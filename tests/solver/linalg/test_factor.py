@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.spatial import Delaunay
 
 from hexwrap_solver.arrays import Floats, Ints
-from hexwrap_solver.conformal.boundary import constant_on_loops, straight
+from hexwrap_solver.conformal.boundary import straight, targets
 from hexwrap_solver.conformal.energy import Energy
 from hexwrap_solver.errors import ConvergenceError
 from hexwrap_solver.linalg import factor
@@ -51,9 +51,7 @@ def test_random_graphs(n: int, seed: int, tied: bool) -> None:
 @pytest.mark.parametrize("tied", [False, True])
 def test_hessians(tied: bool) -> None:
     surface = bump(60, 30)
-    energy = Energy(
-        surface, constant_on_loops(surface, (-np.pi / 3, np.pi / 3)) if tied else straight(surface)
-    )
+    energy = Energy(surface, targets(surface, (-np.pi / 3, np.pi / 3)) if tied else straight(surface))
     diagonal, off_diagonal = energy.hessian(energy.corners(np.zeros(energy.n)))
     factorisation = Factorisation(energy.points, energy.rows, energy.columns)
     factorisation.factorise(diagonal, off_diagonal)

@@ -22,8 +22,8 @@ from hexwrap_solver.surface.brep.pull import Patch, free, lifted, patch_of, pull
 from hexwrap_solver.surface.brep.sizes import Field, Sizes, field_of, meeting, sized
 from hexwrap_solver.surface.brep.types import Brep, Edge, Face, Trim
 from hexwrap_solver.surface.brep.whole import check_brep
-from hexwrap_solver.surface.errors import EmptySurfaceError, FlatSurfaceError, TooFineError
-from hexwrap_solver.surface.mesh_sizes import GRADE, ROW, check_settings
+from hexwrap_solver.surface.errors import EmptySurfaceError, FlatSurfaceError
+from hexwrap_solver.surface.mesh_sizes import GRADE, ROW, check_number, check_settings
 from hexwrap_solver.surface.nurbs import evaluate
 from hexwrap_solver.surface.topology import sum_rows
 from hexwrap_solver.surface.types import MeshSettings
@@ -103,7 +103,7 @@ def mesh_brep(brep: Brep, settings: MeshSettings | None = None) -> BrepMesh:
     for e in used:
         for side, uv in uses[e]:
             side.field = meeting(side.field, at[e][0], uv, wanted[e])
-    _allow(sides, settings.max_vertices)
+    check_number(sum(side.field.total(side.field.h) for side in sides) / ROW, settings.max_vertices)
     marks = {e: _marks(brep.edges[e], first[e], uses[e]) for e in used}
     divided = _divided(brep, used, first, at, wanted, marks, sizes)
     return _sewn(brep, sides, divided, first, sizes, settings.max_vertices)
@@ -137,20 +137,6 @@ def _wanted(sizes: Sizes, at: tuple[Floats, Floats, Floats], uvs: list[Floats], 
         h = np.minimum(h, side.field.wanted(uv))
     x = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(point, axis=0), axis=1))])
     return np.asarray((h[:, None] + GRADE * np.abs(x[:, None] - x)).min(axis=0))
-
-
-def _allow(sides: list[_Side], most: int) -> None:
-    number = 0.0
-    for side in sides:
-        f = side.field
-        weight = np.gradient(f.v)[:, None] * np.gradient(f.u)
-        number += float((f.density / f.h**2 * f.inside * weight).sum()) / ROW
-    if number > most:
-        raise TooFineError(
-            f"The mesh would have about {number:.3g} vertices, more than the {most} allowed: ask for longer "
-            "edges or a larger tolerance.",
-            data={"vertices": int(min(number, 1e18))},
-        )
 
 
 def _marks(edge: Edge, t: Floats, uses: list[tuple[_Side, Floats]]) -> Floats:

@@ -11,7 +11,8 @@ import shapely
 from scipy.spatial import Delaunay
 
 from hexwrap_solver.arrays import Bools, Floats, Ints
-from hexwrap_solver.geometry import cross_2d
+from hexwrap_solver.geometry import cross_2d, pair_key
+from hexwrap_solver.surface.flips import diagonal, flip
 from hexwrap_solver.surface.topology import half_edges, twins
 
 #: Points around the outside, so that the polygon's own boundary is inside the triangulation.
@@ -33,8 +34,9 @@ def triangulated(points: Floats, segments: Ints, polygon: shapely.Polygon) -> In
     )
     everything = np.concatenate([points, frame])
     faces = np.asarray(Delaunay(everything).simplices, dtype=np.int64)
-    area = _areas(everything, faces)
-    faces[area < 0] = faces[area < 0][:, [0, 2, 1]]
+    a, b, c = (everything[faces[:, k]] for k in range(3))
+    clockwise = cross_2d(b - a, c - a) < 0
+    faces[clockwise] = faces[clockwise][:, [0, 2, 1]]
     if not force(everything, faces, segments):
         return None
     faces = faces[(faces < n).all(axis=1)]
@@ -44,17 +46,11 @@ def triangulated(points: Floats, segments: Ints, polygon: shapely.Polygon) -> In
     return faces if len(np.unique(faces)) == n else None
 
 
-def _areas(points: Floats, faces: Ints) -> Floats:
-    a, b, c = (points[faces[:, k]] for k in range(3))
-    return cross_2d(b - a, c - a)
-
-
 def missing(faces: Ints, segments: Ints, n: int) -> Bools:
     """(k,) which segments are not an edge of any face."""
     start, end = half_edges(faces)
-    have = np.minimum(start, end) * n + np.maximum(start, end)
-    low, high = segments.min(axis=1), segments.max(axis=1)
-    return ~np.isin(low * n + high, have)
+    have = pair_key(start, end, n)
+    return ~np.isin(pair_key(segments[:, 0], segments[:, 1], n), have)
 
 
 def force(points: Floats, faces: Ints, segments: Ints) -> bool:
@@ -77,13 +73,14 @@ def _force_one(points: Floats, faces: Ints, twin: Ints, a: int, b: int) -> bool:
         h = _half_edge(faces, start, end)
         if h < 0 or twin[h] < 0:
             return False
-        c, d = int(faces.flat[_after(_after(h))]), int(faces.flat[_after(_after(int(twin[h])))])
+        at = np.array([h])
+        c, d = (int(end[0]) for end in diagonal(faces, at, twin))
         pa, pb, pc, pd = points[start], points[end], points[c], points[d]
         if cross_2d(pd - pa, pc - pa) <= 0 or cross_2d(pb - pd, pc - pd) <= 0:
             waiting.append((start, end))
             continue
-        _flip(faces, twin, h)
-        if {c, d} != {a, b} and _crosses(points, a, b, c, d):
+        flip(faces, at, twin)
+        if not {a, b} & {c, d} and _crosses(points[a], points[b], pc, pd):
             waiting.append((c, d))
     return False
 
@@ -95,20 +92,15 @@ def _crossing(points: Floats, faces: Ints, twin: Ints, a: int, b: int) -> list[t
     s, e = start[h], end[h]
     apart = (s != a) & (s != b) & (e != a) & (e != b)
     s, e = s[apart], e[apart]
-    pa, pb, ps, pe = points[a], points[b], points[s], points[e]
-    one, two = cross_2d(pb - pa, ps - pa), cross_2d(pb - pa, pe - pa)
-    three, four = cross_2d(pe - ps, pa - ps), cross_2d(pe - ps, pb - ps)
-    hit = (one * two < 0) & (three * four < 0)
+    hit = _crosses(points[a], points[b], points[s], points[e])
     return list(zip(s[hit].tolist(), e[hit].tolist(), strict=True))
 
 
-def _crosses(points: Floats, a: int, b: int, c: int, d: int) -> bool:
-    if {a, b} & {c, d}:
-        return False
-    pa, pb, pc, pd = points[a], points[b], points[c], points[d]
-    one, two = cross_2d(pb - pa, pc - pa), cross_2d(pb - pa, pd - pa)
-    three, four = cross_2d(pd - pc, pa - pc), cross_2d(pd - pc, pb - pc)
-    return bool(one * two < 0 and three * four < 0)
+def _crosses(a: Floats, b: Floats, c: Floats, d: Floats) -> Bools:
+    """(…,) whether segments from a to b and from c to d have a point inside both in common."""
+    one, two = cross_2d(b - a, c - a), cross_2d(b - a, d - a)
+    three, four = cross_2d(d - c, a - c), cross_2d(d - c, b - c)
+    return np.asarray((one * two < 0) & (three * four < 0))
 
 
 def _half_edge(faces: Ints, a: int, b: int) -> int:
@@ -117,23 +109,3 @@ def _half_edge(faces: Ints, a: int, b: int) -> int:
             if faces[row, k] == a and faces[row, (k + 1) % 3] == b:
                 return int(3 * row + k)
     return -1
-
-
-def _after(h: int) -> int:
-    return h - 2 if h % 3 == 2 else h + 1
-
-
-def _flip(faces: Ints, twin: Ints, h: int) -> None:
-    """Turns the edge a→b of (a, b, c) | (b, a, d) into c–d: (a, d, c) and (d, b, c)."""
-    t = int(twin[h])
-    bc, ca, ad, db = _after(h), _after(_after(h)), _after(t), _after(_after(t))
-    a, b, c, d = (int(faces.flat[x]) for x in (h, bc, ca, db))
-    outer = [int(twin[x]) for x in (ad, ca, db, bc)]
-    f, g = h // 3, t // 3
-    faces[f], faces[g] = (a, d, c), (d, b, c)
-    pairs = ((3 * f, outer[0]), (3 * f + 2, outer[1]), (3 * g, outer[2]), (3 * g + 1, outer[3]))
-    for own, other in pairs:
-        twin[own] = other
-        if other >= 0:
-            twin[other] = own
-    twin[3 * f + 1], twin[3 * g + 2] = 3 * g + 2, 3 * f + 1

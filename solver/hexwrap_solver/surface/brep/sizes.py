@@ -56,8 +56,12 @@ class Field:
 
     @property
     def area(self) -> float:
+        return self.total(1.0)
+
+    def total(self, unit: Floats | float) -> float:
+        """Area in squares of a length."""
         weight = np.gradient(self.v)[:, None] * np.gradient(self.u)
-        return float((self.density * self.inside * weight).sum())
+        return float((self.density / unit**2 * self.inside * weight).sum())
 
     def wanted(self, uv: Floats) -> Floats:
         """(k,) edge length wanted at parameters (k, 2)."""

@@ -81,8 +81,8 @@ def surface_from_patch(
     except NotClosedError:
         if any(nurbs.closed):
             raise
-    size = float(np.linalg.norm(np.ptp(nurbs.control_points[..., :3].reshape(-1, 3), axis=0)))
-    return surface_from_brep(brep_of_surface(nurbs, max(tolerance or 0.0, TOLERANCE * size)), settings)
+    tolerance = max(tolerance or 0.0, TOLERANCE * nurbs.size)
+    return surface_from_brep(brep_of_surface(nurbs, tolerance), settings)
 
 
 def _sent(mesh: BrepMesh, turned: bool = False) -> SentMesh:
