@@ -29,8 +29,8 @@ from hexwrap_solver.explore.offers import (
 )
 from hexwrap_solver.explore.worth import or_plain
 from hexwrap_solver.panels import fit_panels, make_components, measure, quantize, support
-from hexwrap_solver.panels.fit import FitKey
-from hexwrap_solver.panels.quantize import CurveKey, SizeKey, trade_off
+from hexwrap_solver.panels.fit import fit_key
+from hexwrap_solver.panels.quantize import curve_key, size_key, trade_off
 from hexwrap_solver.panels.types import Components, ComponentSettings, Panels, PanelSettings, Quality, Support
 from hexwrap_solver.pattern import lay_pattern
 from hexwrap_solver.pattern.types import Pattern, PatternSettings
@@ -140,9 +140,9 @@ def _solve(
     made, wanted, facing = None, None, None
     if panels is not None:
         # Three stages, so that a change of the size classes alone reuses the poses and limits.
-        fitted = run("fit", FitKey.of(panels), lambda progress: fit_panels(cmap, laid, panels, progress))
-        curve = run("trade-off", CurveKey.of(panels), lambda progress: trade_off(fitted, panels))
-        made = run("panels", SizeKey.of(panels), lambda progress: quantize(fitted, panels, curve))
+        fitted = run("fit", fit_key(panels), lambda progress: fit_panels(cmap, laid, panels, progress))
+        curve = run("trade-off", curve_key(panels), lambda progress: trade_off(fitted, panels))
+        made = run("panels", size_key(panels), lambda progress: quantize(fitted, panels, curve))
         facing = fitted.facing
         wanted = panels.components or (ComponentSettings() if settings.support else None)
     quality = run("quality", None, lambda progress: measure(cmap, laid, made, progress, facing))

@@ -22,7 +22,7 @@ from hexwrap_server.input.readers.drawing_json import read_json
 from hexwrap_server.output.drawing import Entities
 from hexwrap_server.output.text import csv_table
 from hexwrap_server.output.units import heading, unit_of
-from hexwrap_solver.arrays import Floats
+from hexwrap_solver.arrays import Floats, runs
 
 
 def read_drawing(path: Path) -> Drawing:
@@ -59,8 +59,8 @@ def refined(curve: Curve, step: float) -> Curve:
         return curve
     along = np.diff(points, axis=0)
     pieces = np.maximum(np.ceil(np.linalg.norm(along, axis=1) / step), 1).astype(np.int64)
-    at = np.repeat(np.arange(len(along)), pieces)
-    share = (np.arange(len(at)) - np.repeat(np.cumsum(pieces) - pieces, pieces)) / pieces[at]
+    at, number = runs(pieces)
+    share = number / pieces[at]
     fine = points[at] + share[:, None] * along[at]
     return Curve(fine if curve.closed else np.vstack([fine, points[-1:]]), curve.closed)
 

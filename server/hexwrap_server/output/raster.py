@@ -64,17 +64,11 @@ class Polygons:
 
     def take(self, rows: Bools) -> Polygons:
         """Only the rows that are True."""
-        kept = np.repeat(rows, self.outline.lengths)
-        offsets = np.append(0, np.cumsum(self.outline.lengths[rows]))
-        return Polygons(Ragged(self.outline.values[kept], offsets), self.normal[rows], self.anchor[rows])
+        return Polygons(self.outline.take(rows), self.normal[rows], self.anchor[rows])
 
     def join(self, other: Polygons) -> Polygons:
         """These rows, then the other's."""
-        last = self.outline.offsets[-1]
-        outline = Ragged(
-            np.concatenate([self.outline.values, other.outline.values]),
-            np.concatenate([self.outline.offsets, other.outline.offsets[1:] + last]),
-        )
+        outline = Ragged.chained([self.outline, other.outline])
         return Polygons(
             outline, np.vstack([self.normal, other.normal]), np.vstack([self.anchor, other.anchor])
         )

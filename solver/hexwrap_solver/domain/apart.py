@@ -10,10 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hexwrap_solver.arrays import Complexes, Floats, Ints
+from hexwrap_solver.arrays import Complexes, Floats, Ints, runs
 from hexwrap_solver.conformal.net import Net
 from hexwrap_solver.conformal.types import ConformalMap
-from hexwrap_solver.domain.locate import runs
 
 #: Points of the raster along the longer side of the net.
 RASTER = 400

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexwrap_solver.arrays import Complexes, Floats, Ints
+from hexwrap_solver.arrays import Complexes, Floats, Ints, runs
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.tolerances import RELATIVE, TINY
 
@@ -29,12 +29,6 @@ def barycentric(corners: Complexes, place: Complexes) -> Floats:
     second = (p.real * b.imag - p.imag * b.real) / area
     third = (a.real * p.imag - a.imag * p.real) / area
     return np.stack([1 - second - third, second, third], axis=1)
-
-
-def runs(counts: Ints) -> tuple[Ints, Ints]:
-    """(owner, position inside the owner's run) of Σcounts entries."""
-    owner = np.repeat(np.arange(len(counts)), counts)
-    return owner, np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts)
 
 
 @dataclass(frozen=True)

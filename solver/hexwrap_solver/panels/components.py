@@ -19,7 +19,6 @@ from hexwrap_solver.panels.polygons import (
     means,
     row_maxima,
     row_minima,
-    take_rows,
 )
 from hexwrap_solver.panels.types import Components, ComponentSettings, Panels
 from hexwrap_solver.tolerances import RELATIVE
@@ -83,8 +82,7 @@ def _inset_parts(panels: Panels, inset: float) -> Ragged:
         rows[row] = np.asarray(plain[i])
     for row in np.flatnonzero(hinge >= 0).tolist():
         rows[row] = _inset_bent(np.asarray(panels.polygons[row], dtype=np.float64), int(hinge[row]), inset)
-    offsets = np.cumsum([0, *(len(one) for one in rows)])
-    return Ragged(np.concatenate(rows), offsets)
+    return Ragged.of(np.concatenate(rows), np.array([len(one) for one in rows]))
 
 
 def _inset_bent(corner: Floats, hinge: int, inset: float) -> Floats:
@@ -141,7 +139,7 @@ class Parts:
 
 def _in_plane(panels: Panels, which: Ints) -> shapely.Geometry:
     """(k,) the given panels as polygons in their own planes, about their centres, without self-crossings."""
-    some, _ = take_rows(panels.polygons, which)
+    some = panels.polygons.take(which)
     corner = in_planes(some, panels.center[which], plane_axes(panels.normal[which]))
     return shapely.make_valid(outlines(corner, some.row)) if len(which) else np.zeros(0, dtype=object)
 
@@ -183,8 +181,7 @@ def _with_rows(table: Ragged, rows: Ints, found: list[Floats]) -> Ragged:
     every = [table[i] for i in range(table.n_rows)]
     for i, row in zip(rows, found, strict=True):
         every[i] = row
-    offsets = np.cumsum([0, *(len(row) for row in every)])
-    return Ragged(np.concatenate(every).astype(np.float64), offsets)
+    return Ragged.of(np.concatenate(every).astype(np.float64), np.array([len(row) for row in every]))
 
 
 def _require_room(panels: Panels, thin: np.ndarray, inset: float, room: Floats) -> None:
@@ -201,7 +198,7 @@ def _require_room(panels: Panels, thin: np.ndarray, inset: float, room: Floats) 
 def _solids(outline: Ragged, parts: Parts, thickness: float) -> tuple[Ragged, Ragged]:
     """Prisms from the outline outwards: n lower corners, then n upper ones; 4n − 4 triangles each."""
     count, offsets = outline.lengths, outline.offsets
-    local = np.arange(len(outline.values)) - np.repeat(offsets[:-1], count)
+    local = outline.within
     n = np.repeat(count, count)
     at = local + 2 * np.repeat(offsets[:-1], count)
     vertices = np.zeros((2 * len(outline.values), 3))
@@ -219,8 +216,7 @@ def _solids(outline: Ragged, parts: Parts, thickness: float) -> tuple[Ragged, Ra
     owner = np.concatenate([np.repeat(row, 2), inner, inner])
     triangles = np.concatenate([sides.reshape(-1, 3), lower, upper])
     order = np.argsort(owner, kind="stable")
-    face_offsets = np.concatenate([[0], np.cumsum(3 * (4 * count - 4))]).astype(np.int64)
-    return Ragged(vertices, 2 * offsets), Ragged(triangles[order].ravel(), face_offsets)
+    return Ragged(vertices, 2 * offsets), Ragged.of(triangles[order].ravel(), 3 * (4 * count - 4))
 
 
 def triangulated(outline: Ragged, normal: Floats) -> Ints:
@@ -229,8 +225,7 @@ def triangulated(outline: Ragged, normal: Floats) -> Ints:
     Fans from the corner with the greatest interior angle; outlines with several reflex corners, which no fan
     may fill, by clipping ears (Meisters 1975).
     """
-    row = outline.row
-    local = np.arange(len(row)) - outline.offsets[:-1][row]
+    row, local = outline.row, outline.within
     following = np.where(local + 1 < outline.lengths[row], local + 1, 0)
     apex = _fan_corner(outline, normal)[row]
     inner = (local != apex) & (following != apex)

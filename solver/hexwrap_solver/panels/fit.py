@@ -26,7 +26,6 @@ from hexwrap_solver.panels.polygons import (
     means,
     row_maxima,
     row_minima,
-    take_rows,
 )
 from hexwrap_solver.panels.poses import fit_poses, target_lengths
 from hexwrap_solver.panels.regular import Poses, bending, corners, outline_areas
@@ -52,31 +51,12 @@ HOLD = 50.0
 LEAST_EDGE = 0.01
 
 
-@dataclass(frozen=True)
-class FitKey:
+def fit_key(s: PanelSettings) -> tuple[object, ...]:
     """The settings that ``fit_panels`` depends on."""
-
-    mode: str
-    target: str
-    orientation: str
-    joint: float
-    method: str
-    weights: Weights
-    fold: str
-
-    @classmethod
-    def of(cls, settings: PanelSettings) -> FitKey:
-        return cls(
-            settings.mode,
-            settings.target,
-            settings.orientation,
-            settings.joint,
-            settings.method,
-            settings.weights,
-            settings.fold,
-        )
+    return s.mode, s.target, s.orientation, s.joint, s.method, s.weights, s.fold
 
 
+NO_POLYGONS = Ragged(np.zeros((0, 3)), np.zeros(1, dtype=np.int64))
 WATERTIGHT_NOTES = (
     "Watertight panels share their corners: joint, orientation and size classes do not apply.",
 )
@@ -101,7 +81,7 @@ def fit_panels(
 ) -> FittedPanels:
     """Poses and size limits of split panels, or the finished faces of a watertight mesh (paper, section 5).
 
-    Depends on the settings in ``FitKey`` only. Raises PanelsError where no whole cell has room for a panel.
+    Depends on the settings in ``fit_key`` only. Raises PanelsError where no whole cell has room for a panel.
     """
     progress(0.0, "fitting panels")
     if settings.mode == "watertight":
@@ -190,7 +170,7 @@ def _fit_split(
     planes = separating_planes(pattern, edges, folds.normal, folds.joints(edges, settings.joint))
     progress(0.4, "limiting sizes")
     face = np.concatenate([np.zeros(0, dtype=np.int64), *(group.face for group in (*kinds, *folds.kinds))])
-    spokes = _chained([group.spokes for group in (*kinds, *folds.kinds)])
+    spokes = Ragged.chained([NO_POLYGONS, *(group.spokes for group in (*kinds, *folds.kinds))])
     kind = np.repeat(np.arange(len(kinds) + len(folds.kinds)), [len(g.face) for g in (*kinds, *folds.kinds)])
     length, center, said = _limits(kinds, planes, edges, settings, progress)
     pieces = [group.inscribed(planes) for group in folds.kinds]
@@ -226,7 +206,7 @@ def _fit_split(
         mode="split",
         face=made,
         regular=kept[made],
-        spokes=take_rows(spokes, order)[0],
+        spokes=spokes.take(order),
         shapes=single.shapes,
         center=_merge(kept, center[order], cut, single.center)[made],
         normal=whole_normal[made],
@@ -254,20 +234,13 @@ def _areas(area: Floats, made: Ints, bends: Bends | None) -> Floats:
     return own
 
 
-def _chained(tables: list[Ragged]) -> Ragged:
-    """(·, 3) values, one table after the other."""
-    count = np.concatenate([np.zeros(0, dtype=np.int64), *(table.lengths for table in tables)])
-    values = np.concatenate([np.zeros((0, 3)), *(table.values.reshape(-1, 3) for table in tables)])
-    return Ragged(values, np.concatenate([[0], np.cumsum(count)]).astype(np.int64))
-
-
 def _joined(parts: list[tuple[Ragged, Floats, Bools]]) -> tuple[Ragged, Floats, Bools]:
     """Polygons, centres and cells of several kinds, in the order of the cells."""
     if len(parts) == 1:
         return parts[0]
     order = np.argsort(np.concatenate([np.flatnonzero(kept) for _, _, kept in parts]), kind="stable")
     center = np.concatenate([center for _, center, _ in parts])[order]
-    shapes = take_rows(_chained([shapes for shapes, _, _ in parts]), order)[0]
+    shapes = Ragged.chained([shapes for shapes, _, _ in parts]).take(order)
     return shapes, center, np.logical_or.reduce([kept for _, _, kept in parts])
 
 
@@ -298,7 +271,7 @@ def _fit_watertight(
         mode="watertight",
         face=np.arange(pattern.n_cells),
         regular=np.zeros(pattern.n_cells, dtype=bool),
-        spokes=_chained([]),
+        spokes=NO_POLYGONS,
         shapes=shapes,
         center=center,
         normal=normal,
@@ -466,15 +439,15 @@ def _trimmed(
     """Flat polygons for the chosen cells, their centres, and which cells (of all) keep a panel. origin: (c,
     3) points of the planes."""
     if not chosen.any():
-        return Ragged.from_table(np.zeros((0, 1, 3))), np.zeros((0, 3)), chosen.copy()
-    shapes, at = take_rows(cells, np.flatnonzero(chosen))
+        return NO_POLYGONS, np.zeros((0, 3)), chosen.copy()
+    shapes, at = cells.take(chosen), cells.places(chosen)
     flat, center, size = flatten_and_clear(
         shapes, normal[chosen], planes.direction[at], planes.offset[at], edges.across[at], origin[chosen]
     )
     enough = size >= LEAST_TRIMMED
     kept = np.zeros(len(chosen), dtype=bool)
     kept[np.flatnonzero(chosen)[enough]] = True
-    return take_rows(flat, np.flatnonzero(enough))[0], center[enough], kept
+    return flat.take(enough), center[enough], kept
 
 
 def _merge(first: Bools, a: Floats, second: Bools, b: Floats) -> Floats:

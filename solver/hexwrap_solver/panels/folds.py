@@ -17,10 +17,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints, Ragged
+from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints, Ragged, runs
 from hexwrap_solver.geometry import dot, normalize
 from hexwrap_solver.panels.limits import inscribed
-from hexwrap_solver.panels.polygons import area_vectors, means, take_rows
+from hexwrap_solver.panels.polygons import area_vectors, means
 from hexwrap_solver.panels.regular import Poses, bending, copies
 from hexwrap_solver.panels.separation import Separation
 from hexwrap_solver.panels.tangents import surface_normals
@@ -193,7 +193,7 @@ def _shapes(outline: Ragged) -> Ints:
     number, used = np.zeros(outline.n_rows, dtype=np.int64), 0
     for count in np.unique(outline.lengths):
         rows = np.flatnonzero(outline.lengths == count)
-        place = take_rows(outline, rows)[0].values.reshape(len(rows), -1)
+        place = outline.take(rows).values.reshape(len(rows), -1)
         key = np.rint(place * PARTS).astype(np.int64)
         _, own = np.unique(key, axis=0, return_inverse=True)
         number[rows] = used + own.ravel()
@@ -292,8 +292,8 @@ class AlongFolds:
 def places_of(pattern: Pattern, made: Ints, bends: Bends | None) -> tuple[Ints, Ints]:
     """(c,) the panel of each cell, −1: none; and (h,) the corner of that at which each half-edge's own edge
     begins, −1 along hinges."""
-    offsets, row = pattern.faces.offsets, pattern.faces.row
-    corner = np.arange(len(row)) - offsets[row]
+    row = pattern.faces.row
+    corner = pattern.faces.within
     panel = np.full(pattern.n_cells, -1, dtype=np.int64)
     panel[made] = np.arange(len(made))
     if bends is not None:
@@ -320,8 +320,8 @@ def _ends(pattern: Pattern, cell: Ints, side: Ints) -> tuple[Floats, Floats]:
 
 def replace_pieces(pieces: FoldPieces, keep: Bools) -> FoldPieces:
     """Some of them, which have no mates."""
-    outline = take_rows(pieces.outline, np.flatnonzero(keep))[0]
-    return FoldPieces(pieces.cell[keep], pieces.side[keep], np.full(int(keep.sum()), -1), outline)
+    none = np.full(int(keep.sum()), -1)
+    return FoldPieces(pieces.cell[keep], pieces.side[keep], none, pieces.outline.take(keep))
 
 
 @dataclass(frozen=True)
@@ -362,27 +362,22 @@ def bent_singles(pattern: Pattern, pieces: FoldPieces, shapes: Ragged, center: F
     room = reach_b > reach_a
     cell, side, of, count, start = (table[room] for table in (cell, side, of, count, start))
     total = count.sum(axis=1) - 2
-    offsets = np.concatenate([[0], np.cumsum(total)]).astype(np.int64)
-    pair = np.repeat(np.arange(len(total)), total)
-    within = np.arange(len(pair)) - offsets[pair]
+    pair, within = runs(total)
     m = count[pair, 0]
     one = start[pair, 0] + (side[pair, 0] + 1 + within) % m
     two = start[pair, 1] + (side[pair, 1] + 2 + within - m) % count[pair, 1]
-    joined = points[np.where(within < m, one, two)]
-    joined[offsets[:-1]] = (middle + reach_b[:, None] * x)[room]
-    joined[offsets[:-1] + count[:, 0] - 1] = (middle + reach_a[:, None] * x)[room]
+    joined = Ragged.of(points[np.where(within < m, one, two)], total)
+    first_corner = joined.offsets[:-1]
+    joined.values[first_corner] = (middle + reach_b[:, None] * x)[room]
+    joined.values[first_corner + count[:, 0] - 1] = (middle + reach_a[:, None] * x)[room]
     alone = np.ones(k, dtype=bool)
     alone[of] = False
-    flat, _ = take_rows(shapes, np.flatnonzero(alone))
-    every = Ragged(
-        np.concatenate([flat.values, joined]), np.concatenate([flat.offsets, flat.offsets[-1] + offsets[1:]])
-    )
     faces = np.concatenate([face[alone], cell[:, 0]])
     order = np.argsort(faces, kind="stable")
     none = np.full(int(alone.sum()), -1)
     return Singles(
-        take_rows(every, order)[0],
-        np.concatenate([center[alone], means(Ragged(joined, offsets))])[order],
+        Ragged.chained([shapes.take(alone), joined]).take(order),
+        np.concatenate([center[alone], means(joined)])[order],
         faces[order],
         np.concatenate([none, cell[:, 1]])[order],
         np.concatenate([none, count[:, 0] - 1])[order],
@@ -411,11 +406,9 @@ def flat_parts(polygons: Ragged, panels: Panels) -> tuple[Ragged, Ints, Ints, Fl
     begin[2 * bends.panel + 1] = bends.hinge
     owner = np.repeat(np.arange(panels.n_panels), 2)
     owner, begin, count = owner[count > 0], begin[count > 0], count[count > 0]
-    offsets = np.concatenate([[0], np.cumsum(count)]).astype(np.int64)
-    row = np.repeat(np.arange(len(count)), count)
-    within = begin[row] + np.arange(len(row)) - offsets[row]
-    at = polygons.offsets[owner][row] + within % polygons.lengths[owner][row]
-    parts = Ragged(polygons.values[at], offsets)
+    row, within = runs(count)
+    at = polygons.offsets[owner][row] + (begin[row] + within) % polygons.lengths[owner][row]
+    parts = Ragged.of(polygons.values[at], count)
     bent = np.isin(owner, bends.panel)
     normal = panels.normal[owner]
     vector = area_vectors(parts)
@@ -434,9 +427,8 @@ def parts_by_cell(panels: Panels) -> tuple[Panels, Ints]:
     face, turn = panels.face[owner], np.zeros(len(owner), dtype=np.int64)
     face[first + 1] = bends.other
     turn[first], turn[first + 1] = bends.side[:, 0] + 1, bends.side[:, 1] + 1
-    row, count = parts.row, parts.lengths
-    within = np.arange(len(row)) - parts.offsets[row]
-    at = parts.offsets[row] + (within - turn[row]) % count[row]
+    row = parts.row
+    at = parts.offsets[row] + (parts.within - turn[row]) % parts.lengths[row]
     polygons = Ragged(parts.values[at], parts.offsets)
     center = panels.center[owner]
     bent = np.isin(owner, bends.panel)
@@ -494,8 +486,7 @@ def blanks(panels: Panels) -> tuple[Ragged, Floats]:
     first = np.searchsorted(owner, np.arange(panels.n_panels))
     normal = part_normal[first]
     points = np.array(polygons.values, dtype=np.float64)
-    row = polygons.row
-    within = np.arange(len(row)) - polygons.offsets[row]
+    row, within = polygons.row, polygons.within
     hinge = np.full(panels.n_panels, np.iinfo(np.int64).max)
     hinge[bends.panel] = bends.hinge
     moved = np.flatnonzero(within > hinge[row])

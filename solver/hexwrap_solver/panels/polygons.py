@@ -186,11 +186,3 @@ def _of_corners(
     for one in outlines(polygons, normal):
         measured[_corners(polygons, one.row, len(one.corner[0]))] = measure(one)
     return measured
-
-
-def take_rows(table: Ragged, rows: Ints) -> tuple[Ragged, Ints]:
-    """The given rows, and the positions of their values in the table."""
-    count = table.lengths[rows]
-    offsets = np.concatenate([[0], np.cumsum(count)]).astype(np.int64)
-    at = np.arange(offsets[-1]) + np.repeat(table.offsets[rows] - offsets[:-1], count)
-    return Ragged(table.values[at], offsets), at

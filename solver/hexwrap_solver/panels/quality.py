@@ -124,9 +124,11 @@ def _surface_distances(surface: Surface, pattern: Pattern, panels: Panels) -> Fl
     tree, polygons, n = surface.tree, panels.polygons, panels.n_panels
     points = np.concatenate([np.asarray(polygons.values, dtype=np.float64), panels.center])
     row = polygons.row
-    within = np.arange(len(row)) - polygons.offsets.take(row)  # a trimmed panel may have more
-    within = np.minimum(within, pattern.faces.lengths.take(panels.face).take(row) - 1)
-    corner = pattern.faces.values.take(pattern.faces.offsets.take(panels.face).take(row) + within)
+    # a trimmed panel may have more corners than its cell
+    within = np.minimum(polygons.within, pattern.faces.lengths.take(panels.face).take(row) - 1)
+    corner = pattern.faces.values.take(pattern.faces.offsets.take(panels.face).take(row) + within).astype(
+        np.int64
+    )
     beside = pattern.triangle.take(corner)
     near = np.concatenate([beside, beside[polygons.offsets[:-1]]])
     return tree.farthest(points, np.concatenate([row, np.arange(n)]), n, near, surface.twin)
@@ -138,8 +140,7 @@ def _facing(pattern: Pattern, edges: HalfEdges, panels: Panels) -> Facing:
     panel[panels.face] = np.arange(panels.n_panels)
     normal = np.zeros((pattern.n_cells, 3))
     normal[panels.face] = panels.normal
-    corner = np.arange(len(edges.cell)) - pattern.faces.offsets[edges.cell]
-    return facing_edges(edges, panel, corner, normal)
+    return facing_edges(edges, panel, pattern.faces.within, normal)
 
 
 def _count_wide(edges: HalfEdges, panels: Panels, gap: Floats) -> int | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -28,42 +28,21 @@ from hexwrap_solver.words import place
 TRADE_OFF_CLASSES = 40
 
 
-@dataclass(frozen=True)
-class SizeKey:
+def size_key(s: PanelSettings) -> tuple[object, ...]:
     """The settings that ``quantize`` depends on."""
-
-    sizes: int | str | None
-    max_gap: float | None
-    size_cost: str
-    edge_range: tuple[float, float] | None
-    increment: float
-
-    @classmethod
-    def of(cls, settings: PanelSettings) -> SizeKey:
-        return cls(
-            settings.sizes, settings.max_gap, settings.size_cost, settings.edge_range, settings.increment
-        )
+    return s.sizes, s.max_gap, s.size_cost, s.edge_range, s.increment
 
 
-@dataclass(frozen=True)
-class CurveKey:
+def curve_key(s: PanelSettings) -> tuple[object, ...]:
     """The settings that ``trade_off`` depends on."""
-
-    size_cost: str
-    largest: float | None
-    increment: float
-
-    @classmethod
-    def of(cls, settings: PanelSettings) -> CurveKey:
-        largest = None if settings.edge_range is None else settings.edge_range[1]
-        return cls(settings.size_cost, largest, settings.increment)
+    return s.size_cost, None if s.edge_range is None else s.edge_range[1], s.increment
 
 
 def trade_off(fitted: FittedPanels, settings: PanelSettings) -> TradeOff | None:
     """What each number of classes leaves open, for the better of the limits; the regular panels only. None
     without such.
 
-    Depends on the settings in ``CurveKey`` only. Raises PanelsError as ``quantize`` does.
+    Depends on the settings in ``curve_key`` only. Raises PanelsError as ``quantize`` does.
     """
     limits = _limits(fitted, settings)[1]
     if not len(limits[0]):
@@ -78,8 +57,8 @@ def trade_off(fitted: FittedPanels, settings: PanelSettings) -> TradeOff | None:
 def quantize(fitted: FittedPanels, settings: PanelSettings, curve: TradeOff | None = None) -> Panels:
     """Chooses the size classes and makes the polygons. curve: the ``trade_off``, where it is known.
 
-    Depends on the settings in ``SizeKey`` only. Raises PanelsError where the increment is longer than a panel
-    may be.
+    Depends on the settings in ``size_key`` only. Raises PanelsError where the increment is longer than a
+    panel may be.
     """
     regular = fitted.regular
     curve = curve or trade_off(fitted, settings)
@@ -286,11 +265,10 @@ def _polygons(fitted: FittedPanels, length: Floats) -> Ragged:
         return Ragged(points, spokes.offsets)
     count = np.zeros(len(regular), dtype=np.int64)
     count[regular], count[~regular] = spokes.lengths, fitted.shapes.lengths
-    offsets = np.concatenate([[0], np.cumsum(count)]).astype(np.int64)
     is_regular = np.repeat(regular, count)
-    every = np.zeros((int(offsets[-1]), 3))
+    every = np.zeros((len(is_regular), 3))
     every[is_regular], every[~is_regular] = points, fitted.shapes.values
-    return Ragged(every, offsets)
+    return Ragged.of(every, count)
 
 
 def _curve(fitted: FittedPanels, allowed: Floats, settings: PanelSettings) -> Floats:

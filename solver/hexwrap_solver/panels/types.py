@@ -223,12 +223,9 @@ class Panels:
 
     def part(self, rows: Ints) -> Panels:
         """Some of the panels, none of them bent; their classes are kept."""
-        count = self.polygons.lengths[rows]
-        offsets = np.concatenate([[0], np.cumsum(count)]).astype(np.int64)
-        at = np.repeat(self.polygons.offsets[rows] - offsets[:-1], count) + np.arange(int(offsets[-1]))
         fields = ("face", "size", "edge_length", "limit", "center", "normal", "whole")
         taken = {name: getattr(self, name)[rows] for name in fields}
-        return replace(self, polygons=Ragged(self.polygons.values[at], offsets), bends=None, **taken)
+        return replace(self, polygons=self.polygons.take(rows), bends=None, **taken)
 
     @property
     def divided(self) -> Bools:

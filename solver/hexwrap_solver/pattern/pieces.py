@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hexwrap_solver.arrays import Bools, Complexes, Ints, Ragged
+from hexwrap_solver.arrays import Bools, Complexes, Ints, Ragged, runs
 from hexwrap_solver.geometry import outline_area
 from hexwrap_solver.pattern.lattice import Lattice
 from hexwrap_solver.pattern.lay.cells import Cells
@@ -75,11 +75,9 @@ def _from_the_fold(shape: Ragged, place: Complexes, step: Complexes, side: Ints)
     """The cells of the given sides, from these on, with them along the real axis about 0."""
     cell = shape.row[side]
     count = shape.lengths[cell]
-    offsets = np.concatenate([[0], np.cumsum(count)]).astype(np.int64)
-    row = np.repeat(np.arange(len(side)), count)
-    within = np.arange(len(row)) - offsets[row]
+    row, within = runs(count)
     at = shape.offsets[cell][row] + (side[row] - shape.offsets[cell][row] + within) % count[row]
     middle = place[side] + step[side] / 2
     along = step[side] / np.maximum(abs(step[side]), TINY)
     seen = (place[at] - middle[row]) / along[row]
-    return Ragged(np.stack([seen.real, seen.imag], axis=-1), offsets)
+    return Ragged.of(np.stack([seen.real, seen.imag], axis=-1), count)

@@ -297,8 +297,7 @@ def _summed(values: Floats, first: Ints) -> Floats:
 
 def _ragged(rows: list[Ints]) -> Ragged:
     lengths = np.array([len(row) for row in rows], dtype=np.int64)
-    offsets = np.concatenate([[0], np.cumsum(lengths)])
-    return Ragged(np.concatenate([np.zeros(0, dtype=np.int64), *rows]), offsets)
+    return Ragged.of(np.concatenate([np.zeros(0, dtype=np.int64), *rows]), lengths)
 
 
 def _reference(energy: Energy, steps: bool, start: Floats | None) -> tuple[Floats, Factorisation]:

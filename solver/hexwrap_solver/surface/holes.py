@@ -40,10 +40,8 @@ def fill_openings(surface: Surface) -> Surface:
     kept = len(surface.loops) - surface.openings
     old = len(surface.vertices)
     # a loop runs with the surface on its left, and so clockwise around its hole
-    outlines = Ragged(
-        np.concatenate([loop[::-1] for loop in surface.loops[kept:]]),
-        np.cumsum([0, *map(len, surface.loops[kept:])]),
-    )
+    around = [loop[::-1] for loop in surface.loops[kept:]]
+    outlines = Ragged.of(np.concatenate(around), np.array([len(loop) for loop in around]))
     z, fills = _filled(surface, outlines)
     n = old + len(z) - len(outlines.values)
     name = np.concatenate([outlines.values, np.arange(old, n)])

@@ -137,9 +137,7 @@ def only(mesh: SentMesh, faces: Ints) -> SentMesh:
         return mesh
     keep = np.zeros(mesh.faces.n_rows, dtype=bool)
     keep[faces] = True
-    values = mesh.faces.values[np.repeat(keep, mesh.faces.lengths)]
-    offsets = np.append(0, np.cumsum(mesh.faces.lengths[keep])).astype(np.int64)
-    return _with_faces(mesh, Ragged(values, offsets))
+    return _with_faces(mesh, mesh.faces.take(keep))
 
 
 def _with_faces(mesh: SentMesh, faces: Ragged) -> SentMesh:
@@ -162,7 +160,7 @@ def together(meshes: Sequence[SentMesh]) -> tuple[SentMesh, Ints]:
     normals = [mesh.normals for mesh in meshes if mesh.normals is not None]
     whole = SentMesh(
         np.concatenate([mesh.vertices for mesh in meshes]),
-        Ragged(values.astype(np.int64), np.append(0, np.cumsum(lengths)).astype(np.int64)),
+        Ragged.of(values.astype(np.int64), lengths),
         np.concatenate(normals) if len(normals) == len(meshes) else None,
     )
     return whole, np.repeat(np.arange(len(meshes)), [mesh.faces.n_rows for mesh in meshes])
@@ -193,7 +191,7 @@ def joined(mesh: SentMesh, tolerance: float) -> tuple[SentMesh, Ints, Joint]:
     kept, split = only(mesh, np.flatnonzero(~more)).faces, more[source]
     values = np.concatenate([near[np.asarray(kept.values, dtype=np.int64)], faces[split].ravel()])
     lengths = np.append(kept.lengths, np.full(int(split.sum()), 3))
-    closed = _with_faces(mesh, Ragged(values, np.append(0, np.cumsum(lengths))))
+    closed = _with_faces(mesh, Ragged.of(values, lengths))
     return closed, np.append(np.flatnonzero(~more), source[split]), joint.worse(splits)
 
 

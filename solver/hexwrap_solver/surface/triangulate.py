@@ -37,10 +37,7 @@ def cut_polygons(vertices: Floats, faces: Ragged) -> tuple[Ragged, Ints]:
             corners.append(np.take_along_axis(index, ears.reshape(len(bundle), -1), axis=1).ravel())
     row, size = np.concatenate(rows), np.concatenate(sizes)
     order = np.argsort(row, kind="stable")
-    start = np.append(0, np.cumsum(size))[order]
-    offsets = np.append(0, np.cumsum(size[order]))
-    at = np.repeat(start - offsets[:-1], size[order]) + np.arange(offsets[-1])
-    return Ragged(np.concatenate(corners)[at].astype(np.int64), offsets.astype(np.int64)), row[order]
+    return Ragged.of(np.concatenate(corners), size).take(order), row[order]
 
 
 def _flattened(polygons: Floats) -> Floats:

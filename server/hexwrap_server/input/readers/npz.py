@@ -70,4 +70,4 @@ def _rows(faces: np.ndarray[Any, np.dtype[Any]]) -> Ragged:
     whole = (table[:, 3] >= 0) & (table[:, 3] != table[:, 2])
     keep = np.ones(table.shape, dtype=bool)
     keep[:, 3] = whole
-    return Ragged(table[keep], np.concatenate([[0], np.cumsum(3 + whole)]))
+    return Ragged.of(table[keep], 3 + whole)

@@ -41,7 +41,7 @@ def read_obj(data: bytes) -> FileContent:
     before = np.repeat(np.searchsorted(at_vertex, at_face), lengths)  # negative: back from those so far
     mesh = SentMesh(
         vertices.reshape(-1, 3),
-        Ragged(_checked(named, before, len(at_vertex), lengths), np.append(0, np.cumsum(lengths))),
+        Ragged.of(_checked(named, before, len(at_vertex), lengths), lengths),
     )
     return of_mesh(mesh, *_groups(lines, kinds, at_face))
 

@@ -50,7 +50,7 @@ def read_off(data: bytes) -> FileContent:
     corners = [x for row in face_rows for x in row[1 : 1 + int(row[0])]]
     index = integers(corners, "faces of the OFF file")
     from_one = bool(len(index)) and index.min() == 1 and index.max() == n
-    faces = Ragged(index - from_one, np.append(0, np.cumsum(lengths)))
+    faces = Ragged.of(index - from_one, lengths)
     content = of_mesh(SentMesh(points[:, :3] / points[:, 3:] if homogeneous else points, faces))
     if not from_one:
         return content

@@ -101,8 +101,7 @@ def rhino_mesh(mesh: Any) -> SentMesh:
         )
     keep = np.ones(table.shape, dtype=bool)
     keep[:, 3] = table[:, 3] != table[:, 2]
-    offsets = np.concatenate([[0], np.cumsum(keep.sum(axis=1))])
-    return SentMesh(vertices, Ragged(table[keep], offsets), _normals(mesh, len(vertices)))
+    return SentMesh(vertices, Ragged.of(table[keep], keep.sum(axis=1)), _normals(mesh, len(vertices)))
 
 
 def _normals(mesh: Any, n: int) -> Floats | None:

@@ -64,7 +64,9 @@ def _text(text: bytes) -> FileContent:
         raise UnreadableFileError("The STL file holds no mesh: it has no facets.")
     opened = np.cumsum([word == b"facet" for word in words])
     at_vertex = np.flatnonzero([word == b"vertex" for word in words])
-    lengths = np.bincount(opened[at_vertex] - 1, minlength=facets) if opened[0] else np.zeros(1)
+    lengths = (
+        np.bincount(opened[at_vertex] - 1, minlength=facets) if opened[0] else np.zeros(1, dtype=np.int64)
+    )
     incomplete = np.flatnonzero(lengths < 3)
     if len(incomplete) or words[-1] != b"endfacet":
         facet = incomplete[0] if len(incomplete) else facets - 1
@@ -76,8 +78,7 @@ def _text(text: bytes) -> FileContent:
     if any(len(row) < 3 for row in rows):
         raise UnreadableFileError("A vertex of the STL file has fewer than three coordinates.")
     corners = floats([x for row in rows for x in row], "vertices of the STL file").reshape(-1, 3)
-    offsets = np.append(0, np.cumsum(lengths)).astype(np.int64)
-    mesh = SentMesh(corners, Ragged(np.arange(len(corners), dtype=np.int64), offsets))
+    mesh = SentMesh(corners, Ragged.of(np.arange(len(corners), dtype=np.int64), lengths))
     solids = [match for match in names if not match["end"]]
     starts = [match.start() for match in _WORD.finditer(body) if match[0].lower() == b"facet"]
     owner = np.maximum(np.searchsorted([match.start() for match in solids], starts) - 1, 0)

@@ -16,7 +16,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hexwrap_solver.arrays import Floats, Ints
+from hexwrap_solver.arrays import Floats, Ints, runs
 from hexwrap_solver.linalg.factor import Factorisation
 
 
@@ -41,8 +41,7 @@ class FlatSteps:
         self._one, self._other = np.where(high, [self._other, self._one], [self._one, self._other])
         # One product for each pair of rows of two cells, at each vertex that they share.
         size = rows[self._one] * rows[self._other]
-        self._pair = np.repeat(np.arange(len(size)), size)
-        within = np.arange(len(self._pair)) - np.repeat(np.cumsum(size) - size, size)
+        self._pair, within = runs(size)
         i, j = np.divmod(within, rows[self._other][self._pair])
         start = np.cumsum(rows) - rows
         one, other = self._one[self._pair], self._other[self._pair]

@@ -275,8 +275,7 @@ def _nudges(pattern: Pattern) -> Floats:
     """(n, 3) along the normals, of the order of the edges beside them, the same for vertices that are alike
     in their ring: a surface of revolution keeps its symmetry."""
     faces = pattern.faces
-    corner = np.arange(len(faces.values)) - faces.offsets[faces.row]
-    kind = pattern.ring[faces.row] * (int(faces.lengths.max()) + 1) + corner
+    kind = pattern.ring[faces.row] * (int(faces.lengths.max()) + 1) + faces.within
     least = np.full(len(pattern.vertices), kind.max(), dtype=np.int64)
     np.minimum.at(least, faces.values.astype(np.int64), kind)
     _, kind = np.unique(least, return_inverse=True)

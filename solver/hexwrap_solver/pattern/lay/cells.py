@@ -47,9 +47,8 @@ class Cells:
         side = np.repeat(keep, self.corner.lengths)
         renumber = np.where(side, np.cumsum(side) - 1, -1)
         twin = self.twin[side]
-        offsets = np.concatenate([[0], np.cumsum(self.corner.lengths[keep])])
         return Cells(
-            Ragged(self.corner.values[side], offsets),
+            self.corner.take(keep),
             self.isometry[side],
             np.where(twin >= 0, renumber[twin], -1),
             self.index[keep],
@@ -75,9 +74,7 @@ class WholeCells:
         if keep.all():
             return self
         side = np.repeat(keep, self.corner.lengths)
-        offsets = np.concatenate([[0], np.cumsum(self.corner.lengths[keep])])
-        corner = Ragged(self.corner.values[side], offsets)
-        return WholeCells(corner, self.slot[side], self.isometry[side], self.index[keep])
+        return WholeCells(self.corner.take(keep), self.slot[side], self.isometry[side], self.index[keep])
 
 
 def whole_cells(lattice: Lattice, edges: PatternEdges) -> WholeCells:

@@ -13,8 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hexwrap_solver.arrays import Bools, Floats, Ints
-from hexwrap_solver.domain.locate import runs
+from hexwrap_solver.arrays import Bools, Floats, Ints, runs
 from hexwrap_solver.pattern.lay.layout import Layout
 from hexwrap_solver.pattern.lay.nodes import Nodes
 from hexwrap_solver.pattern.lay.trace import trace

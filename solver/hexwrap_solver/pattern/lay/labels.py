@@ -7,7 +7,7 @@ from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import breadth_first_order, connected_components
 from scipy.spatial import cKDTree
 
-from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged
+from hexwrap_solver.arrays import Bools, Floats, Ints, Ragged, runs
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.geometry import sums_to_root
 from hexwrap_solver.pattern.lay.cells import graph_of
@@ -114,7 +114,6 @@ def places(ring: Ints, turn: Floats) -> Ints:
     """(c,) rank of each cell in its ring by its turn in [0, 1)."""
     turn = np.mod(np.round(turn % 1.0, 12), 1.0)
     order = np.lexsort((turn, ring))
-    counts = np.bincount(ring)
     place = np.zeros(len(ring), dtype=np.int64)
-    place[order] = np.arange(len(ring)) - np.repeat(np.cumsum(counts) - counts, counts)
+    place[order] = runs(np.bincount(ring))[1]
     return place

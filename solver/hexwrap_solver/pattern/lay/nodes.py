@@ -8,8 +8,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from hexwrap_solver.arrays import Bools, Floats, Ints
-from hexwrap_solver.domain.locate import runs
+from hexwrap_solver.arrays import Bools, Floats, Ints, runs
 from hexwrap_solver.errors import PatternError
 from hexwrap_solver.pattern.lattice import Lattice
 from hexwrap_solver.pattern.lay.layout import Layout

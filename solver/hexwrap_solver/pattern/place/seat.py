@@ -14,7 +14,7 @@ from functools import cache
 
 import numpy as np
 
-from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints
+from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints, runs
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.geometry import outline_area, plane_areas
 from hexwrap_solver.pattern.lattice import LATTICES, Isometry, Lattice
@@ -220,8 +220,7 @@ def _rim(
     side = np.flatnonzero((surface.twin < 0) & ~on_line[surface.faces.ravel()])
     start, end = corners.ravel()[side], corners.ravel()[next_half_edge(side)]
     number = np.maximum(np.ceil(abs(end - start) * per_edge / lattice.edge).astype(np.int64), 1)
-    row = np.repeat(np.arange(len(side)), number)
-    step = np.arange(len(row)) - np.repeat(np.cumsum(number) - number, number)
+    row, step = runs(number)
     points: Complexes = np.asarray(start[row] + (end - start)[row] * (step / number[row]))
     fine = np.floor(np.stack([points.real, points.imag], axis=1) * (2 * per_edge / lattice.edge))
     points = points[np.unique(fine, axis=0, return_index=True)[1]]

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints
-from hexwrap_solver.domain.locate import runs
+from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints, runs
 from hexwrap_solver.geometry import orbits
 from hexwrap_solver.pattern.lay.edges import PatternEdges
 from hexwrap_solver.pattern.lay.layout import Layout

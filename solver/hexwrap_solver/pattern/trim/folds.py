@@ -160,8 +160,7 @@ def without_ends(lattice: Lattice, cells: Cells) -> tuple[Cells, Bools]:
         keep[following[tip]] = False
         renumber = np.where(keep, np.cumsum(keep) - 1, -1)
         row, twin, isometry = cells.corner.row[keep], cells.twin[keep], cells.isometry[keep]
-        offsets = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=cells.n))]).astype(np.int64)
-        frame = lattice.invert(isometry[offsets[row]])  # the first corner may have gone
-        corner = Ragged(cells.corner.values[keep], offsets)
+        corner = Ragged.of(cells.corner.values[keep], np.bincount(row, minlength=cells.n))
+        frame = lattice.invert(isometry[corner.offsets[row]])  # the first corner may have gone
         twin = np.where(twin >= 0, renumber[twin], -1)
         cells = Cells(corner, lattice.compose(frame, isometry), twin, cells.index)

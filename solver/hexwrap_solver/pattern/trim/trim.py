@@ -167,9 +167,7 @@ class _Faces:
     def part(self, keep: Bools) -> _Faces:
         """Some of the faces."""
         entry = np.repeat(keep, self.half_edge.lengths)
-        offsets = np.concatenate([[0], np.cumsum(self.half_edge.lengths[keep])])
-        half_edge = Ragged(self.half_edge.values[entry], offsets)
-        return _Faces(half_edge, self.isometry[entry], self.corner[entry])
+        return _Faces(self.half_edge.take(keep), self.isometry[entry], self.corner[entry])
 
     def without_cut(self, edges: HalfEdges) -> _Faces:
         """Those that do not come to the boundary of the surface."""
@@ -186,8 +184,7 @@ class _Faces:
     def entries(self, keep: Bools) -> _Faces:
         """All faces with some of their corners; the side before a corner left out goes on to the next."""
         lengths = np.bincount(self.half_edge.row[keep], minlength=self.half_edge.n_rows)
-        offsets = np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
-        return _Faces(Ragged(self.half_edge.values[keep], offsets), self.isometry[keep], self.corner[keep])
+        return _Faces(Ragged.of(self.half_edge.values[keep], lengths), self.isometry[keep], self.corner[keep])
 
 
 def _trace(layout: Layout, edges: HalfEdges, used: Bools) -> _Faces:
@@ -221,8 +218,7 @@ def _trace(layout: Layout, edges: HalfEdges, used: Bools) -> _Faces:
     entry = entry[np.argsort(all_who[entry], kind="stable")]
     lengths = np.bincount(all_who[entry], minlength=len(start))[finished]
     half_edge = np.concatenate(what)[entry]
-    offsets = np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
-    return _Faces(Ragged(half_edge, offsets), np.concatenate(where)[entry], edges.tail[half_edge])
+    return _Faces(Ragged.of(half_edge, lengths), np.concatenate(where)[entry], edges.tail[half_edge])
 
 
 def _areas(layout: Layout, points: Points, faces: _Faces) -> Floats:
@@ -295,10 +291,7 @@ def _together(
     twin_cut = np.where((twin_cut < 0) & (twin_name >= 0), side_of_edge[twin_name], twin_cut)
     lengths = np.concatenate([whole.corner.lengths, cut.half_edge.lengths])
     return Cells(
-        Ragged(
-            np.concatenate([whole.corner.values, cut.corner]),
-            np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64),
-        ),
+        Ragged.of(np.concatenate([whole.corner.values, cut.corner]), lengths),
         np.concatenate([whole.isometry, cut.isometry]),
         np.concatenate([side_of_edge[reverse], twin_cut]),
         np.concatenate([whole.index, np.zeros(cut.half_edge.n_rows, dtype=np.int64)]),
