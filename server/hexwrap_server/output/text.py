@@ -36,7 +36,7 @@ def length(value: float) -> str:
 def lengths(values: list[float], shapes: list[int] | None = None) -> list[str]:
     """Lengths, each as ``length`` writes it, or with the digits that tell it apart from those beside it.
 
-    Those that differ by rounding, and panels that their shapes (numbers of sides) tell apart, are written alike.
+    Those that differ by rounding, or whose ``shapes`` (numbers of sides) tell them apart, are written alike.
     """
     shapes = shapes or [0] * len(values)
     words = [length(value) for value in values]
