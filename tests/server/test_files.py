@@ -514,6 +514,11 @@ def test_lengths_have_the_digits_that_tell_them_apart(values, words):
     assert text.lengths(values) == words
 
 
+def test_lengths_of_panels_that_their_sides_tell_apart_need_no_more_digits():
+    assert text.lengths([1.332332, 1.332334], [6, 5]) == ["1.332", "1.332"]
+    assert text.lengths([1.332332, 1.332334], [6, 6]) == ["1.332332", "1.332334"]
+
+
 @pytest.mark.usefixtures("small_pictures")
 @pytest.mark.parametrize("name", ["tower", "Bürogebäude am Südufer, Bauabschnitt 3, Westfassade", "W" * 120])
 def test_titles_of_pictures_are_never_cut_off(solution: Solution, name: str) -> None:

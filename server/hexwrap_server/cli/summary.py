@@ -19,7 +19,7 @@ SHOWN = (1, 2, 3, 5, 8, 11, 16, 24, 40)
 #: The distortion of a pattern in which a triangle of the surface turns over.
 FOLDED = 1e6
 #: Width of the longest bar of the chart, characters.
-BAR = 30
+BAR = 28
 Rows = Iterable[tuple[str, str]]
 
 
@@ -140,7 +140,7 @@ def _trade_off(curve: dict[str, Any]) -> Table:
 
 def _curve(found: dict[str, Any]) -> Table:
     """What fewer or more singularities would leave open."""
-    table = _chart("singularities", f"uncovered, {found['sizes']} sizes", "largest / smallest cell")
+    table = _chart("singularities", f"uncovered, {found['sizes']} sizes", "max/min cell")
     most = max(*found["uncovered"], 1e-12)
     for i, number in enumerate(found["number"]):
         uncovered, taken = found["uncovered"][i], i == found["taken"]
@@ -174,9 +174,11 @@ def _length(value: float | None) -> str:
 def _sizes(sizes: list[dict[str, Any]]) -> Table:
     table = _chart("size", "edge", "panels")
     most = max((size["count"] for size in sizes), default=1)
-    words = lengths([size["edge_length"] for size in sizes[:MOST_SIZES]])
-    for size, word in zip(sizes, words, strict=False):
+    shown = sizes[:MOST_SIZES]
+    words = lengths([size["edge_length"] for size in shown], [size["sides"] for size in shown])
+    for size, word in zip(shown, words, strict=True):
         bar = _bar("█", size["count"] / most, size["color"])
+        bar.append(f" {size['sides']} sides, at folds" if size["fold"] else "", "dim")
         table.add_row(str(size["size"]), word, str(size["count"]), bar)
     if len(sizes) > MOST_SIZES:
         table.add_row("…", "", f"{sum(size['count'] for size in sizes[MOST_SIZES:])}", "")

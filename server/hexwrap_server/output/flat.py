@@ -195,7 +195,8 @@ def _write_inside(space: Entities, laid: Ragged, panels: Panels, names: list[str
     points = np.asarray(laid.values, dtype=np.float64)
     centre = np.stack([np.bincount(rows, points[:, i]) / count for i in range(2)], axis=1)
     inradius = _inradius(laid)
-    sizes, size_words = panels.size.tolist(), lengths(panels.class_length.tolist())
+    sizes = panels.size.tolist()
+    size_words = lengths(panels.class_length.tolist(), panels.class_sides.tolist())
     turn = np.degrees(np.arctan2(-up[:, 0], up[:, 1])).tolist()
     ways = zip(centre.tolist(), up.tolist(), strict=True)
     for row, (edge, r) in enumerate(zip(panels.edge_length.tolist(), inradius.tolist(), strict=True)):

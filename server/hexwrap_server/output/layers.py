@@ -24,7 +24,7 @@ def size_name(size: int) -> str:
 
 def size_layers(panels: Panels) -> dict[int, Layer]:
     """The layer of each size that has panels, and of panels without a size (−1)."""
-    words = lengths(panels.class_length.tolist())
+    words = lengths(panels.class_length.tolist(), panels.class_sides.tolist())
     colours = class_colours(panels)
     used = set(panels.size.tolist())
     layers = {

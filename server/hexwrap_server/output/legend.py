@@ -131,7 +131,7 @@ def _sizes(panels: Panels, unit: str) -> list[Row]:
     listed = zip(
         colours.class_colours(panels),
         panels.class_sides.tolist(),
-        text.lengths(panels.class_length.tolist()),
+        text.lengths(panels.class_length.tolist(), panels.class_sides.tolist()),
         panels.class_count.tolist(),
         strict=True,
     )

@@ -33,16 +33,17 @@ def length(value: float) -> str:
     return _digits(value, 4)
 
 
-def lengths(values: list[float]) -> list[str]:
+def lengths(values: list[float], shapes: list[int] | None = None) -> list[str]:
     """Lengths, each as ``length`` writes it, or with the digits that tell it apart from those beside it.
 
-    Those that differ by rounding are written alike: panels of other shapes along folds, or with other sides.
+    Those that differ by rounding, or whose ``shapes`` (numbers of sides) tell them apart, are written alike.
     """
+    shapes = shapes or [0] * len(values)
     words = [length(value) for value in values]
     for digits in range(5, MOST_DIGITS + 1):
         same = [
-            a == b and abs(x - y) > ROUNDING * abs(x)
-            for (a, x), (b, y) in pairwise(zip(words, values, strict=True))
+            a == b and shape == other and abs(x - y) > ROUNDING * abs(x)
+            for (a, x, shape), (b, y, other) in pairwise(zip(words, values, shapes, strict=True))
         ]
         alike = [a or b for a, b in zip([False, *same], [*same, False], strict=True)]
         if not any(same):
