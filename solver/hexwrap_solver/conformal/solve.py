@@ -37,8 +37,8 @@ from hexwrap_solver.tolerances import ANGLE
 #: A cone angle this near to a multiple of π/6 is made one, radians, where the map does not come out with the
 #: angle as it is: its apex would lie so far away that coordinates lose the digits in which they differ.
 NEARLY = 1e-7
-#: Where u changes by more along an edge of a folded surface, its mesh gets this many vertices.
-STEEP, ENOUGH = 0.15, 1000
+#: Where u changes by more along an edge of a folded surface of fewer vertices, it gets this many.
+STEEP, FEW, ENOUGH = 0.15, 100, 1000
 #: Smaller relative errors of boundary lengths are not worth a note.
 TELLING = 1e-6
 NO_ANGLES = (
@@ -85,7 +85,7 @@ def _coarse(found: ConformalMap) -> bool:
     """Whether the mesh of a folded surface has too few vertices for u. Its flat sides are the same in more
     triangles, while those of a mesh of a round surface are what was sent."""
     surface = found.surface
-    if not surface.features or len(surface.vertices) >= ENOUGH:
+    if not surface.features or found.inserted or found.flips or len(surface.vertices) >= FEW:
         return False
     return bool(np.ptp(found.log_scale[surface.faces], axis=1).max() > STEEP)
 
