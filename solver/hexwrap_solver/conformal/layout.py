@@ -26,7 +26,8 @@ Numbers = TypeVar("Numbers", Floats, Complexes)
 FAR = 3.0
 #: Shorter edges, relative to the longest one, count as so long where squares of lengths are weights.
 FINEST = 1e-100
-#: A translation shorter than this, relative to the domain, is none (flat rings that close up by themselves).
+#: A translation shorter than this, relative to the shortest edge of the loops, is none (flat rings that close
+#: up by themselves): leaving it out turns these edges by as much, a tenth of what angles are promised to.
 NO_TRANSLATION = 1e-10
 
 
@@ -268,7 +269,8 @@ def normalise(
         moved -= 1j * moved[loops[0]].imag.mean()
         return moved, Deck(deck.angle, complex(deck.translation.real)), abs(deck.translation)
     length = _loop_length(surface, uv, sheet, deck)
-    short = abs(deck.translation) <= NO_TRANSLATION * length
+    start, end, _ = _boundary_edges(surface, uv, sheet, deck)
+    short = abs(deck.translation) <= NO_TRANSLATION * abs(end - start).min()
     return uv - uv[loops[0]].mean(), Deck(deck.angle, 0j if short else deck.translation), length
 
 

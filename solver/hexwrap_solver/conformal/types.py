@@ -194,6 +194,11 @@ class Deck:
         return is_whole_turn(self.angle)
 
     @property
+    def is_flat_ring(self) -> bool:
+        """K a multiple of 2π, but not 0: around a hole in a flat surface, say."""
+        return self.is_translation and not is_zero(self.angle)
+
+    @property
     def reduced(self) -> float:
         """K modulo 2π, in [−π, π]."""
         return math.remainder(self.angle, 2 * math.pi)

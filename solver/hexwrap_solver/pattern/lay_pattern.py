@@ -272,15 +272,16 @@ def _finish(
     uv = dot(weights, cmap.corners()[triangle])
     faces, neighbours = Ragged(corner, cells.corner.offsets), cells.neighbours()
     net = cmap.kind == "net"
-    if net:
-        centers = np.add.reduceat(vertices[corner], faces.offsets[:-1], axis=0) / faces.lengths[:, None]
-        first: Bools | None = first_on_net(cmap, centers, neighbours)
-        turn_of_cell = azimuth(cmap, centers)
-    else:
+    first: Bools | None = None
+    if not net:
         first = _at_first_loop(cmap, layout, faces, neighbours, cells.isometry[:, 3])
         turn_of_cell = _turn_of_cells(cmap, faces, cells, triangle, weights)
     if first is None:
-        raise _too_coarse(cmap, settings, placement)
+        # Around a window near the edge of a facade no ring of cells need go.
+        if not net and not cmap.deck.is_flat_ring:
+            raise _too_coarse(cmap, settings, placement)
+        centers = np.add.reduceat(vertices[corner], faces.offsets[:-1], axis=0) / faces.lengths[:, None]
+        first, turn_of_cell = first_on_net(cmap, centers, neighbours), azimuth(cmap, centers)
     ring = rows_from(neighbours, first)
     ring = ring // layout.lattice.counted  # a row of triangles: those that stand and those that hang
     features = on_features(cmap, placing, placement, cut.seams, cells, corner, whole)

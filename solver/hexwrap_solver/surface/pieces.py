@@ -69,10 +69,12 @@ def pieces(mesh: SentMesh) -> list[Piece]:
     welded = relabelled(welded, weldings(welded, TOLERANCE * size)[0])
     twin = _straight_on(welded)
     _, piece = connected_components(face_graph(twin), directed=False)
-    # A quad may fall apart where one of its triangles has no area: the first triangle counts.
-    first = np.flatnonzero(np.diff(polygon, prepend=-1))[same]
+    areas = face_areas(mesh.vertices, triangles)
+    # A quad may fall apart where one of its triangles has no area, as at a pole: the other one counts.
+    by_size = np.lexsort((-areas, polygon))
+    first = by_size[np.flatnonzero(np.diff(polygon, prepend=-1))][same]
     count = int(piece.max()) + 1
-    area = np.bincount(piece, face_areas(mesh.vertices, triangles), count)
+    area = np.bincount(piece, areas, count)
     rim = np.flatnonzero(twin < 0)
     start, end = (side[rim] for side in half_edges(welded.faces))
     kept = start != end

@@ -11,6 +11,8 @@ import pytest
 from scipy.spatial import KDTree
 
 from hexwrap_solver.arrays import Ragged
+from hexwrap_solver.conformal import conformal_map
+from hexwrap_solver.conformal.types import BoundaryCondition
 from hexwrap_solver.errors import NotAdaptedError, PatternError
 from hexwrap_solver.geometry import lengths
 from hexwrap_solver.panels.polygons import fan_areas
@@ -21,6 +23,8 @@ from hexwrap_solver.pattern.place.choose import PlacementFamily, place_lattice
 from hexwrap_solver.pattern.place.placement import BEARABLE
 from hexwrap_solver.pattern.place.size import FREE, width_per_cell
 from hexwrap_solver.pattern.types import Pattern, PatternSettings
+from hexwrap_solver.surface import surface_from_mesh, with_openings
+from hexwrap_solver.surface.types import SentMesh
 from tests.solver.conformal.test_conformal_map import ring_with_corners
 from tests.solver.pattern import annuli
 
@@ -271,3 +275,32 @@ def test_a_cone_angle_that_does_not_suit_names_the_quantum_as_it_is_asked_for():
     for kind in ("hex", "triangle", "quad"):
         with pytest.raises(NotAdaptedError, match=rf"boundary\.quantum {kind}\b"):
             lay_pattern(cmap, PatternSettings(kind=kind))
+
+
+def wall(*windows: tuple[int, int, int, int]):
+    """A curved facade of 30 × 15 in quads of a half, with windows from column to column and row to row; its
+    coordinates have eight decimals, as text files do."""
+    x, y = np.meshgrid(np.linspace(0, 30, 61), np.linspace(0, 15, 31), indexing="ij")
+    points = np.round(np.stack([x, 4 * np.sin(np.pi * x / 30), y], axis=-1).reshape(-1, 3), 8)
+    i, j = (index.ravel() for index in np.meshgrid(np.arange(60), np.arange(30), indexing="ij"))
+    quads = np.stack([31 * i + j, 31 * (i + 1) + j, 31 * (i + 1) + j + 1, 31 * i + j + 1], axis=1)
+    glass = np.zeros(len(quads), dtype=bool)
+    for left, right, low, high in windows:
+        glass |= (left <= i) & (i < right) & (low <= j) & (j < high)
+    return with_openings(surface_from_mesh(SentMesh(points, Ragged.from_table(quads[~glass]))), "cut")
+
+
+@pytest.mark.parametrize("windows", [[(24, 36, 1, 12)], [(2, 8, 1, 8), (30, 40, 10, 20)]])
+def test_around_a_window_near_the_edge_of_a_facade_no_ring_of_cells_need_go(windows):
+    """Between window and edge there is room for half a cell; the others are as large as without it."""
+    condition = BoundaryCondition("isometric", quantum="hex")
+    found = conformal_map(wall(*windows), condition)
+    assert found.deck.is_flat_ring
+    pattern = lay_pattern(found, PatternSettings())
+    assert 800 < pattern.n_cells < 1300
+    area = np.linalg.norm(area_vectors(pattern.faces, pattern.vertices), axis=1).sum() / 2
+    assert area > 0.9 * found.surface.areas.sum()
+    inner = (pattern.neighbours.values.reshape(-1, 6) >= 0).all(axis=1)
+    assert inner.sum() > 0.75 * pattern.n_cells
+    assert len(set(pattern.labels())) == pattern.n_cells
+    assert 0 < lay_pattern(found, PatternSettings(around=pattern.around)).n_cells < 1300

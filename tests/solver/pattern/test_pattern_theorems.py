@@ -140,7 +140,7 @@ def test_every_pattern_closes_or_is_refused(k, kind, around, rotation, grid, pha
     except PatternError:
         assert around < 12 * (abs(k) + 2)  # cells as large as the ring is wide
         return
-    if boundary == "whole":
+    if boundary == "whole" and not cmap.deck.is_flat_ring:  # there no ring of cells need go around
         check_closed(pattern)
     assert len(set(pattern.labels())) == pattern.n_cells
     area = cell_areas(cmap, pattern)

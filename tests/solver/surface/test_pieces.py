@@ -132,3 +132,17 @@ def test_cones_that_meet_at_their_tips_are_alike() -> None:
     upper, lower = pieces(mesh(vertices, np.stack([a, b, b + 1, a + 1], axis=1)))[:2]
     assert upper.loops == lower.loops == 1
     assert upper.area == pytest.approx(lower.area)
+
+
+@pytest.mark.parametrize("off", [0.0, 1e-15])
+def test_quads_that_narrow_to_a_point_stay_with_the_dome(off: float) -> None:
+    """As grids of spheres have them: at the pole two corners of each, whichever way it is cut, are one."""
+    turn, up = np.meshgrid(2 * np.pi * np.arange(12) / 12, np.linspace(0, np.pi / 2, 7), indexing="ij")
+    radius = np.where(np.arange(7) == 6, off, np.cos(up))
+    dome = np.stack([radius * np.cos(turn), radius * np.sin(turn), np.sin(up)], axis=-1).reshape(-1, 3)
+    i, j = (x.ravel() for x in np.meshgrid(np.arange(12), np.arange(6), indexing="ij"))
+    right = (i + 1) % 12
+    quads = np.stack([7 * i + j, 7 * right + j, 7 * right + j + 1, 7 * i + j + 1], axis=1)
+    (piece,) = pieces(mesh(dome, quads))
+    assert piece.loops == 1
+    assert len(piece.faces) == len(quads)
