@@ -16,6 +16,7 @@ from hexwrap_server.input.choose import Chosen, choose
 from hexwrap_server.input.object_words import listed
 from hexwrap_server.input.readers.found import Found
 from hexwrap_server.input.readers.rhino_brep import control_net
+from hexwrap_server.input.requests import SentSurface
 from hexwrap_server.input.surface_files import read_file, sent_surface
 from hexwrap_server.input.surface_files import read_surface as read_chosen
 from hexwrap_server.jobs.work import take_in
@@ -736,6 +737,15 @@ def test_a_slit_is_told_in_files_without_a_tolerance(ending: str) -> None:
     cut = WRITERS[ending](np.concatenate([vertices, seam]), slit.tolist())
     assert read_chosen(whole, "a" + ending).notes == ()
     assert any("come within 2e-05 of each other" in note for note in read_chosen(cut, "a" + ending).notes)
+
+
+def test_a_slit_is_told_in_a_mesh_of_a_request() -> None:
+    vertices, quads = tube(9, 24)
+    points = np.concatenate([vertices, vertices[::24] + np.array([0, 2e-5, 0])])
+    slit = np.where((quads % 24 == 0) & (quads[:, :1] % 24 == 23), 9 * 24 + quads // 24, quads)
+    whole, cut = (take_in(SentSurface(mesh=mesh(points, faces))).repairs for faces in (quads, slit))
+    assert not any("of each other" in repair for repair in whole)
+    assert any("come within 2e-05 of each other" in repair for repair in cut)
 
 
 def test_coordinates_too_coarse_for_the_model_are_told() -> None:

@@ -83,8 +83,8 @@ def choose(
     odd = (*content.notes, *odd_unit(content, unit))
     unit = unit or content.unit
     if content.whole is not None and content.mesh is not None:
-        slits = _slits(content.whole.boundary, size_of(content.mesh.vertices), None, MATCH)
-        return Chosen(content.mesh, tuple(meant), (*slits, *coarse_numbers(content.mesh, None), *odd))
+        torn = slits(content.whole.boundary, size_of(content.mesh.vertices), None)
+        return Chosen(content.mesh, tuple(meant), (*torn, *coarse_numbers(content.mesh, None), *odd))
     meant = sorted(meant, key=lambda item: -max(item.size))[:MOST]
     found = parts_of(content, meant)
     if not found.parts:
@@ -116,7 +116,7 @@ def choose(
     notes += list(apart.values())[:SHOWN]
     if any(_touch(part, other, content.tolerance) for other in fitting[:MOST_MASSES] if other is not part):
         notes.append(UNITE)
-    notes += _slits(part.boundary, size_of(part.box), content.tolerance, _commands([part], meant))
+    notes += slits(part.boundary, size_of(part.box), content.tolerance, _commands([part], meant))
     notes += coarse_numbers(geometry, content.tolerance)
     notes += [*copies(len(found.copies)), *spoilt(found.spoilt, meant, content), *others(content, used), *odd]
     return Chosen(geometry, tuple(used), tuple(notes))
@@ -275,7 +275,7 @@ def _nearly(
     return notes
 
 
-def _slits(boundary: Floats, size: float, tolerance: float | None, commands: str) -> list[str]:
+def slits(boundary: Floats, size: float, tolerance: float | None, commands: str = MATCH) -> list[str]:
     """About edges of a part that nearly meet each other, and not only along the boundary (k, 2, 3)."""
     whose = "gaps that are welded, up to" if tolerance is None else "the file's tolerance of"
     tolerance = tolerance or TOLERANCE * size

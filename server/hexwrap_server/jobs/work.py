@@ -9,10 +9,13 @@ from functools import cache, lru_cache, partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from isal import igzip
 
 from hexwrap_server import logs
 from hexwrap_server.errors import CodecError, FormError, GoneError, StorageError
+from hexwrap_server.input.choose import slits
+from hexwrap_server.input.parts import size_of
 from hexwrap_server.input.requests import CacheSettings, Order, Outcome, SentSurface, Wanted
 from hexwrap_server.jobs import codec
 from hexwrap_server.jobs.cache import CachingRunner, StageCache
@@ -122,10 +125,13 @@ def take_in(sent: SentSurface, asked: SurfaceSettings | None = None) -> Surface:
     if settings.features is not None:
         surface = with_lines(surface, settings.features.lines)
     surface = with_openings(surface, settings.openings)
-    unit = settings.unit or sent.unit
-    if (unit, sent.origin, sent.notes) == (None, Origin(), ()):
+    unit, notes = settings.unit or sent.unit, sent.notes
+    if sent.mesh is not None and (sent.origin, notes) == (Origin(), ()):  # no reader has looked
+        loops = [surface.vertices[np.stack([loop, np.roll(loop, -1)], axis=1)] for loop in surface.loops]
+        notes = tuple(slits(np.concatenate([np.zeros((0, 2, 3)), *loops]), size_of(surface.vertices), None))
+    if (unit, sent.origin, notes) == (None, Origin(), ()):
         return surface
-    repairs = (*sent.notes, *surface.repairs)
+    repairs = (*notes, *surface.repairs)
     return replace(surface, unit=unit, origin=sent.origin, repairs=repairs).knowing(surface)
 
 

@@ -14,7 +14,11 @@ from hexwrap_solver.surface.caps import caps_of, kept
 from hexwrap_solver.surface.checks import LISTED, check_arrays, check_extent
 from hexwrap_solver.surface.degenerate import flat, repair_flat
 from hexwrap_solver.surface.duplicates import equal_faces
-from hexwrap_solver.surface.errors import DegeneratePolygonError, NotOrientableError
+from hexwrap_solver.surface.errors import (
+    DegeneratePolygonError,
+    NonManifoldEdgeError,
+    NotOrientableError,
+)
 from hexwrap_solver.surface.features import chained, folds, lie_along
 from hexwrap_solver.surface.genus import (
     SentNames,
@@ -26,7 +30,7 @@ from hexwrap_solver.surface.genus import (
 )
 from hexwrap_solver.surface.normals import sent_normals
 from hexwrap_solver.surface.orient import flipped
-from hexwrap_solver.surface.pieces import divided
+from hexwrap_solver.surface.pieces import Piece, divided, inner_pieces, only
 from hexwrap_solver.surface.topology import face_graph, vertex_normals
 from hexwrap_solver.surface.triangulate import triangulate
 from hexwrap_solver.surface.types import (
@@ -38,15 +42,47 @@ from hexwrap_solver.surface.types import (
     Triangles,
 )
 from hexwrap_solver.surface.weld import TOLERANCE, coincident, relabelled, weldings
+from hexwrap_solver.words import place
+
+#: At most this many places of what is left out are told.
+SHOWN = 5
 
 
 def surface_from_mesh(sent: SentMesh, settings: SurfaceSettings | None = None) -> Surface:
     """The surface that a sent mesh describes, repaired as far as that leaves its shape alone.
 
-    Flat caps of a closed mass are taken off, and creases found, as the settings say.
+    Floors and inner walls that are welded to it are left out, flat caps of a closed mass taken off, and
+    creases found, as the settings say.
     Vertices keep the order in which they were sent. Raises SurfaceError: one child of it per way to fail.
     """
     settings = settings or SurfaceSettings()
+    try:
+        return _welded(sent, settings)
+    except NonManifoldEdgeError as refusal:
+        inner = inner_pieces(sent)
+        if not inner:
+            raise
+        keep = np.ones(sent.faces.n_rows, dtype=bool)
+        keep[np.concatenate([piece.faces for piece in inner])] = False
+        try:
+            surface = _welded(only(sent, np.flatnonzero(keep)), settings)
+        except SurfaceError:
+            raise refusal from None  # which names the faces as they were sent
+        left_out = _left_out(inner)
+        return replace(surface, repairs=(left_out, *surface.repairs)).knowing(surface)
+
+
+def _left_out(inner: list[Piece]) -> str:
+    """The sentence about floors and inner walls."""
+    count, faces = len(inner), sum(len(piece.faces) for piece in inner)
+    what = "1 floor or inner wall" if count == 1 else f"{count} floors or inner walls"
+    places = ", ".join(place((piece.low + piece.high) / 2) for piece in inner[:SHOWN])
+    more = f" and {count - SHOWN} more" if count > SHOWN else ""
+    return f"{what} of {faces} face{'s' * (faces > 1)} in all left out, around {places}{more}."
+
+
+def _welded(sent: SentMesh, settings: SurfaceSettings) -> Surface:
+    """The surface with nothing left out but strays without area. Raises SurfaceError."""
     check_arrays(sent)
     vertices = np.ascontiguousarray(sent.vertices, dtype=float)
     triangles, polygon = triangulate(vertices, sent.faces)

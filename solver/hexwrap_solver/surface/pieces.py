@@ -15,7 +15,7 @@ from hexwrap_solver.surface.duplicates import equal_faces
 from hexwrap_solver.surface.topology import face_graph, half_edges
 from hexwrap_solver.surface.triangulate import triangulate
 from hexwrap_solver.surface.types import SentMesh, Triangles
-from hexwrap_solver.surface.weld import TOLERANCE, relabelled, weldings
+from hexwrap_solver.surface.weld import TOLERANCE, coincident, relabelled, weldings
 from hexwrap_solver.tolerances import TINY
 
 #: Open edges are divided again where a division has made new ones, at most so often.
@@ -102,6 +102,25 @@ def pieces(mesh: SentMesh) -> list[Piece]:
         for i, k in enumerate(held.tolist())
     ]
     return sorted(found, key=lambda piece: -piece.area)
+
+
+def inner_pieces(mesh: SentMesh) -> list[Piece]:
+    """The pieces whose whole boundary lies on others, as that of floors and inner walls does, the largest
+    first. Raises SurfaceError."""
+    found = pieces(mesh)
+    size = float(np.linalg.norm(np.ptp(mesh.vertices[mesh.faces.values], axis=0)))
+    where = coincident(mesh.vertices, TOLERANCE * size)
+    piece_of = np.empty(mesh.faces.n_rows, dtype=np.int64)
+    for k, piece in enumerate(found):
+        piece_of[piece.faces] = k
+    pairs = np.unique(np.stack([where[mesh.faces.values], piece_of[mesh.faces.row]]), axis=1)
+    shared = np.bincount(pairs[0], minlength=len(where))[where] > 1
+    tree = cKDTree(mesh.vertices)
+    return [
+        piece
+        for piece in found
+        if len(piece.boundary) and shared[tree.query(piece.boundary.reshape(-1, 3))[1]].all()
+    ]
 
 
 def _straight_on(mesh: Triangles) -> Ints:

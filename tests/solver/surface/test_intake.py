@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hexwrap_solver.surface import Surface, surface_from_mesh
+from hexwrap_solver.surface.errors import NonManifoldEdgeError
 from hexwrap_solver.surface.orient import INWARD, inward_note
 from hexwrap_solver.surface.pieces import pieces
 from hexwrap_solver.surface.topology import edge_lengths, face_normals
@@ -406,3 +407,37 @@ def test_faces_nearly_on_top_of_others_count_once() -> None:
     surface = surface_from_mesh(mesh(np.concatenate([vertices, copy]), faces))
     same_shape(surface, surface_from_mesh(mesh(vertices, quads)))
     assert any("within 1e-06 of the model's size of others were left out" in note for note in surface.repairs)
+
+
+def floored(levels: list[int], inverted: bool = False) -> SentMesh:
+    """A tube of nine rows with floors welded to some of them."""
+    vertices, quads = tube(9, 24)
+    faces = quads.tolist()
+    for k in levels:
+        at = (24 * k + np.arange(24)).tolist()
+        middle = len(vertices)
+        vertices = np.append(vertices, [vertices[at].mean(axis=0)], axis=0)
+        floor = [[middle, a, b] for a, b in zip(at, [*at[1:], at[0]], strict=True)]
+        faces = [*floor, *faces] if inverted else [*faces, *floor]
+    return mesh(vertices, faces)
+
+
+@pytest.mark.parametrize("inverted", [False, True])
+@pytest.mark.parametrize("levels", [[4], [2, 4, 6], [0, 3, 8]])
+def test_floors_welded_to_a_tower_are_left_out(levels: list[int], inverted: bool) -> None:
+    vertices, quads = tube(9, 24)
+    surface = surface_from_mesh(floored(levels, inverted))
+    inner = len(set(levels) - {0, 8})
+    what = "1 floor or inner wall" if inner == 1 else f"{inner} floors or inner walls"
+    assert surface.repairs[0].startswith(f"{what} of {24 * inner} faces in all left out, around (")
+    same_shape(surface, surface_from_mesh(mesh(vertices, quads)))
+
+
+def test_what_is_left_out_does_not_change_the_indices_of_other_faults() -> None:
+    """A fin beside the floor is refused, with its faces as they were sent."""
+    sent = floored([4], inverted=True)
+    points = np.append(sent.vertices, [[5.0, 0.0, 1.0]], axis=0)
+    faces = [*sent.faces.to_lists(), [24, 48, len(points) - 1]]
+    with pytest.raises(NonManifoldEdgeError) as refused:
+        surface_from_mesh(mesh(points, faces))
+    assert len(faces) - 1 in refused.value.faces
