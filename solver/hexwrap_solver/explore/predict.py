@@ -20,7 +20,7 @@ from hexwrap_solver.arrays import Complexes, Floats, Ints, Progress, no_progress
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.domain.locate import barycentric
 from hexwrap_solver.geometry import outline_area, plane_areas
-from hexwrap_solver.panels.sizes import partition_by_area
+from hexwrap_solver.panels.sizes import floor_to, partition_by_area
 from hexwrap_solver.pattern.lattice import LATTICES, Lattice
 from hexwrap_solver.pattern.lay.nodes import lattice_points_in_triangles
 from hexwrap_solver.pattern.lay_pattern import CLOSE, check_count, off_by
@@ -90,14 +90,18 @@ class Outlook:
         """Mean edge of the cells; infinite where there are none."""
         return float(self.size.mean()) if len(self.size) else np.inf
 
-    def foresee(self, sizes: int | None, joint: float = 0.0) -> Foreseen:
-        """With this many size classes (None: a length for each panel) and joints at least so wide."""
+    def foresee(
+        self, sizes: int | None, joint: float = 0.0, longest: float = np.inf, increment: float = 0.0
+    ) -> Foreseen:
+        """With this many size classes (None: a length for each panel), joints at least so wide, and edges at
+        most so long and multiples of the increment."""
         others = self.special + self.trimmed + self.folded
         types = panels = 0
         area = perimeter = cells = 0.0
         for sides, outline in self.lattice.centred.items():
             of_kind, unit = self.sides == sides, outline_area(outline)
-            limit = self.limit[of_kind] - joint / (2 * _inradius(outline))
+            limit = np.minimum(self.limit[of_kind] - joint / (2 * _inradius(outline)), longest)
+            limit = floor_to(limit, increment)
             cells += unit * float((self.size[of_kind] ** 2).sum())
             limit = limit[limit > 0]
             if not len(limit):

@@ -224,9 +224,10 @@ class Responses:
         right[dof[inside], inside] = 1.0
         return np.asarray(self._share_of @ self.factor.solve(right))
 
-    def seats(self) -> Ints:
-        """Vertices on which the rules allow a singularity, one in every patch."""
-        few = int(np.clip(SOLVED / len(self.surface.vertices), FEWEST, len(self.middle)))
+    def seats(self, solved: float = SOLVED, fewest: int = FEWEST) -> Ints:
+        """Vertices on which the rules allow a singularity, one in every patch. solved: seats times vertices,
+        at most, but for this number of ``fewest``."""
+        few = max(int(solved / len(self.surface.vertices)), fewest)
         middle = self.middle
         if few < len(middle):
             _, middle = _patches(self.surface, _wall_areas(self.surface), few)

@@ -12,15 +12,18 @@ from hexwrap_solver.conformal.robust.refine import fine_enough
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.pattern.lattice import LATTICES
 from hexwrap_solver.pattern.types import Kind, Pattern
-from hexwrap_solver.singularities.linear import Model, linear_model, vertex_areas
+from hexwrap_solver.singularities.linear import Model, Responses, vertex_areas
 from hexwrap_solver.singularities.search import Search, ranked
 from hexwrap_solver.singularities.sizes import uncovered, uncovered_by, within
 from hexwrap_solver.singularities.types import Choices, End, Rules
 from hexwrap_solver.surface.holes import fill_openings
 from hexwrap_solver.surface.types import Surface
 
-#: A coarse look: this many patches and singularities. Larger meshes are not looked at.
-PATCHES, MOST, LARGEST = 200, 8, 30_000
+#: A coarse look: this many patches and singularities.
+PATCHES, MOST = 200, 8
+#: A seat in each patch up to 30,000 vertices; larger meshes get fewer, for the time of the solves to stay,
+#: but this number at least.
+SOLVED, FEWEST = 6e6, 50
 #: What cells beside a fold leave open more than others (measured on houses).
 FOLDED = 0.2
 #: Numbers of sizes that are told apart; more leave hardly less open.
@@ -76,7 +79,6 @@ def worth_a_look(cmap: ConformalMap, laid: Pattern, sizes: int, left: float) -> 
         lattice.fold < lattice.order
         or len(cmap.cones)
         or not 1 <= len(surface.loops) - surface.openings <= 2
-        or len(surface.vertices) > LARGEST
     ):
         return False
     if len(surface.vertices) < PATCHES:  # u at so few says little of the cells between
@@ -89,7 +91,8 @@ def worth_a_look(cmap: ConformalMap, laid: Pattern, sizes: int, left: float) -> 
 def seats(surface: Surface, kind: Kind) -> Seats:
     """kind: of the pattern."""
     surface = fill_openings(fine_enough(surface, PATCHES))
-    model = linear_model(surface, _rules(surface, kind, 0.0), patches=PATCHES, steps=False)
+    known = Responses(surface, _rules(surface, kind, 0.0), patches=PATCHES, steps=False)
+    model = known.model(known.seats(SOLVED, FEWEST))
     ends = np.concatenate([surface.vertices[loop] for loop in surface.loops])
     return Seats(model, np.asarray(cKDTree(ends).query(model.place)[0]), surface.vertices)
 

@@ -40,10 +40,10 @@ def tube(radius: Floats, height: float, around: int = 40) -> Surface:
     return surface_of(vertices.reshape(-1, 3), np.concatenate(faces))
 
 
-def waist() -> Surface:
+def waist(rows: int = 31, around: int = 40) -> Surface:
     """Three times as wide at its ends as in the middle."""
-    x = np.linspace(-1, 1, 31)
-    return tube(np.sqrt(1 + 8 * x**2), 7.0)
+    x = np.linspace(-1, 1, rows)
+    return tube(np.sqrt(1 + 8 * x**2), 7.0, around)
 
 
 def straight() -> Surface:

@@ -16,6 +16,7 @@ from hexwrap_solver.panels.types import PanelSettings
 from hexwrap_solver.pattern.lattice import LATTICES
 from hexwrap_solver.pattern.types import PatternSettings
 from hexwrap_solver.pipeline import SolveSettings, solve
+from hexwrap_solver.singularities import outlook as outlook_module
 from hexwrap_solver.singularities import solve as module
 from hexwrap_solver.singularities.place import Proposals
 from hexwrap_solver.singularities.types import Proposal, SingularityAt, SingularitySettings
@@ -178,9 +179,9 @@ def test_too_few_are_refused():
         solved(shapes.ellipsoid(), count=3, around=20)
 
 
-def lobed():
+def lobed(rows: int = 31, around: int = 40):
     """A tube with a waist and no symmetry that would save sizes."""
-    plain = shapes.waist()
+    plain = shapes.waist(rows, around)
     x, y, z = plain.vertices.T
     wide = 1 + 0.25 * np.cos(2 * np.arctan2(y, x) + 0.4 * z)
     return shapes.surface_of(np.stack([x * wide, y * wide, z + 0.1 * x], axis=1), plain.faces)
@@ -222,6 +223,19 @@ def test_says_what_singularities_would_bring(plain, found):
     assert not any("would leave less than" in note for note in found.quality.notes)
     even = solved(shapes.straight(), mode="straight", around=16)
     assert not any("would leave less than" in note for note in even.quality.notes)
+
+
+def test_says_so_of_any_number_of_vertices():
+    """Fewer places are looked at on a fine mesh, for the time not to grow with it; what is told is true."""
+    fine = lobed(160, 250)
+    assert len(fine.vertices) == 40_000
+    seats = len(outlook_module.seats(fine, "hex").model.seat)
+    assert outlook_module.FEWEST <= seats < outlook_module.PATCHES
+    plain = solved(fine, mode="straight", around=24)
+    said = [re.search(FORESEEN, note) for note in plain.quality.notes if "would leave less than" in note]
+    assert len(said) == 1
+    then = solved(lobed(), count=int(said[0][3]), around=24)
+    assert 1 - then.quality.coverage < float(said[0][2]) / 100
 
 
 def test_the_curve_of_sizes_counts_no_singularities(found):
