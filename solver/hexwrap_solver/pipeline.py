@@ -13,6 +13,7 @@ from typing import Annotated, Any, Protocol, TypeVar
 
 from hexwrap_solver.arrays import Progress, no_progress
 from hexwrap_solver.conformal import conformal_map
+from hexwrap_solver.conformal.robust.refine import fine_enough
 from hexwrap_solver.conformal.types import BoundaryCondition, ConformalMap
 from hexwrap_solver.explore import best_boundary_map
 from hexwrap_solver.explore.offers import (
@@ -35,7 +36,7 @@ from hexwrap_solver.panels.types import Components, ComponentSettings, Panels, P
 from hexwrap_solver.pattern import lay_pattern
 from hexwrap_solver.pattern.types import Pattern, PatternSettings
 from hexwrap_solver.setting import Setting
-from hexwrap_solver.singularities.outlook import ProspectKey, outlook, prospects, seats, worth_a_look
+from hexwrap_solver.singularities.outlook import PATCHES, ProspectKey, outlook, prospects, seats, worth_a_look
 from hexwrap_solver.singularities.solve import SIZES, closed_map, needs_singularities, seated
 from hexwrap_solver.singularities.types import Choices, SingularitySettings
 from hexwrap_solver.surface.curvature import saddle_share
@@ -245,6 +246,7 @@ def _map(surface: Surface, settings: SolveSettings, run: StageRunner) -> tuple[C
         return run("map", boundary, lambda progress: make(surface, boundary, progress)), None
     if boundary.mode == "auto":  # ends that are free take up what singularities need
         boundary = replace(boundary, mode="isometric")
+    surface = fine_enough(surface, PATCHES)
     wanted = asked
     sizes = settings.panels.sizes if settings.panels is not None else None
     # where they stand is not chosen for the sizes then: variants with other sizes share the map

@@ -739,6 +739,12 @@ def test_a_slit_is_told_in_files_without_a_tolerance(ending: str) -> None:
     assert any("come within 2e-05 of each other" in note for note in read_chosen(cut, "a" + ending).notes)
 
 
+def test_faces_without_area_are_told_as_such() -> None:
+    vertices, quads = tube()
+    notes = read_chosen(obj(vertices, [*quads.tolist(), [7, 14, 14], [0, 0, 3]]), "a.obj").notes
+    assert notes == ("2 faces without area left out.",)
+
+
 def test_a_slit_is_told_in_a_mesh_of_a_request() -> None:
     vertices, quads = tube(9, 24)
     points = np.concatenate([vertices, vertices[::24] + np.array([0, 2e-5, 0])])

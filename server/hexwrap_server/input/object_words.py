@@ -19,6 +19,8 @@ from hexwrap_solver.words import box, place
 SHOWN, LISTED = 5, 200
 #: A gap below this part of the tolerance is rounding.
 NONE = 1e-6
+#: A piece has no area if that is below this part of its box's greatest side squared.
+THIN = 1e-9
 
 
 def joint(joint: Joint, tolerance: float | None, objects: int) -> list[str]:
@@ -85,9 +87,15 @@ def apart_from(boxes: Sequence[Floats]) -> list[str]:
 
 
 def strays(strays: Sequence[Piece]) -> list[str]:
-    """A sentence for small pieces that hang at a vertex or an edge of a larger one, another for the rest."""
-    fins, others = ([piece for piece in strays if piece.is_fin is fin] for fin in (True, False))
-    return [_left_out(noun, some) for noun, some in (("fin", fins), ("stray piece", others)) if some]
+    """A sentence for faces without area, one for small pieces that hang at a vertex or an edge of a larger
+    one, another for the rest."""
+    thin = [piece for piece in strays if piece.area <= THIN * float((piece.high - piece.low).max()) ** 2]
+    count = sum(len(piece.faces) for piece in thin)
+    words = [f"{count} face{'s' * (count > 1)} without area left out."] if thin else []
+    thick = [piece for piece in strays if all(piece is not one for one in thin)]
+    fins, others = ([piece for piece in thick if piece.is_fin is fin] for fin in (True, False))
+    nouns = (("fin", fins), ("stray piece", others))
+    return words + [_left_out(noun, some) for noun, some in nouns if some]
 
 
 def _left_out(noun: str, some: Sequence[Piece]) -> str:

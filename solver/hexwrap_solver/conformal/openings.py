@@ -73,6 +73,11 @@ def _wall(filled: Surface, wall: Surface, keep: np.ndarray, used: np.ndarray) ->
         np.where(stand >= 0, where[stand], -1),
         filled.normals[used],
         filled.repairs,
+        features=tuple(
+            replace(feature, vertices=new[feature.vertices])
+            for feature in filled.features
+            if used[feature.vertices].all()
+        ),
     )
 
 

@@ -17,6 +17,8 @@ from hexwrap_solver.conformal.net import Net
 from hexwrap_solver.conformal.openings import cut_openings
 from hexwrap_solver.conformal.orientation import faithful, positively_oriented
 from hexwrap_solver.conformal.robust import FlatMetric, metric_with_flips, solve_with_flips, with_inserted
+from hexwrap_solver.conformal.robust.refine import fine_enough
+from hexwrap_solver.conformal.robust.solve import REFINED
 from hexwrap_solver.conformal.span import MAX_SPAN, check_reach, check_span, cone_angle_of
 from hexwrap_solver.conformal.types import (
     QUANTA,
@@ -35,6 +37,8 @@ from hexwrap_solver.tolerances import ANGLE
 #: A cone angle this near to a multiple of π/6 is made one, radians, where the map does not come out with the
 #: angle as it is: its apex would lie so far away that coordinates lose the digits in which they differ.
 NEARLY = 1e-7
+#: Where u changes by more along an edge of a folded surface of fewer vertices, it gets this many.
+STEEP, FEW, ENOUGH = 0.15, 100, 1000
 #: Smaller relative errors of boundary lengths are not worth a note.
 TELLING = 1e-6
 NO_ANGLES = (
@@ -61,6 +65,35 @@ def conformal_map(
         return cut_openings(conformal_map(fill_openings(surface), condition, progress, cones), surface)
     cones = Cones.none() if cones is None else cones
     check_cones(surface, cones)
+    found = _on_mesh(surface, condition, progress, cones)
+    if not _coarse(found):
+        return found
+    try:
+        finer = _on_mesh(fine_enough(surface, ENOUGH), condition, progress, cones)
+    except ConvergenceError:
+        return found
+    count = len(finer.surface.vertices) - len(surface.vertices)
+    sentence = (
+        f"{REFINED} {count} vertices were inserted on its edges, since between the few that were sent the "
+        "size of the cells changes much."
+    )
+    notes = tuple(note for note in finer.notes if not note.startswith(REFINED))
+    return replace(finer, inserted=count, notes=(*notes, sentence))
+
+
+def _coarse(found: ConformalMap) -> bool:
+    """Whether the mesh of a folded surface has too few vertices for u. Its flat sides are the same in more
+    triangles, while those of a mesh of a round surface are what was sent."""
+    surface = found.surface
+    if not surface.features or found.inserted or found.flips or len(surface.vertices) >= FEW:
+        return False
+    return bool(np.ptp(found.log_scale[surface.faces], axis=1).max() > STEEP)
+
+
+def _on_mesh(
+    surface: Surface, condition: BoundaryCondition, progress: Progress, cones: Cones
+) -> ConformalMap:
+    """On the triangles as they are, where that works."""
     angles = boundary_angles(surface, condition, cones)
     found = _isometric(surface, condition, angles, cones, progress)
     if found is None:

@@ -40,9 +40,10 @@ def best_boundary_map(
             refusal = error
     try:
         isometric = conformal_map(surface, replace(condition, mode="isometric"), part(0.5))
-    except HexwrapError:
+    except HexwrapError as error:
         if straight is None:
             raise
+        refusal = error
     return _chosen(straight, isometric, refusal)
 
 
@@ -61,7 +62,8 @@ def _chosen(
             return isometric
         return _with_note(isometric, f"Boundary: isometric, since it cannot be straight: {refusal.detail}")
     if isometric is None:
-        return straight
+        assert refusal is not None
+        return _with_note(straight, f"Boundary: straight, since it cannot be isometric: {refusal.detail}")
     share = {"straight": foreseen(straight), "isometric": foreseen(isometric)}
     keep = share["straight"] <= share["isometric"] + MARGIN
     chosen, other = ("straight", "isometric") if keep else ("isometric", "straight")

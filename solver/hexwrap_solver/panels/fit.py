@@ -255,7 +255,7 @@ def _fit_watertight(
     )
     shapes = Ragged(moved[pattern.faces.values.astype(np.int64)], pattern.faces.offsets)
     unmoved = 2 if aims.flat else 1  # energies: the beginning, and the end made flat
-    stuck = energies and len(energy) <= unmoved and energy[0] > MINIMAL
+    stuck = energies and len(energy) <= unmoved and (not len(energy) or energy[0] > MINIMAL)
     center, normal = means(shapes), plane_normals(shapes)
     away = surface.tree.nearest(moved).distance / mean_edges(shapes).mean()
     notes = (

@@ -414,7 +414,9 @@ def _trim_notes(cut: Trimmed, narrow: int, folded: int, apart: int) -> list[str]
             "follow it."
         )
     if apart:
-        notes.append(f"{apart} cells share no edge with the rest of the pattern and were left out.")
+        what = "1 cell shares no edge with the rest of the pattern and was"
+        what = what if apart == 1 else f"{apart} cells share no edge with the rest of the pattern and were"
+        notes.append(f"{what} left out.")
     return notes
 
 

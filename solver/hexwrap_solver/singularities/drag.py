@@ -9,11 +9,10 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from hexwrap_solver.arrays import Bools, Floats, Ints
-from hexwrap_solver.conformal.robust.refine import Problem, split_edges
-from hexwrap_solver.conformal.types import Targets
+from hexwrap_solver.conformal.robust.refine import split
 from hexwrap_solver.geometry import normalize
 from hexwrap_solver.surface.normals import with_tangents
-from hexwrap_solver.surface.nurbs import evaluate, evaluate_points, wrap
+from hexwrap_solver.surface.nurbs import evaluate, wrap
 from hexwrap_solver.surface.projection import project
 from hexwrap_solver.surface.topology import half_edges
 from hexwrap_solver.surface.types import Surface
@@ -38,19 +37,6 @@ def refined(surface: Surface, places: Floats, cell: float) -> Surface:
                 break
             surface = split(surface, marked)
     return surface
-
-
-def split(surface: Surface, marked: Ints) -> Surface:
-    """Edges halved, with new vertices on the NURBS surface where there is one."""
-    n, m = len(surface.vertices), len(surface.faces)
-    unused = Targets(np.zeros(n), np.full(n, -1, dtype=np.int64), np.zeros(0))
-    problem = Problem(surface, unused, np.zeros(n), np.arange(m))
-    finer = split_edges(problem, marked, np.full(len(marked), 0.5)).surface
-    if surface.nurbs is None or finer.parameters is None:
-        return finer
-    vertices = finer.vertices.copy()
-    vertices[n:] = evaluate_points(surface.nurbs, finer.parameters[n:])
-    return replace(finer, vertices=vertices)
 
 
 @dataclass(frozen=True)

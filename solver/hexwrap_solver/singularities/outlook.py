@@ -8,6 +8,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from hexwrap_solver.arrays import Floats
+from hexwrap_solver.conformal.robust.refine import fine_enough
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.pattern.lattice import LATTICES
 from hexwrap_solver.pattern.types import Kind, Pattern
@@ -18,8 +19,7 @@ from hexwrap_solver.singularities.types import Choices, End, Rules
 from hexwrap_solver.surface.holes import fill_openings
 from hexwrap_solver.surface.types import Surface
 
-#: A coarse look: this many patches and singularities. Of meshes of fewer vertices it does not hold, and
-#: larger ones are not looked at.
+#: A coarse look: this many patches and singularities. Larger meshes are not looked at.
 PATCHES, MOST, LARGEST = 200, 8, 30_000
 #: What cells beside a fold leave open more than others (measured on houses).
 FOLDED = 0.2
@@ -76,9 +76,11 @@ def worth_a_look(cmap: ConformalMap, laid: Pattern, sizes: int, left: float) -> 
         lattice.fold < lattice.order
         or len(cmap.cones)
         or not 1 <= len(surface.loops) - surface.openings <= 2
-        or not PATCHES <= len(surface.vertices) <= LARGEST
+        or len(surface.vertices) > LARGEST
     ):
         return False
+    if len(surface.vertices) < PATCHES:  # u at so few says little of the cells between
+        return left >= SAVED
     weight = vertex_areas(surface)
     # no singularities can save more than the sizes cost
     return uncovered(cmap.log_scale, weight / weight.sum(), sizes) >= max(SAVED, SHARE * left)
@@ -86,7 +88,7 @@ def worth_a_look(cmap: ConformalMap, laid: Pattern, sizes: int, left: float) -> 
 
 def seats(surface: Surface, kind: Kind) -> Seats:
     """kind: of the pattern."""
-    surface = fill_openings(surface)
+    surface = fill_openings(fine_enough(surface, PATCHES))
     model = linear_model(surface, _rules(surface, kind, 0.0), patches=PATCHES, steps=False)
     ends = np.concatenate([surface.vertices[loop] for loop in surface.loops])
     return Seats(model, np.asarray(cKDTree(ends).query(model.place)[0]), surface.vertices)

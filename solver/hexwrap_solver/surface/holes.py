@@ -14,6 +14,7 @@ import shapely
 from scipy.sparse import coo_array, csr_array, diags_array
 from scipy.sparse.linalg import splu
 
+from hexwrap_solver import words
 from hexwrap_solver.arrays import Complexes, Floats, Ints, Ragged
 from hexwrap_solver.geometry import dot, face_areas
 from hexwrap_solver.surface.brep.plane import triangulated
@@ -30,6 +31,8 @@ CLEARANCE = 0.6
 MOST_PER_VERTEX = 40
 #: Cotangents are cut off here: the fairest fill must not hang on needles.
 MOST_COTANGENT = 50.0
+#: Of two loops whose ``_flatness`` differs by so much, one looks like a window, the other like an end.
+UNLIKE = 0.35
 
 
 def fill_openings(surface: Surface) -> Surface:
@@ -239,4 +242,37 @@ def _faired(vertices: Floats, faces: Ints, old: int, wall: int) -> Floats:
 def with_openings(surface: Surface, openings: Openings) -> Surface:
     """The surface with its loops beyond the two longest as openings, or as boundaries."""
     count = max(len(surface.loops) - 2, 0) if openings == "cut" else 0
-    return replace(surface, openings=count) if count else surface
+    if not count:
+        return surface
+    return replace(surface, openings=count, repairs=(*surface.repairs, *_mistaken(surface)))
+
+
+def _mistaken(surface: Surface) -> list[str]:
+    """Told where a filled loop looks like an end of a tube and one of the two longest like a window."""
+    flat = np.array([_flatness(surface, loop) for loop in surface.loops])
+    window, end = int(flat[:2].argmax()), 2 + int(flat[2:].argmin())
+    if flat[window] - flat[end] < UNLIKE:
+        return []
+    (there, around), (here, shorter) = (_whereabouts(surface, surface.loops[i]) for i in (window, end))
+    return [
+        f"The opening at {there}, {around} around, is longer than the end at {here}, {shorter} around, which "
+        "was filled in its stead: openings are the loops beyond the two longest. With surface.openings "
+        "loop each is a boundary."
+    ]
+
+
+def _flatness(surface: Surface, loop: Ints) -> float:
+    """Mean cosine between the surface's normals along a loop and that of its plane: 1 for a hole in a flat
+    wall, 0 for the end of a cylinder."""
+    start, end = surface.vertices[loop], surface.vertices[np.roll(loop, -1)]
+    length = np.linalg.norm(end - start, axis=1)
+    plane = np.cross(start - start.mean(axis=0), end - start).sum(axis=0)
+    plane /= max(float(np.linalg.norm(plane)), TINY)
+    return float(length @ abs(surface.normals[loop] @ plane) / max(float(length.sum()), TINY))
+
+
+def _whereabouts(surface: Surface, loop: Ints) -> tuple[str, str]:
+    """The middle of a loop, and its length."""
+    points = surface.vertices[loop]
+    around = float(np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1).sum())
+    return words.place(points.mean(axis=0)), words.length(around)

@@ -5,15 +5,19 @@ from __future__ import annotations
 import numpy as np
 
 from hexwrap_solver.arrays import Bools, Floats, Ints
+from hexwrap_solver.geometry import face_normals, lengths
 from hexwrap_solver.surface.topology import half_edges, spanning_tree
 from hexwrap_solver.surface.types import Surface
 
-#: A tube has an inside where it and the cones over its loops enclose more than this part of (their
+#: A surface has an inside where it and the cones over its loops enclose more than this part of (their
 #: area)^(3/2): a sphere encloses 0.094, a cylinder 100 times as long as it is wide 0.014, a flat ring 0.
 ENCLOSING = 0.01
+#: Its normals look all around: added up they come to less than this part of the area. Those of a cylinder
+#: come to 0, of a hemisphere to 0.5, of a facade on a half circle to 0.64, whether it has a window or not.
+ALL_AROUND = 0.6
 INWARD = (
-    "The surface's normals look into the tube, and the panels with them: the outside is the side that most "
-    "faces look to. Where the other one is meant, turn the surface over (Rhino: Flip)."
+    "The surface's normals look inwards, and the panels with them: the outside is the side that most faces "
+    "look to. Where the other one is meant, turn the surface over (Rhino: Flip)."
 )
 
 
@@ -66,6 +70,10 @@ def is_inside_out(vertices: Floats, faces: Ints, twin: Ints) -> bool:
 
 
 def inward_note(surface: Surface) -> tuple[str, ...]:
-    """A sentence where an open tube looks inwards beyond doubt; it is left as it was sent."""
-    ends = len(surface.loops) - surface.openings
-    return (INWARD,) if ends == 2 and -surface.enclosed > ENCLOSING else ()
+    """A sentence where a tube, a dome or a closed surface looks inwards beyond doubt; it is left as it was
+    sent."""
+    if -surface.enclosed <= ENCLOSING:
+        return ()
+    across = face_normals(surface.vertices, surface.faces)
+    one_way = float(np.linalg.norm(across.sum(axis=0)) / lengths(across).sum())
+    return (INWARD,) if one_way < ALL_AROUND else ()

@@ -106,3 +106,17 @@ def test_no_edge_of_a_fill_is_one_of_the_surface_already():
     counts = np.unique(sides, axis=0, return_counts=True)[1]
     assert sorted(counts)[:3] == [1, 1, 1]
     assert (np.sort(counts)[3:] == 2).all()
+
+
+def test_an_opening_that_is_longer_than_an_end_is_told() -> None:
+    """Openings are the loops beyond the two longest, whatever they look like."""
+    mast = bump(24, 60)
+    column, row = mast.faces % 24, mast.faces // 24
+    low, high = column.min(axis=1), column.max(axis=1)
+    slot = (low >= 3) & (high <= 9) & (row.min(axis=1) >= 5) & (row.max(axis=1) <= 55)
+    tall = sent(mast.vertices * [1, 1, 12], mast.faces[~slot])
+    told = with_openings(tall, "cut").repairs
+    assert sum("was filled in its stead" in note for note in told) == 1
+    for fine in (windows(6), holed(SPHERE, CENTRES[:4], 0.35)):
+        assert with_openings(fine, "cut").repairs == fine.repairs
+    assert with_openings(tall, "loop").repairs == tall.repairs

@@ -9,7 +9,8 @@ import pytest
 
 from hexwrap_solver.conformal import conformal_map
 from hexwrap_solver.conformal.types import BoundaryAngle, BoundaryCondition
-from hexwrap_solver.explore import best_boundary_map, foreseen
+from hexwrap_solver.errors import ConvergenceError
+from hexwrap_solver.explore import best_boundary_map, boundary, foreseen
 from hexwrap_solver.explore.boundary import MARGIN
 from hexwrap_solver.panels import fit_panels, measure, quantize
 from hexwrap_solver.panels.types import PanelSettings
@@ -38,6 +39,17 @@ def test_a_flat_ring_is_left_as_it_is():
     found = best_boundary_map(flat_ring, AUTO)
     assert found.deck.angle == pytest.approx(2 * np.pi)
     assert foreseen(found) < 1e-3
+
+
+def test_a_choice_that_had_to_be_made_is_told(monkeypatch):
+    def failing(surface, condition, progress):
+        if condition.mode == "isometric":
+            raise ConvergenceError("It did not converge.")
+        return conformal_map(surface, condition, progress)
+
+    monkeypatch.setattr(boundary, "conformal_map", failing)
+    found = best_boundary_map(bump(24, 8), AUTO)
+    assert found.notes[0] == "Boundary: straight, since it cannot be isometric: It did not converge."
 
 
 def test_what_is_foreseen_is_what_sizes_alone_leave_uncovered():

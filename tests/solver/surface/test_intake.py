@@ -12,7 +12,7 @@ from hexwrap_solver.surface.errors import NonManifoldEdgeError
 from hexwrap_solver.surface.orient import INWARD, inward_note
 from hexwrap_solver.surface.pieces import pieces
 from hexwrap_solver.surface.topology import edge_lengths, face_normals
-from hexwrap_solver.surface.types import SentMesh, Triangles
+from hexwrap_solver.surface.types import SentMesh, SurfaceSettings, Triangles
 from tests.solver.surface.shapes import mesh, triangles, tube, twisted
 
 
@@ -300,6 +300,32 @@ def test_a_ring_or_a_shell_has_no_inside() -> None:
     flat = vertices * [1.0, 1.0, 0.0] * (1 + z)[:, None] + np.outer(0.05 * z, [0.0, 0.0, 1.0])
     for faces in (quads, quads[:, ::-1]):
         assert inward_note(surface_from_mesh(mesh(flat, faces))) == ()
+
+
+@pytest.mark.parametrize("missing", [0, 1, 3])
+def test_closed_surfaces_and_domes_that_look_inwards_are_told(missing: int) -> None:
+    """A house, with its floor, without, and without its floor and a slope."""
+    points = np.array([(x, y, z) for z in (0, 5) for y in (0, 8) for x in (0, 12)] + [(0, 4, 8), (12, 4, 8)])
+    floor = [[0, 2, 3], [0, 3, 1]]
+    walls = [[0, 1, 5, 4], [1, 3, 7, 5], [3, 2, 6, 7], [2, 0, 4, 6], [6, 4, 8], [5, 7, 9]]
+    faces = [*floor, *walls, [4, 5, 9, 8], [7, 6, 8, 9]][2 * (missing > 0) :][: None if missing < 3 else -1]
+    keep = SurfaceSettings(caps="keep")
+    outward, inward = (
+        surface_from_mesh(mesh(points.astype(float), some), keep)
+        for some in (faces, [face[::-1] for face in faces])
+    )
+    assert inward_note(outward) == ()
+    assert inward_note(inward) == (INWARD,)
+
+
+@pytest.mark.parametrize("windows", [0, 1, 2])
+def test_a_curved_facade_has_no_inside_with_windows_or_without(windows: int) -> None:
+    vertices, quads = tube(rings=13, around=48)
+    half = quads[(quads % 48).max(axis=1) <= 24]
+    front = vertices * [1.0, 1.0, 2.0]
+    faces = np.delete(half, [24 * 5 + 6, 24 * 5 + 15][:windows], axis=0)
+    for some in (faces, faces[:, ::-1]):
+        assert inward_note(surface_from_mesh(mesh(front, some))) == ()
 
 
 def test_the_outside_of_the_tube_is_outside() -> None:

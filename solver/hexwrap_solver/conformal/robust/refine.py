@@ -15,8 +15,9 @@ from hexwrap_solver.conformal.robust.retriangulate import flatten_out
 from hexwrap_solver.conformal.types import Targets
 from hexwrap_solver.geometry import dot, normalize
 from hexwrap_solver.surface.flips import angle_sums_opposite
+from hexwrap_solver.surface.nurbs import evaluate_points
 from hexwrap_solver.surface.topology import half_edges
-from hexwrap_solver.surface.types import Surface
+from hexwrap_solver.surface.types import Feature, Surface
 from hexwrap_solver.tolerances import ANGLE
 
 #: A boundary vertex with target angle Θ gets at least Θ / FULLEST triangles.
@@ -34,6 +35,8 @@ OPENED, BROAD = 1.5, 0.25 * np.pi
 FLAT = np.deg2rad(210.0)
 #: Rounds of it between two solutions.
 SPREAD = 12
+#: Edges of coarse meshes are halved so many times at most.
+HALVINGS = 10
 
 
 @dataclass(frozen=True)
@@ -83,6 +86,7 @@ def split_edges(problem: Problem, marked: Ints, place: Floats) -> Problem:
         normals=normals,
         patch=None if surface.patch is None else surface.patch[source],
         parameters=_blend_parameters(surface, i, j, s),
+        features=_along_splits(surface.features, i, j, new),
     )
     shared = np.where(inner | (targets.shared[i] != targets.shared[j]), -1, targets.shared[i])
     counts = np.bincount(shared[shared >= 0], minlength=len(targets.shared_angle))
@@ -93,6 +97,30 @@ def split_edges(problem: Problem, marked: Ints, place: Floats) -> Problem:
         None if targets.offset is None else blend(targets.offset),
     )
     return Problem(refined, grown, blend(problem.u), parent)
+
+
+def fine_enough(surface: Surface, vertices: int) -> Surface:
+    """The same surface with so many vertices at least, for singularities to stand at and u to vary."""
+    longest = float(np.sqrt(surface.areas.sum() / vertices))
+    for _ in range(HALVINGS):
+        long = np.flatnonzero(surface.lengths.ravel() > longest)
+        if len(surface.vertices) >= vertices or not len(long):
+            break
+        surface = split(surface, long)
+    return surface
+
+
+def split(surface: Surface, marked: Ints) -> Surface:
+    """Edges halved, with new vertices on the NURBS surface where there is one."""
+    n, m = len(surface.vertices), len(surface.faces)
+    unused = Targets(np.zeros(n), np.full(n, -1, dtype=np.int64), np.zeros(0))
+    problem = Problem(surface, unused, np.zeros(n), np.arange(m))
+    finer = split_edges(problem, marked, np.full(len(marked), 0.5)).surface
+    if surface.nurbs is None or finer.parameters is None:
+        return finer
+    vertices = finer.vertices.copy()
+    vertices[n:] = evaluate_points(surface.nurbs, finer.parameters[n:])
+    return replace(finer, vertices=vertices)
 
 
 def once_per_edge(surface: Surface, marked: Ints, place: Floats) -> tuple[Ints, Floats]:
@@ -135,6 +163,24 @@ def _extend(loop: Ints, h: Ints, new: Ints, tail: Ints, inner: Bools) -> Ints:
     place = positions(loop, max(int(loop.max()), int(tail.max())) + 1)
     here = ~inner & (place[tail[h]] >= 0)
     return np.insert(loop, place[tail[h[here]]] + 1, new[here])
+
+
+def _along_splits(features: tuple[Feature, ...], i: Ints, j: Ints, new: Ints) -> tuple[Feature, ...]:
+    """Features with the new vertices on their edges, those between i and j."""
+    if not len(new):
+        return features
+    n = int(new.max(initial=0)) + 1
+    key = np.minimum(i, j) * n + np.maximum(i, j)
+    order = np.argsort(key)
+    found = []
+    for feature in features:
+        a, b = feature.vertices[:-1], feature.vertices[1:]
+        wanted = np.minimum(a, b) * n + np.maximum(a, b)
+        at = np.minimum(np.searchsorted(key[order], wanted), len(key) - 1)
+        split = np.flatnonzero(key[order[at]] == wanted)
+        along = np.insert(feature.vertices, split + 1, new[order[at[split]]])
+        found.append(replace(feature, vertices=along))
+    return tuple(found)
 
 
 def _blend_parameters(surface: Surface, i: Ints, j: Ints, s: Floats) -> Floats | None:

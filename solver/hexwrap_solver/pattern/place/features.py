@@ -96,7 +96,8 @@ def worth_following(
         kept &= sure
     left = len(features) - int(kept.sum())
     if left and not notes:
-        notes.append(f"{left} short folds of the mesh are not followed: cells are longer.")
+        what = "1 short fold of the mesh is" if left == 1 else f"{left} short folds of the mesh are"
+        notes.append(f"{what} not followed: cells are longer.")
     return frozenset(np.flatnonzero(kept).tolist()), tuple(notes)
 
 
