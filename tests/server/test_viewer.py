@@ -285,6 +285,24 @@ class TestResult:
         )
         assert tower.complaints == []
 
+    def test_the_widest_gap_is_shown_and_the_whole_model_in_a_narrow_window(self, tower: Page) -> None:
+        tower.click("#widest")
+        gaps = "state.result.panels.gap_tangential"
+        assert tower.evaluate(f"() => {{ {INSIDE} return {gaps}[state.selected] === Math.max(...{gaps}) }}")
+        towards = "space.camera.position.clone().sub(space.controls.target).normalize()"
+        facing = f"{towards}.dot({{ x: n[0], y: n[1], z: n[2] }})"
+        normal = "const n = state.result.panels.normal[state.selected];"
+        assert tower.evaluate(f"() => {{ {INSIDE} {normal} return {facing} }}") > 0.4
+        wide = tower.viewport_size
+        tower.click("#fit")
+        tower.set_viewport_size({"width": 860, "height": 720})
+        tower.wait_for_function(
+            f"""() => {{ {INSIDE} return state.result.mesh.vertices.map((p) => space.project(p))
+            .every(({{ x, y }}) => x > 0 && y > 0
+                && x < space.element.clientWidth && y < space.element.clientHeight) }}"""
+        )
+        tower.set_viewport_size(wide)
+
     def test_hover_is_linked_between_space_and_domain(self, tower: Page) -> None:
         tower.mouse.move(*on_screen(tower, "panels.center", facing_panel(tower)))
         tower.wait_for_function(
@@ -342,6 +360,8 @@ def test_a_variant_is_taken_from_the_front(browser, server: Server) -> None:
         page.route(
             f"**/v1/jobs/{job['id']}/events", lambda route: route.fulfill(body=": cut off\n\n"), times=1
         )
+        busy = {"status": 503, "headers": {"Retry-After": "0.1"}, "json": {"detail": "The server is busy."}}
+        page.route(f"**/v1/jobs/{job['id']}/events", lambda route: route.fulfill(**busy), times=1)
         page.locator(f"#jobs [data-job='{job['id']}']").click()
         page.locator("svg.front .best").wait_for()
         found = fetched(server, f"/v1/jobs/{job['id']}/result")
@@ -354,13 +374,25 @@ def test_a_variant_is_taken_from_the_front(browser, server: Server) -> None:
         page.keyboard.press("Home")  # the fewest types: all others fade
         types = [found["variants"][i]["measured"]["types"] for i in measured]
         assert page.locator("svg.front .out").count() == sum(n > min(types) for n in types)
+        # and another one is proposed, of those that are left
+        proposed = next(
+            i for i in found["ranking"] if found["variants"][i]["measured"]["types"] == min(types)
+        )
+        assert page.locator("svg.front .best").get_attribute("data-variant") == str(proposed)
+        page.locator(".proposal button").click()
+        assert page.locator("svg.front .current").get_attribute("data-variant") == str(proposed)
+        before = shown(page)
+        page.locator("[data-limit='types']").focus()
+        page.keyboard.press("End")
         page.locator(f"svg.front [data-variant='{found['best']}']").focus()
         page.keyboard.press("Enter")
-        taken = fetched(server, f"/v1/jobs/{shown(page)}/result?include=quality")
+        job = before if proposed == found["best"] else shown(page, before)
+        taken = fetched(server, f"/v1/jobs/{job}/result?include=quality")
         assert 1 - taken["quality"]["coverage"] == pytest.approx(
             found["variants"][found["best"]]["measured"]["uncovered"]
         )
-        assert page.complaints == []
+        (refused,) = page.complaints
+        assert "503" in refused
 
 
 def test_singularities_are_chosen_on_their_curve_and_dragged(browser, server: Server) -> None:
@@ -450,6 +482,29 @@ def test_a_dropped_file_is_solved(browser, server: Server, tmp_path: Path) -> No
         answer = fetched(server, f"/v1/jobs/{job}")
         assert (answer["status"], answer["name"]) == ("done", "tube")
         assert page.complaints == []
+
+
+def test_a_dropped_file_does_not_inherit_what_a_sample_was_made_for(
+    browser, server: Server, tmp_path: Path
+) -> None:
+    (tmp_path / "tube.obj").write_text(tube())
+    with opened(browser, server) as page:
+        page.locator("#settings fieldset").first.wait_for()
+        set_already = page.locator("#settings summary small:visible").all_inner_texts()
+        assert "".join(set_already) == ""
+        page.select_option("#sample", "ring")
+        before = shown(page)
+        page.set_input_files("#file", tmp_path / "tube.obj")
+        before = shown(page, before)
+        request = fetched(server, f"/v1/jobs/{before}/request")
+        assert request["boundary"]["mode"] == "auto"
+        assert request["pattern"]["around"] is None
+        # settings of one's own stay for the next file
+        page.fill("[name='panels.sizes']", "4")
+        before = shown(page, before)
+        (tmp_path / "wide.obj").write_text(tube(bulge=1.0))
+        page.set_input_files("#file", tmp_path / "wide.obj")
+        assert fetched(server, f"/v1/jobs/{shown(page, before)}/request")["panels"]["sizes"] == 4
 
 
 def test_a_file_that_is_dropped_before_the_settings_are_there_is_solved(

@@ -9,7 +9,7 @@ import orjson
 
 from hexwrap_server.jobs import codec
 from hexwrap_server.output.text import csv_table
-from hexwrap_solver.explore.front import best_of, excess, front_of, limited
+from hexwrap_solver.explore.front import by_cost, excess, front_of, limited
 from hexwrap_solver.explore.types import Figures, Limits
 
 Json = dict[str, Any]
@@ -30,8 +30,9 @@ def figures(found: Figures) -> Json:
 
 
 def summary(documents: list[Json], limits: Limits, refused: list[str]) -> Json:
-    """The whole result: which are on the front, which one is proposed, and what there is to say. refused: why
-    further variants cannot be made."""
+    """The whole result: which are on the front, which one is proposed, and what there is to say. ranking: all
+    that were measured, those of the front first; within narrower limits the first that keeps them is to be
+    proposed. refused: why further variants cannot be made."""
     solved = [i for i, one in enumerate(documents) if one["measured"] is not None]
     found = {i: Figures(**documents[i]["measured"]) for i in solved}
     over = {i: beyond(documents[i], limits) for i in solved}
@@ -40,16 +41,18 @@ def summary(documents: list[Json], limits: Limits, refused: list[str]) -> Json:
     front = [kept[p] for p in np.flatnonzero(front_of([found[i] for i in kept]))]
     for i in front:
         documents[i]["front"] = True
+    others = [i for i in solved if i not in front]
+    ranking = [part[p] for part in (front, others) for p in by_cost([found[i] for i in part])]
     best = None
     if front:
-        best = front[best_of([found[i] for i in front])]
+        best = ranking[0]
     elif solved:
         best = min(solved, key=over.__getitem__)
         notes.append(_exceeded({i: documents[i] for i in solved}, limits))
     problems = refused + [one["problem"] for one in documents if one["problem"]]
     if problems:
         notes.append(f"{_number(len(problems))} cannot be made. {max(problems, key=problems.count)}")
-    return {"variants": documents, "front": front, "best": best, "notes": notes}
+    return {"variants": documents, "front": front, "best": best, "ranking": ranking, "notes": notes}
 
 
 def _number(variants: int) -> str:

@@ -50,6 +50,8 @@ export interface Variants {
   variants: Variant[];
   front: number[];
   best: number | null;
+  /** All that were measured, the one to propose first; not there in what older servers found. */
+  ranking?: number[];
   notes: string[];
 }
 
@@ -147,8 +149,25 @@ export class ProblemError extends Error {
   }
 }
 
-/** The server did not answer at all (stopped, restarting). */
-export class UnreachableError extends Error {}
+/** The server did not answer at all (stopped, restarting), or is too busy to; wait: after so many ms it may. */
+export class UnreachableError extends Error {
+  constructor(message: string, readonly wait = 700) {
+    super(message);
+  }
+}
+
+/** Asks again while the server is away. */
+export async function untilReached<T>(ask: () => Promise<T>, tell: (error: UnreachableError) => void): Promise<T> {
+  for (;;) {
+    try {
+      return await ask();
+    } catch (error) {
+      if (!(error instanceof UnreachableError)) throw error;
+      tell(error);
+      await new Promise((resolve) => setTimeout(resolve, error.wait));
+    }
+  }
+}
 
 /** Secret of a server that was started with --token; kept for the visit only. */
 let token = sessionStorage.getItem("hexwrap-token") ?? "";
@@ -168,6 +187,8 @@ async function call(path: string, init: RequestInit = {}): Promise<Response> {
   const problem: Problem = kind.includes("json")
     ? await response.json()
     : { type: "about:blank", title: response.statusText, status: response.status, detail: `The server answered ${response.status}.` };
+  const seconds = Number(response.headers.get("retry-after"));
+  if (response.status === 503 && (init.method ?? "GET") === "GET") throw new UnreachableError(problem.detail, 1000 * (seconds || 1));
   throw new ProblemError(problem);
 }
 

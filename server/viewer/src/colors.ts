@@ -146,7 +146,7 @@ export function colour(result: Result, mode: Mode): Colouring {
   }
   const range = high - low || 1;
   for (let i = 0; i < n; i++)
-    colors.set(Number.isFinite(values[i]) ? ramp(range > 1e-12 * Math.abs(high) ? (values[i] - low) / range : 0.5) : UNSIZED, 3 * i);
+    colors.set(Number.isFinite(values[i]) ? ramp(range > Math.max(LEAST, 1e-12 * Math.abs(high)) ? (values[i] - low) / range : 0.5) : UNSIZED, 3 * i);
   const { label, unit } = MODES.find((m) => m.mode === mode)!;
   const title = unit === "relative" ? `${label} / edge` : unit === "length" ? inUnit(label, result) : label;
   return { colors, legend: { kind: "ramp", title, low: number(low), high: number(high) } };
@@ -175,10 +175,13 @@ function digitsApart(lengths: number[]): number {
   return 10;
 }
 
+/** Less is a rounding error, in whatever unit. */
+const LEAST = 1e-9;
+
 /** A figure as people read it: four significant digits, no needless zeros. */
 export function number(x: number | null | undefined, digits = 4): string {
   if (x === null || x === undefined || !Number.isFinite(x)) return "–";
-  if (Math.abs(x) < 1e-12) return "0"; // a rounding error, in whatever unit
+  if (Math.abs(x) < LEAST) return "0";
   if (Math.abs(x) < 1e-3 || Math.abs(x) >= 1e6) return x.toExponential(1).replace("e+", "e");
   return String(Number(x.toPrecision(digits)));
 }

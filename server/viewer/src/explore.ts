@@ -1,5 +1,5 @@
 // Variants of the surface: a scatter of what they cost against what they leave open, with sliders for limits.
-import { api, UnreachableError, type Figures, type Job, type Request, type Variant, type Variants } from "./api";
+import { api, untilReached, type UnreachableError, type Figures, type Job, type Request, type Variant, type Variants } from "./api";
 import { svg } from "./charts";
 import { number } from "./colors";
 import { element } from "./form";
@@ -13,10 +13,16 @@ const LEAST = 1e-5;
 /** Of a share of the most types. */
 const hue = (share: number) => `hsl(${250 - 200 * share} 65% 52%)`;
 
+/** A variant in words. */
+function said({ uncovered, bare, types, panels, gap_max, cost }: Figures): string {
+  const joint = gap_max === null || gap_max === undefined ? "" : `, widest joint ${number(gap_max, 3)}`;
+  return `${types} types, ${panels} panels, ${number(100 * uncovered, 3)} % uncovered, ${number(100 * bare, 2)} % of the surface without panels${joint}, cost ${Math.round(cost).toLocaleString("en")}`;
+}
+
 /** What a variant may be at most, to be shown as one that will do. */
 const LIMITS: { name: "types" | "gap_max" | "panels"; label: string }[] = [
   { name: "types", label: "Types" },
-  { name: "gap_max", label: "Joint" },
+  { name: "gap_max", label: "Widest joint" },
   { name: "panels", label: "Panels" },
 ];
 
@@ -54,30 +60,28 @@ export class Explorer {
     this.known = [];
     this.job = job;
     this.draw();
-    while (this.busy) {
-      try {
-        for await (const { name, data } of api.events(job.id)) {
-          if (turn !== this.turn) return;
-          if (name === "variant") this.known[data.index] = data.variant;
-          else this.job = data;
-          this.soon();
-        }
-      } catch (error) {
-        if (!(error instanceof UnreachableError)) throw error;
-        if (turn !== this.turn) return;
-        this.tell(error.message);
-        await new Promise((resolve) => setTimeout(resolve, 700));
-        if (turn !== this.turn) return;
-      }
-    }
+    const tell = ({ message }: UnreachableError) => turn === this.turn && this.tell(`${message} Trying again.`);
+    await untilReached(() => this.watch(job.id, turn), tell);
+    if (turn !== this.turn) return;
     if (this.job?.status === "done") {
-      const found = await api.variants(job.id);
+      const found = await untilReached(() => api.variants(job.id), tell);
       if (turn !== this.turn) return;
       this.found = found;
       this.known = found.variants;
       for (const { name } of LIMITS) delete this.limits[name];
     }
     this.draw();
+  }
+
+  /** Takes in what comes, until the job is over or another one counts. */
+  private async watch(id: string, turn: number): Promise<void> {
+    if (!this.busy || turn !== this.turn) return;
+    for await (const { name, data } of api.events(id)) {
+      if (turn !== this.turn) return;
+      if (name === "variant") this.known[data.index] = data.variant;
+      else this.job = data;
+      this.soon();
+    }
   }
 
   private get busy(): boolean {
@@ -108,6 +112,33 @@ export class Explorer {
     return LIMITS.every(({ name }) => (figures[name] ?? 0) <= (this.limits[name] ?? Infinity) * (1 + 1e-9));
   }
 
+  /** The variant to propose: the first that keeps the limits. */
+  private proposed(): number | null {
+    const { found } = this;
+    const ranking = found?.ranking ?? found?.front ?? [];
+    return ranking.find((i) => this.fits(this.known[i].measured!)) ?? null;
+  }
+
+  /** What is proposed within the limits, and a button that shows it. */
+  private proposal(): HTMLElement {
+    const best = this.proposed();
+    if (best === null) return element("p", { class: "note proposal" }, "No variant that was measured keeps these limits.");
+    const button = element("button", { type: "button" }, "Show the proposed one");
+    button.addEventListener("click", () => this.choose(best));
+    return element("div", { class: "proposal" }, element("p", { class: "note" }, `Proposed: ${said(this.known[best].measured!)}.`), button);
+  }
+
+  private choose(index: number): void {
+    this.chosen = index;
+    this.draw();
+    this.take(this.known[index].request);
+  }
+
+  private limited(): void {
+    this.root.querySelector("svg.front")!.replaceWith(this.scatter());
+    this.root.querySelector(".proposal")!.replaceWith(this.proposal());
+  }
+
   private draw(): void {
     const busy = this.busy;
     const button = element("button", { type: "button", id: "explore" }, busy ? "Stop" : "Explore variants");
@@ -121,7 +152,7 @@ export class Explorer {
     });
     const parts: (Node | string)[] = [element("div", { class: "buttons" }, button)];
     if (this.known.length) parts.push(this.scatter());
-    if (this.found) parts.push(...this.sliders());
+    if (this.found) parts.push(...this.sliders(), this.proposal());
     parts.push(element("p", { class: "note", role: "status" }, this.said()));
     this.root.replaceChildren(...parts);
   }
@@ -155,25 +186,22 @@ export class Explorer {
       svg("text", { x: PAD.left, y: H - 6 }, `cost ${Math.round(c0).toLocaleString("en")}`),
       svg("text", { x: W - PAD.right, y: H - 6, "text-anchor": "end" }, Math.round(c1).toLocaleString("en")),
     );
+    const best = this.proposed();
     spots.forEach(({ one, index, figures }, i) => {
       const fill = hue(figures.types / most);
       const [cx, cy] = [x(figures.cost), y(open[i])];
-      const words = `${number(100 * figures.uncovered, 3)} % uncovered, ${number(100 * figures.bare, 2)} % of the surface bare, ${figures.types} types, ${figures.panels} panels, cost ${Math.round(figures.cost).toLocaleString("en")}`;
+      const words = said(figures);
       if (!one.measured) {
         root.append(svg("circle", { cx, cy, r: 2.2, fill, class: "foreseen" }, svg("title", {}, `Foreseen: ${words}`)));
         return;
       }
-      const state = [index === this.chosen && "current", index === this.found?.best && "best", !this.fits(figures) && "out"].filter(Boolean).join(" ");
+      const state = [index === this.chosen && "current", index === best && "best", !this.fits(figures) && "out"].filter(Boolean).join(" ");
       const spot = svg("circle", {
         cx, cy, r: one.front ? 6 : 3.2, fill, class: `variant ${state}`,
         tabindex: 0, role: "button", "data-variant": index, "aria-label": words,
       });
       spot.append(svg("title", {}, words));
-      const take = () => {
-        this.chosen = index;
-        this.draw();
-        this.take(one.request);
-      };
+      const take = () => this.choose(index);
       spot.addEventListener("click", take);
       spot.addEventListener("keydown", (event) => {
         if (!["Enter", " "].includes((event as KeyboardEvent).key)) return;
@@ -200,7 +228,7 @@ export class Explorer {
       slider.addEventListener("input", () => {
         this.limits[name] = slider.valueAsNumber;
         shown.textContent = `≤ ${number(slider.valueAsNumber)}`;
-        this.root.querySelector("svg.front")!.replaceWith(this.scatter());
+        this.limited();
       });
       return [element("label", { class: "limit" }, label, slider, shown)];
     });

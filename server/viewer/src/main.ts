@@ -1,6 +1,6 @@
 // The page: reads settings, submits jobs, shows results. All state stands in one object; draw functions read it.
 import { balance, choices, close, loopOf, type Corner } from "./angles";
-import { api, FILES, ProblemError, UnreachableError, type BoundaryAngle, type FileObject, type Job, type Problem, type Request, type Result, type Vec3 } from "./api";
+import { api, FILES, ProblemError, UnreachableError, untilReached, type BoundaryAngle, type FileObject, type Job, type Problem, type Request, type Result, type Vec3 } from "./api";
 import { flatOutline, histogram, singularityCurve, tradeOff } from "./charts";
 import { collected, colour, MODES, number, RAMP_CSS, regular, type Legend, type Mode } from "./colors";
 import { DomainView } from "./domain";
@@ -169,13 +169,8 @@ async function follow(job: Job, turn: number, keepView: boolean): Promise<void> 
   const started = performance.now();
   while (job.status === "queued" || job.status === "running") {
     setJob(job);
-    try {
-      job = await api.job(job.id, performance.now() - started < 600 ? 0.15 : 0.4);
-    } catch (error) {
-      if (!(error instanceof UnreachableError)) throw error;
-      banner("The server does not answer; trying again.");
-      await new Promise((resolve) => setTimeout(resolve, 700));
-    }
+    const { id } = job;
+    job = await untilReached(() => api.job(id, performance.now() - started < 600 ? 0.15 : 0.4), away);
     if (turn !== state.turn) return;
   }
   setJob(job);
@@ -269,7 +264,7 @@ function present(job: Job, result: Result, keepView: boolean): void {
   shownSurface = state.surface;
   location.hash = `job/${job.id}`;
   banner(null);
-  note([...(result.mesh.repairs ?? []), ...(result.quality?.notes ?? [])].join(" "));
+  note([...(result.mesh.repairs ?? []), ...(result.quality?.notes ?? [])].join("\n"));
   space.show(result, keepView);
   domain.show(result, keepView);
   toggles();
@@ -287,10 +282,12 @@ async function takeFile(file: File, object?: string): Promise<void> {
   if (object === undefined) drawObjects(file, []);
   state.surface = null;
   explorer.clear();
-  setEntries([]);
-  drawAngles();
+  const sample = $<HTMLSelectElement>("sample");
+  if (sample.value) form.adopt({}); // what a sample was made for goes with it
+  sample.value = "";
+  forgetPlaces();
+  drawForm();
   state.name = file.name.replace(/\.[^.]*$/, "");
-  ($("sample") as HTMLSelectElement).value = "";
   note(`Reading ${file.name} …`);
   try {
     const stored = await api.surface(file, object);
@@ -308,6 +305,13 @@ async function takeFile(file: File, object?: string): Promise<void> {
       await showFaults(file, error.problem, turn);
     }
   }
+}
+
+/** Corners, singularities and lines that were put at places of another surface. */
+function forgetPlaces(): void {
+  setEntries([]);
+  if ((form.get("singularities.at") as Json[] | null)?.length) form.set("singularities", null);
+  if (form.get("surface.features") !== null) form.set("surface.features", { ...askedFeatures(), lines: [], without: [] } as unknown as Json);
 }
 
 /** What a file holds, where that is more than one object: a click takes it alone. */
@@ -358,6 +362,7 @@ async function openJob(id: string): Promise<void> {
     if (turn !== state.turn) return;
     if (job.kind === "explore") return await explorer.follow(job);
     state.request = request;
+    $<HTMLSelectElement>("sample").value = "";
     adopt(request);
     await follow(job, turn, false);
   } catch (error) {
@@ -376,6 +381,13 @@ function note(text: string, error = false): void {
 function banner(text: string | null): void {
   $("banner").hidden = text === null;
   $("banner").textContent = text ?? "";
+  delete $("banner").dataset.away;
+}
+
+/** Stands until the server answers again. */
+function away({ message }: UnreachableError): void {
+  banner(`${message} Trying again.`);
+  $("banner").dataset.away = "yes";
 }
 
 function report(error: unknown): void {
@@ -404,10 +416,10 @@ async function drawJobs(): Promise<void> {
   try {
     jobs = await api.jobs();
   } catch (error) {
-    if (error instanceof UnreachableError) banner(error.message);
+    if (error instanceof UnreachableError) away(error);
     return;
   }
-  if ($("banner").textContent?.startsWith("The server does not answer")) banner(null);
+  if ($("banner").dataset.away) banner(null);
   $("jobs").replaceChildren(...jobs.map((job) => {
     const busy = job.status === "running" || job.status === "queued";
     const seconds = Object.values(job.timings ?? {}).filter((t) => typeof t === "number").reduce((a, b) => a + b, 0);
@@ -585,10 +597,21 @@ const drawing = new LineDrawing((points, on) => {
 
 function drawQuality(): void {
   const { result } = state;
-  const rows: [string, string][] = [];
+  const rows: [string, string | Node][] = [];
+  const widest = (gap: number, at: number | null) => {
+    if (at === null) return number(gap, 3);
+    const button = element("button", { type: "button", id: "widest", title: "Show the panel at the widest gap" }, `${number(gap, 3)} at ${result!.panels!.label[at]}`);
+    button.addEventListener("click", () => {
+      select(at);
+      space.face(result!.panels!.normal[at]);
+    });
+    return button;
+  };
   if (result) {
     const { map, pattern, panels, quality: q } = result;
     const loops = `${map.boundary_angles.length} loop${map.boundary_angles.length === 1 ? "" : "s"}`;
+    const gaps = panels?.gap_tangential ?? [];
+    const worst = gaps.reduce<number | null>((best, gap, i) => (gap !== null && (best === null || gap > gaps[best]!) ? i : best), null);
     const cone = map.cone_angle === null ? "" : `, ${number((180 * map.cone_angle) / Math.PI)}°`;
     rows.push(["Domain", map.kind === "net" ? `net with ${loops}` : map.kind === "cone" ? `cone${cone}` : "cylinder"]);
     if (map.cones.length) rows.push(["Singularities", String(map.cones.length)]);
@@ -596,7 +619,7 @@ function drawQuality(): void {
     rows.push(["Scale ratio", number(q.scale_ratio)]);
     if (panels) rows.push(
       ["Panels", String(panels.face.length)], ["Planarity", number(q.planarity?.max, 2)], ["Overlaps", String(q.overlaps)],
-      ["Coverage", `${number(100 * q.coverage)} %`], ["Gap (mean, max)", `${number(q.gap?.tangential?.mean, 3)}, ${number(q.gap?.tangential?.max, 3)}`],
+      ["Coverage", `${number(100 * q.coverage)} %`], ["Gap (mean)", number(q.gap?.tangential?.mean, 3)], ["Gap (widest)", widest(q.gap?.tangential?.max, worst)],
       ["Distance (max)", number(q.surface_distance?.max, 3)], ["Distinct panels", String(q.distinct_panels)]);
     if (q.movement > 0) rows.push(["Convex", `${number(100 * q.convex)} %`], ["Moved (max)", number(q.movement, 3)]);
   }
@@ -780,6 +803,7 @@ page.addEventListener("submit", (event) => {
 function settingChanged(path: string, before: Json): void {
   if (path === "boundary.angle_unit") // the angles stay what they are
     setEntries(entries().map((entry) => ({ ...entry, angle: (entry.angle / HALF_TURN[before as Unit]) * perHalfTurn() })));
+  if (path === "boundary.mode" && !entries().length) form.set("boundary.angle_unit", byAngles() ? "deg" : "rad");
   const components = form.get("panels.components") as Settings | null;
   if (path === "support" && form.get("support") && !components?.depth && form.get("panels") !== null)
     form.set("panels.components", { inset: 0, thickness: 0, ...components, depth: supportDepth() });
@@ -875,25 +899,11 @@ function storedTheme(): boolean {
   return matchMedia("(prefers-color-scheme: dark)").matches;
 }
 
-/** Tries again while the server is away. */
-async function untilReached<T>(ask: () => Promise<T>): Promise<T> {
-  for (;;) {
-    try {
-      return await ask();
-    } catch (error) {
-      if (!(error instanceof UnreachableError)) throw error;
-      banner(error.message);
-      await new Promise((resolve) => setTimeout(resolve, 700));
-    }
-  }
-}
-
 /** Makes the form of what the server says can be set. */
 async function describe(): Promise<void> {
-  description = await untilReached(api.settings);
+  description = await untilReached(api.settings, away);
   form = new Form($("settings"), description, settingChanged, { "boundary.angles": $("angles") });
   form.suggestion = (path) => (path === "pattern.around" ? state.result?.pattern?.around ?? 48 : Number(meanEdge().toPrecision(3)));
-  form.set("boundary.angle_unit", "deg");
   drawForm();
 }
 

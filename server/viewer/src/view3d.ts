@@ -62,6 +62,7 @@ export class View3D {
     this.controls.dampingFactor = 0.12;
     this.controls.zoomToCursor = true;
     this.controls.addEventListener("change", () => this.invalidate());
+    this.controls.addEventListener("start", () => (this.fitted = false));
     this.scene.add(new THREE.HemisphereLight(0xffffff, 0x9aa0a4, 2.1), this.content, this.layer.group, this.normals, this.supports, this.camera);
     this.headlight.position.set(0.5, 0.8, 1);
     this.camera.add(this.headlight);
@@ -88,16 +89,21 @@ export class View3D {
     this.placeLabels();
   }
 
+  /** Nobody has turned or moved the model since: it then goes with the window. */
+  private fitted = false;
+
   private resize(): void {
     const { clientWidth: w, clientHeight: h } = this.element;
     if (!w || !h) return;
     this.renderer.setSize(w, h);
     this.camera.aspect = w / h;
     this.camera.updateProjectionMatrix();
+    if (this.fitted) this.fit();
     this.render();
   }
 
   private key(event: KeyboardEvent): void {
+    this.fitted = false;
     const turn = 0.12;
     const offset = this.camera.position.clone().sub(this.controls.target);
     if (event.key === "ArrowLeft" || event.key === "ArrowRight")
@@ -128,6 +134,7 @@ export class View3D {
     const { min, max } = this.box;
     const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((k) => new THREE.Vector3(k & 1 ? max.x : min.x, k & 2 ? max.y : min.y, k & 4 ? max.z : min.z).sub(center));
     const distance = 1.08 * Math.max(...corners.map((c) => c.dot(back) + Math.max(Math.abs(c.dot(right)) / this.camera.aspect, Math.abs(c.dot(up))) / half));
+    this.fitted = true;
     this.controls.target.copy(center);
     this.camera.position.copy(center).addScaledVector(back, distance);
     this.camera.near = distance / 200;
@@ -407,6 +414,16 @@ export class View3D {
 
   paint(colors: Uint8Array): void {
     this.layer.paint(colors);
+    this.invalidate();
+  }
+
+  /** Turns the model until what has this normal faces the eye. */
+  face(normal: Vec3): void {
+    const reach = this.camera.position.distanceTo(this.controls.target);
+    const towards = new THREE.Vector3(...normal).normalize();
+    if (this.camera.position.clone().sub(this.controls.target).dot(towards) > 0.5 * reach) return;
+    this.camera.position.copy(this.controls.target).addScaledVector(towards, reach);
+    this.controls.update();
     this.invalidate();
   }
 

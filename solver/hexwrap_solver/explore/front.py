@@ -75,9 +75,9 @@ def front_of(figures: Sequence[Figures]) -> Bools:
     return non_dominated(objectives(figures), SAME)
 
 
-def best_of(figures: Sequence[Figures]) -> int:
-    """The least cost, where surface without panels costs ``OPEN`` times what panels cost."""
-    return min(range(len(figures)), key=lambda i: figures[i].cost * (1 + OPEN * _open(figures[i])))
+def by_cost(figures: Sequence[Figures]) -> list[int]:
+    """The least cost first, where surface without panels costs ``OPEN`` times what panels cost."""
+    return sorted(range(len(figures)), key=lambda i: figures[i].cost * (1 + OPEN * _open(figures[i])))
 
 
 def _open(found: Figures) -> float:

@@ -12,7 +12,7 @@ from hexwrap_solver.conformal import conformal_map
 from hexwrap_solver.conformal.types import BoundaryCondition
 from hexwrap_solver.errors import SettingError
 from hexwrap_solver.explore.foresee import foresee, seated
-from hexwrap_solver.explore.front import best_of, excess, front_of, non_dominated, to_solve
+from hexwrap_solver.explore.front import by_cost, excess, front_of, non_dominated, to_solve
 from hexwrap_solver.explore.predict import outlook, shortened
 from hexwrap_solver.explore.types import Costs, ExploreSettings, Figures, Limits, Vary
 from hexwrap_solver.explore.variants import SPARE, variants
@@ -138,12 +138,12 @@ def test_what_is_proposed_is_cheap_and_closed() -> None:
         Figures(0.03, 9, 9, 100.0),
         Figures(0.02, 9, 9, 300.0),
     )
-    assert best_of([open_and_cheap, closed, dear]) == 1
+    assert by_cost([open_and_cheap, closed, dear])[0] == 1
 
 
 def test_large_cells_that_leave_the_ends_bare_do_not_look_cheap() -> None:
     large, small = Figures(0.05, 50, 5, 70.0, bare=0.3), Figures(0.05, 200, 5, 100.0, bare=0.05)
-    assert best_of([large, small]) == 1
+    assert by_cost([large, small]) == [1, 0]
     assert front_of([large, small]).tolist() == [True, True]
     assert to_solve([large, small], [0.0, 0.0]).tolist() == [0, 1]
     assert front_of([large, replace(small, bare=0.29)]).tolist() == [True, False]
