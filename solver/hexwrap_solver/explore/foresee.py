@@ -136,8 +136,8 @@ def _candidate(asked: SolveSettings, settings: ExploreSettings, seen: Outlook, u
     assert asked.panels is not None
     sizes = asked.panels.sizes
     assert isinstance(sizes, int)
-    longest = asked.panels.edge_range[1] if asked.panels.edge_range else np.inf
-    found = seen.foresee(sizes, asked.panels.joint, longest, asked.panels.increment)
+    panels = asked.panels
+    found = seen.foresee(sizes, panels.joint, panels.edge_range, panels.increment)
     if not found.panels:
         if not len(seen.size):
             return Candidate(asked, PatternError("No whole cell fits: ask for smaller cells."))

@@ -20,7 +20,7 @@ from hexwrap_solver.arrays import Complexes, Floats, Ints, Progress, no_progress
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.domain.locate import barycentric
 from hexwrap_solver.geometry import outline_area, plane_areas
-from hexwrap_solver.panels.sizes import floor_to, partition_by_area
+from hexwrap_solver.panels.sizes import divide, floor_to, lengths_of, partition_by_area
 from hexwrap_solver.pattern.lattice import LATTICES, Lattice
 from hexwrap_solver.pattern.lay.nodes import lattice_points_in_triangles
 from hexwrap_solver.pattern.lay_pattern import CLOSE, check_count, off_by
@@ -91,10 +91,16 @@ class Outlook:
         return float(self.size.mean()) if len(self.size) else np.inf
 
     def foresee(
-        self, sizes: int | None, joint: float = 0.0, longest: float = np.inf, increment: float = 0.0
+        self,
+        sizes: int | None,
+        joint: float = 0.0,
+        edge_range: tuple[float, float] | None = None,
+        increment: float = 0.0,
     ) -> Foreseen:
-        """With this many size classes (None: a length for each panel), joints at least so wide, and edges at
-        most so long and multiples of the increment."""
+        """With this many size classes (None: a length for each panel), joints at least so wide, and the
+        allowed edge lengths, multiples of the increment; panels that cannot reach the range share no class
+        with those that can."""
+        shortest, longest = edge_range or (0.0, np.inf)
         others = self.special + self.trimmed + self.folded
         types = panels = 0
         area = perimeter = cells = 0.0
@@ -108,10 +114,13 @@ class Outlook:
                 continue
             length, count = _levels(limit)
             if sizes is not None:
-                made = partition_by_area(length, sizes, count)
-                start = made.start[-1]
-                types -= len(length) - len(start)
-                length = np.repeat(length[start], np.diff(np.append(start, len(length))))
+                below = int(np.searchsorted(length, shortest)) if sizes > 1 else 0
+                groups = [own for own in (slice(below), slice(below, None)) if len(length[own])]
+                parts = [(partition_by_area(length[own], sizes, count[own]), length[own]) for own in groups]
+                divided = zip(parts, divide(parts, sizes, "area"), strict=True)
+                starts = [(made.start[k - 1], own) for (made, own), k in divided]
+                types -= len(length) - sum(len(start) for start, _ in starts)
+                length = np.concatenate([lengths_of(start, own) for start, own in starts])
             types, panels = types + len(length), panels + len(limit)
             area += unit * float(count @ length**2)
             perimeter += sides * float(count @ length)

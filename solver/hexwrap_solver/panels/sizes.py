@@ -338,7 +338,7 @@ def choose_lengths(
     groups = [group for group in (np.flatnonzero(low), np.flatnonzero(~low)) if len(group)]
     ordered = [group[np.argsort(limit[group], kind="stable")] for group in groups]
     parts = [partition(limit[group], classes, cost, increment) for group in ordered]
-    for group, (made, floored), k in zip(ordered, parts, _divide(parts, classes, cost), strict=True):
+    for group, (made, floored), k in zip(ordered, parts, divide(parts, classes, cost), strict=True):
         chosen = lengths_of(made.start[unlike(made, floored, k, cost) - 1], floored)
         if cost == "area":
             chosen = _sparing(floored, k, chosen)
@@ -346,7 +346,7 @@ def choose_lengths(
     return length
 
 
-def _divide(parts: list[tuple[Partition, Floats]], classes: int, cost: str) -> list[int]:
+def divide(parts: list[tuple[Partition, Floats]], classes: int, cost: str) -> list[int]:
     """Number of classes for each of one or two groups (at least one each)."""
     if len(parts) == 1:
         return [len(parts[0][0].start)]

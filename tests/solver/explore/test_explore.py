@@ -77,17 +77,21 @@ def test_foreseen_is_near_measured(surface, mode: str, kind: str, boundary: str)
             assert found.types <= sizes * len(LATTICES[kind].outlines)
 
 
-@pytest.mark.parametrize(("longest", "increment"), [(0.09, 0.0), (1.0, 0.02), (0.09, 0.02)])
-def test_allowed_lengths_are_foreseen(longest: float, increment: float) -> None:
-    """Cells larger than the longest edge stay partly open, which no number of sizes mends."""
+@pytest.mark.parametrize(
+    ("allowed", "increment", "sizes"),
+    [((0.0, 0.09), 0.0, 11), ((0.0, 1.0), 0.02, 11), ((0.0, 0.09), 0.02, 11), ((0.12, 1.0), 0.0, 2)],
+)
+def test_allowed_lengths_are_foreseen(allowed: tuple[float, float], increment: float, sizes: int) -> None:
+    """Cells larger than the longest edge stay partly open, which no number of sizes mends; those too small
+    for the range take sizes of their own."""
     cmap = conformal_map(bump(64, 40), BoundaryCondition("straight").adapted("hex"))
     pattern = PatternSettings(around=32)
     laid, seen = lay_pattern(cmap, pattern), outlook(cmap, pattern)
-    settings = PanelSettings(sizes=11, edge_range=(0.0, longest), increment=increment)
+    settings = PanelSettings(sizes=sizes, edge_range=allowed, increment=increment)
     made = quantize(fit_panels(cmap, laid, settings), settings)
-    found = seen.foresee(11, longest=longest, increment=increment)
+    found = seen.foresee(sizes, edge_range=allowed, increment=increment)
     assert found.uncovered == pytest.approx(1 - measure(cmap, laid, made).coverage, abs=0.01)
-    assert found.uncovered > seen.foresee(11).uncovered + 0.03
+    assert found.uncovered > seen.foresee(sizes).uncovered + 0.03
 
 
 def test_more_sizes_never_leave_more_open_and_joints_never_less() -> None:
