@@ -75,11 +75,7 @@ def worth_a_look(cmap: ConformalMap, laid: Pattern, sizes: int, left: float) -> 
     """Whether singularities can be looked at, and all of them together could save much. left: share of the
     area that panels leave open now."""
     surface, lattice = cmap.surface, LATTICES[laid.kind]
-    if (
-        lattice.fold < lattice.order
-        or len(cmap.cones)
-        or not 1 <= len(surface.loops) - surface.openings <= 2
-    ):
+    if lattice.fold < lattice.order or len(cmap.cones) or not 1 <= len(surface.loops) - surface.openings <= 2:
         return False
     if len(surface.vertices) < PATCHES:  # u at so few says little of the cells between
         return left >= SAVED
