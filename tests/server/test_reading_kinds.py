@@ -131,6 +131,23 @@ def off_body(faces: list[list[int]] = MIXED) -> tuple[str, list[str]]:
     return lines[1], lines[2:]
 
 
+@pytest.mark.parametrize("named", [True, False])
+def test_very_many_objects_are_told_apart_at_once(named: bool) -> None:
+    """Separate triangles, each ten times the work of the file if each were cut out of the whole."""
+    n = 20_000
+    rng = np.random.default_rng(1)
+    vertices = rng.random((n, 1, 3)) * 100 + np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    corners = [f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in vertices.reshape(-1, 3).tolist()]
+    lines = [f"o {i}\n" * named + f"f {3 * i + 1} {3 * i + 2} {3 * i + 3}" for i in range(n)]
+    objects = read_file("\n".join(corners + lines).encode(), "many.obj").objects
+    assert len(objects) == n
+    for found in objects[:: n // 7]:
+        part = found.read()
+        assert isinstance(part, SentMesh)
+        assert part.faces.n_rows == 1
+        assert np.ptp(part.vertices[part.faces.values], axis=0) == pytest.approx(found.size, abs=1e-12)
+
+
 @pytest.mark.parametrize("keyword", ["OFF\n", "OFF ", "OFF", "off\n", "", "# a comment\n\nOFF\n"])
 def test_off_keywords(keyword: str) -> None:
     counts, lines = off_body()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 from scipy.sparse.csgraph import connected_components
@@ -22,6 +23,10 @@ from hexwrap_solver.tolerances import TINY
 ROUNDS = 16
 #: Of edges at which more faces than these meet, none of them hang together.
 MOST_AROUND = 16
+#: Open edges in a heap, near which more open vertices lie than this many in all, are not divided at all.
+MOST_NEAR = 20_000_000
+#: So many open edges are looked at at a time.
+BATCH = 4096
 #: Edges lie along each other, and faces on the same side, with at least this cosine.
 ALIGNED = 0.9
 
@@ -262,22 +267,29 @@ def _overlap(vertices: Floats, faces: Ints, rim: Ints, h: Ints, v: Ints) -> Bool
 def _on_edges(vertices: Floats, start: Ints, end: Ints, tolerance: float) -> tuple[Ints, Ints, Floats]:
     """Edges that ends of others lie on, these vertices and their distances. Of each edge what is nearest to
     its middle comes first: divided there, and again, it takes rounds as the logarithm of their number."""
-    among = np.unique(np.concatenate([start, end]))
     none = (start[:0], start[:0], vertices[:0, 0])
+    among = np.unique(np.concatenate([start, end]))
     if len(among) == 0:
         return none
-    a, along = vertices[start], vertices[end] - vertices[start]
-    length = np.linalg.norm(along, axis=1)
-    near = cKDTree(vertices[among]).query_ball_point(a + along / 2, length / 2 + tolerance)
-    counts = np.array([len(found) for found in near], dtype=np.int64)
-    edge = np.repeat(np.arange(len(start)), counts)
-    if counts.sum() == 0:
-        return none
-    v = among[np.concatenate([np.array(found, dtype=np.int64) for found in near])]
-    share = dot(vertices[v] - a[edge], along[edge]) / np.maximum(length[edge] ** 2, TINY)
-    apart = np.linalg.norm(vertices[v] - a[edge] - share[:, None] * along[edge], axis=1)
-    margin = np.minimum(share, 1 - share) * length[edge]
-    hit = (apart <= tolerance) & (margin > tolerance) & (v != start[edge]) & (v != end[edge])
-    order = np.flatnonzero(hit)
-    order = order[np.lexsort((abs(share[order] - 0.5), edge[order]))]
-    return edge[order], v[order], apart[order]
+    tree = cKDTree(vertices[among])
+    total, found = 0, [none]
+    for first in range(0, len(start), BATCH):
+        edge = np.arange(first, min(first + BATCH, len(start)))
+        a, along = vertices[start[edge]], vertices[end[edge]] - vertices[start[edge]]
+        ball = (a + along / 2, np.linalg.norm(along, axis=1) / 2 + tolerance)
+        counts = tree.query_ball_point(*ball, return_length=True)
+        total += int(counts.sum())
+        if total > MOST_NEAR:  # triangles at random, each across the others: nothing there is a seam
+            return none
+        near = np.fromiter(chain.from_iterable(tree.query_ball_point(*ball)), np.int64)
+        row, v = np.repeat(edge - first, counts), among[near]
+        length = np.linalg.norm(along, axis=1)[row]
+        share = dot(vertices[v] - a[row], along[row]) / np.maximum(length**2, TINY)
+        apart = np.linalg.norm(vertices[v] - a[row] - share[:, None] * along[row], axis=1)
+        margin = np.minimum(share, 1 - share) * length
+        hit = (apart <= tolerance) & (margin > tolerance) & (v != start[edge][row]) & (v != end[edge][row])
+        order = np.flatnonzero(hit)
+        order = order[np.lexsort((abs(share[order] - 0.5), row[order]))]
+        found.append((edge[row[order]], v[order], apart[order]))
+    h, v, apart = (np.concatenate(part) for part in zip(*found, strict=True))
+    return h, v, apart

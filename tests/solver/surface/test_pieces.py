@@ -146,3 +146,20 @@ def test_quads_that_narrow_to_a_point_stay_with_the_dome(off: float) -> None:
     (piece,) = pieces(mesh(dome, quads))
     assert piece.loops == 1
     assert len(piece.faces) == len(quads)
+
+
+def test_in_a_heap_of_triangles_nothing_is_looked_for() -> None:
+    """Each ball around an edge holds a sixth of all vertices: 80 million pairs, of which none is a seam."""
+    rng = np.random.default_rng(0)
+    corners = rng.integers(0, 40_000, (20_000, 3))
+    heap = mesh(rng.random((40_000, 3)), corners[np.ptp(corners, axis=1) > 0])
+    whole, _, joint = joined(heap, 1e-9)
+    assert whole is heap
+    assert joint.count == 0
+
+
+def test_the_search_for_what_lies_on_open_edges_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
+    sent, _ = together(halves(finer=True))
+    assert joined(sent, 1e-3)[2].count > 0
+    monkeypatch.setattr("hexwrap_solver.surface.pieces.MOST_NEAR", 10)
+    assert joined(sent, 1e-3)[0] is sent

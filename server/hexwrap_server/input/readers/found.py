@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -89,25 +90,22 @@ def of_mesh(mesh: SentMesh, names: Sequence[tuple[str, str]] = (), owner: Ints |
             return content.noted(_cut(int((np.bincount(row) > 1).sum())))
     check_arrays(mesh)
     if owner is not None and len(names) > 1:
-        parts = [only(mesh, np.flatnonzero(owner == i)) for i in range(len(names))]
-        objects = [
-            _object(str(i), name, part, layer)
-            for i, ((name, layer), part) in enumerate(zip(names, parts, strict=True))
-        ]
-        return FileContent(tuple(objects), mesh=mesh, owner=owner)
+        order = np.argsort(owner, kind="stable")
+        each = np.split(order, np.searchsorted(owner[order], np.arange(1, len(names))))
+        return FileContent(_objects(mesh, names, each), mesh=mesh, owner=owner)
     found = pieces(mesh)
-    large = [piece for piece in found if piece.area >= STRAY * found[0].area]
-    name = names[0][0] if names else ""
+    large = [piece.faces for piece in found if piece.area >= STRAY * found[0].area]
     if len(large) < 2:
-        whole = _object("0", name, mesh)
+        name = names[0][0] if names else ""
+        (whole,) = _objects(mesh, [(name, "")], [np.arange(mesh.faces.n_rows)])
         return FileContent(
             (whole,), mesh=mesh, owner=_none(mesh), whole=found[0] if len(found) == 1 else None
         )
     owner = _none(mesh)
-    for i, piece in enumerate(large):
-        owner[piece.faces] = i
-    objects = [_object(str(i), f"part {i}", only(mesh, piece.faces)) for i, piece in enumerate(large)]
-    return FileContent(tuple(objects), mesh=mesh, owner=owner)
+    for i, own in enumerate(large):
+        owner[own] = i
+    objects = _objects(mesh, [(f"part {i}", "") for i in range(len(large))], large)
+    return FileContent(objects, mesh=mesh, owner=owner)
 
 
 def _cut(count: int) -> str:
@@ -117,10 +115,19 @@ def _cut(count: int) -> str:
     )
 
 
-def _object(id: str, name: str, mesh: SentMesh, layer: str = "") -> Found:
-    used = mesh.vertices[mesh.faces.values] if mesh.faces.n_rows else np.zeros((1, 3))
-    x, y, z = np.ptp(used, axis=0).tolist()
-    return Found(id, name, "mesh", (x, y, z), lambda: mesh, layer)
+def _objects(mesh: SentMesh, names: Sequence[tuple[str, str]], each: Sequence[Ints]) -> tuple[Found, ...]:
+    """Objects of those names and layers and of each of those faces. There may be very many of them: their
+    sizes are found together, and their meshes when they are asked for."""
+    corners = mesh.faces.take(np.concatenate(each))
+    points = mesh.vertices[corners.values]
+    ends = np.append(0, corners.offsets[np.cumsum([len(faces) for faces in each])])
+    held = np.flatnonzero(np.diff(ends))
+    sizes = np.zeros((len(each), 3))
+    sizes[held] = np.maximum.reduceat(points, ends[held]) - np.minimum.reduceat(points, ends[held])
+    return tuple(
+        Found(str(i), name, "mesh", (x, y, z), partial(only, mesh, faces), layer)
+        for i, ((name, layer), faces, (x, y, z)) in enumerate(zip(names, each, sizes.tolist(), strict=True))
+    )
 
 
 def _none(mesh: SentMesh) -> Ints:
