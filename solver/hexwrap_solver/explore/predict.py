@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from hexwrap_solver.arrays import Complexes, Floats, Ints, Progress, no_progress
+from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints, Progress, no_progress
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.domain.locate import barycentric
 from hexwrap_solver.geometry import outline_area, plane_areas
@@ -25,10 +25,14 @@ from hexwrap_solver.pattern.lattice import LATTICES, Lattice
 from hexwrap_solver.pattern.lay.nodes import lattice_points_in_triangles
 from hexwrap_solver.pattern.lay_pattern import CLOSE, check_count, off_by
 from hexwrap_solver.pattern.place.choose import PlacementFamily
+from hexwrap_solver.pattern.place.placement import is_straight
 from hexwrap_solver.pattern.place.rotation import with_rotation
+from hexwrap_solver.pattern.place.rows import rows_along
 from hexwrap_solver.pattern.place.sense import check_edge
 from hexwrap_solver.pattern.place.size import HALF_ROW
 from hexwrap_solver.pattern.types import PatternSettings
+from hexwrap_solver.surface.topology import next_half_edge
+from hexwrap_solver.surface.types import Surface
 from hexwrap_solver.tolerances import RELATIVE, TINY
 
 #: Cells stand on either side of a line of other patterns; those nearer to it are cut by it in two.
@@ -36,6 +40,8 @@ HALVED = 0.25
 #: Cells that a boundary cuts, per cell of area that is left of them: those whose middle is nearer to it than
 #: they reach, on either side, of which half the area is inside.
 TRIMMED = 2.0
+#: Loops lie on lines of the pattern where so much of them does, to within so much of the distance of lines.
+MOSTLY, ASTRAY = 0.9, 0.05
 #: Points on each edge of the boundary, and of features, from which distances are taken.
 FINE = 4
 #: Middles are taken this far beside where they stand, in periods of the lattice, so that hardly one lies on
@@ -69,14 +75,16 @@ class Outlook:
     the boundary as they reach, on the average over all directions (perimeter/2π); along a loop that is a line
     of the pattern, half a row. special: cells with another number of sides; trimmed: those cut at the
     boundary; folded: pieces of those that features cut, of that many kinds; rest: area of all these, which
-    their panels are taken to cover. surface: its area, 0 where cells are trimmed to
-    reach its edges. distortion: of the placement.
+    their panels are taken to cover. edge: the mean over the area of the cells, as that of a pattern; infinite
+    where there are none. surface: its area, 0 where cells are trimmed to reach its edges. distortion: of the
+    placement.
     """
 
     lattice: Lattice
     sides: Ints
     size: Floats
     limit: Floats
+    edge: float
     special: int = 0
     trimmed: int = 0
     folded: int = 0
@@ -84,11 +92,6 @@ class Outlook:
     rest: float = 0.0
     surface: float = 0.0
     distortion: float = 0.0
-
-    @property
-    def edge(self) -> float:
-        """Mean edge of the cells; infinite where there are none."""
-        return float(self.size.mean()) if len(self.size) else np.inf
 
     def foresee(
         self,
@@ -182,12 +185,13 @@ def _outlook(cmap: ConformalMap, placing: PlacementFamily, settings: PatternSett
         unit_area[kind], own = outline_area(outline), sides == kind
         shorter[own] = shortened(outline, (slope * size * uphill)[own], skew[face[own]])
     reach: Floats = np.asarray(sides / (2 * np.pi) * size)
-    regular, alone = np.ones(len(face), dtype=bool), len(cmap.cones)
-    if alone:
+    regular = np.ones(len(face), dtype=bool)
+    if len(cmap.cones):
         regular = cKDTree(surface.vertices[cmap.cones.vertex]).query(middle)[0] > reach
     whole = regular.copy()
-    for i, loop in enumerate(surface.loops):
-        least: Floats = HALF_ROW.get(lattice.kind, HALVED) * size if i in placing.loops else reach
+    on_line = _on_lines(surface, lattice, placed, placement.rotation, settings.boundary)
+    for loop in surface.loops:
+        least: Floats = HALF_ROW.get(lattice.kind, HALVED) * size if on_line[loop].mean() > MOSTLY else reach
         whole &= _distance(middle, surface.vertices[np.append(loop, loop[0])]) > least
     bent = np.zeros(len(face), dtype=bool)
     for i in placing.features:
@@ -195,16 +199,60 @@ def _outlook(cmap: ConformalMap, placing: PlacementFamily, settings: PatternSett
         bent |= _distance(middle, surface.vertices[surface.features[i].vertices]) <= least
     bent &= whole
     whole &= ~bent
-    beside, cut = ~regular | bent, 0
+    beside, cut = bent, 0
     if settings.boundary == "trim":
-        beside, cut = ~whole, round(TRIMMED * float((regular & ~whole & ~bent).sum()))
-    rest = float((unit_area[sides] * size**2)[beside].sum())
+        beside, cut = regular & ~whole, round(TRIMMED * float((regular & ~whole & ~bent).sum()))
+    alone = _at_cones(cmap, lattice, cells)
+    rest = float((unit_area[sides] * size**2)[beside].sum()) + float(alone.sum())
     shorter = np.minimum(shorter, 1.0)
     folded, kinds = 2 * int(bent.sum()), 2 * len(_levels(size[bent])[0]) if bent.any() else 0
     size, shorter, sides = size[whole], shorter[whole], sides[whole]
     limit = size * (1 - shorter)
     wall = 0.0 if settings.boundary == "trim" else float(area.sum())
-    return Outlook(lattice, sides, size, limit, alone, cut, folded, kinds, rest, wall, placement.distortion)
+    length = np.append(size, np.sqrt(alone / _unit_area(lattice.sides - cmap.cones.index)))
+    weight = np.append(unit_area[sides] * size**2, alone)
+    edge = float(length @ weight / weight.sum()) if len(size) else np.inf
+    return Outlook(
+        lattice, sides, size, limit, edge, len(alone), cut, folded, kinds, rest, wall, placement.distortion
+    )
+
+
+def _unit_area(sides: Ints) -> Floats:
+    """Of regular polygons of edge 1."""
+    n = np.maximum(sides, 3)
+    return np.asarray(n / (4 * np.tan(np.pi / n)))
+
+
+def _at_cones(cmap: ConformalMap, lattice: Lattice, cells: Floats) -> Floats:
+    """(k,) areas of the cells at the singularities: of what is nearest to each, as much as they need. cells:
+    (m,) how many lie on each triangle."""
+    surface, cones = cmap.surface, cmap.cones
+    middle = surface.vertices[surface.faces].mean(axis=1)
+    found = np.zeros(len(cones))
+    for k, (v, index) in enumerate(zip(cones.vertex.tolist(), cones.index.tolist(), strict=True)):
+        nearest = np.argsort(np.linalg.norm(middle - surface.vertices[v], axis=1), kind="stable")
+        total, area = (np.append(0, np.cumsum(part[nearest])) for part in (cells, surface.areas))
+        found[k] = np.interp(1 - index / lattice.sides, total, area)
+    return found
+
+
+def _on_lines(surface: Surface, lattice: Lattice, placed: Complexes, angle: float, boundary: str) -> Bools:
+    """(n,) vertices from which a boundary edge starts that lies on a line of the pattern, all but. placed:
+    (m, 3) corners in the plane of the lattice; angle: of edges to the boundary."""
+    found = np.zeros(len(surface.vertices), dtype=bool)
+    if is_straight(lattice, angle):
+        rim = np.flatnonzero(surface.twin < 0)
+        start, end = placed.ravel()[rim], placed.ravel()[next_half_edge(rim)]
+        rows, zero = rows_along(lattice, angle, boundary), lattice.forward * np.exp(-1j * angle)
+        inward = (
+            1j
+            * zero
+            * np.exp(1j * lattice.quantum * np.rint(np.angle((end - start) / zero) / lattice.quantum))
+        )
+        off = [(inward.conj() * (end_ - 0)).real - rows.first for end_ in (start, end)]
+        off = [abs(depth - rows.period * np.rint(depth / rows.period)) for depth in off]
+        found[surface.faces.ravel()[rim]] = np.maximum(*off) < ASTRAY * rows.period
+    return found
 
 
 def shortened(outline: Complexes, gradient: Complexes, skew: Complexes) -> Floats:
