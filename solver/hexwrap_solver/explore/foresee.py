@@ -18,7 +18,7 @@ from hexwrap_solver.pattern.place.rotation import check_parameters
 from hexwrap_solver.pattern.place.sense import check_edge
 from hexwrap_solver.pattern.place.size import mean_stretch, wanted_edge
 from hexwrap_solver.pipeline import Solution, SolveSettings, StageRunner, mapped
-from hexwrap_solver.singularities.solve import chosen, frame_of
+from hexwrap_solver.singularities.solve import chosen, frame_of, needs_singularities
 from hexwrap_solver.singularities.types import SingularityAt, SingularitySettings
 from hexwrap_solver.surface.holes import fill_openings
 from hexwrap_solver.surface.types import Surface
@@ -77,21 +77,22 @@ def seated(
 ) -> list[tuple[Seats, tuple[Variant, ...]]]:
     """Variants of one frame, those of as many singularities together, ascending, and where these stand.
 
-    Where a number is impossible, such as an odd one with two straight ends, the next smaller one is taken.
-    Raises HexwrapError where the surface cannot be used.
+    Where a number is impossible, such as an odd one with two straight ends, the next smaller one is taken,
+    or the smallest there is: a dome whose edge is straight needs six. Raises HexwrapError where the surface
+    cannot be used.
     """
     frame, most = listed[0].frame, max(settings.vary.singularities)
-    seats: dict[int, Seats] = {0: ()}
     with one_blas_thread():
         surface = run("surface", source, lambda progress: take_in())
         try:
             searched = run("seats", (frame, most), lambda progress: _seats(surface, frame, most))
-            seats |= {len(at): at for at in searched}
         except HexwrapError:  # then there are the variants without
-            pass
+            searched = ((),)
+    seats = {len(at): at for at in searched}
+    fewest = min(seats)
     parts: dict[int, list[Variant]] = {}
     for variant in listed:
-        count = max(count for count in seats if count <= variant.singularities)
+        count = max(count for count in seats if count <= max(variant.singularities, fewest))
         parts.setdefault(count, []).append(variant)
     return [(seats[count], tuple(parts[count])) for count in sorted(parts)]
 
@@ -120,16 +121,19 @@ def foresee(
 
 def _seats(surface: Surface, frame: Frame, most: int) -> tuple[Seats, ...]:
     """The best places for each number of singularities that is possible, as a request says them."""
+    boundary = frame.boundary.adapted(frame.pattern.cell_kind)
+    needed = needs_singularities(surface, boundary)
+    asked = SingularitySettings(count="auto" if needed else most)
     surface = fill_openings(surface)
-    boundary, asked = frame.boundary.adapted(frame.pattern.cell_kind), SingularitySettings(count=most)
     found = chosen(surface, frame_of(surface, boundary, asked, frame.pattern, None), asked)
-    return tuple(
+    placed = tuple(
         tuple(
             SingularityAt(index=int(k), point=tuple(surface.vertices[v].tolist()))
             for v, k in zip(one.vertex, one.index, strict=True)
         )
         for one in found.proposals
     )
+    return placed if needed else ((), *placed)
 
 
 def _candidate(asked: SolveSettings, settings: ExploreSettings, seen: Outlook, unit: str | None) -> Candidate:
