@@ -37,6 +37,8 @@ from hexwrap_solver.tolerances import RELATIVE, TINY
 
 #: Cells stand on either side of a line of other patterns; those nearer to it are cut by it in two.
 HALVED = 0.25
+#: Mean edge of either half of a cell, cut from the middle of an edge, in edges, for its number of sides.
+HALF_EDGE = {3: (3 + 3**0.5) / 6, 4: 0.75, 6: (3 + 3**0.5) / 5}
 #: Cells that a boundary cuts, per cell of area that is left of them: those whose middle is nearer to it than
 #: they reach, on either side, of which half the area is inside.
 TRIMMED = 2.0
@@ -206,11 +208,15 @@ def _outlook(cmap: ConformalMap, placing: PlacementFamily, settings: PatternSett
     rest = float((unit_area[sides] * size**2)[beside].sum()) + float(alone.sum())
     shorter = np.minimum(shorter, 1.0)
     folded, kinds = 2 * int(bent.sum()), 2 * len(_levels(size[bent])[0]) if bent.any() else 0
+    halved = (
+        unit_area[sides[bent]] * size[bent] ** 2,
+        size[bent] * [HALF_EDGE.get(p, 1.0) for p in sides[bent]],
+    )
     size, shorter, sides = size[whole], shorter[whole], sides[whole]
     limit = size * (1 - shorter)
     wall = 0.0 if settings.boundary == "trim" else float(area.sum())
-    length = np.append(size, np.sqrt(alone / _unit_area(lattice.sides - cmap.cones.index)))
-    weight = np.append(unit_area[sides] * size**2, alone)
+    length = np.concatenate([size, np.sqrt(alone / _unit_area(lattice.sides - cmap.cones.index)), halved[1]])
+    weight = np.concatenate([unit_area[sides] * size**2, alone, halved[0]])
     edge = float(length @ weight / weight.sum()) if len(size) else np.inf
     return Outlook(
         lattice, sides, size, limit, edge, len(alone), cut, folded, kinds, rest, wall, placement.distortion
