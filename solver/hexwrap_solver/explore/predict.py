@@ -180,6 +180,8 @@ def _outlook(cmap: ConformalMap, placing: PlacementFamily, settings: PatternSett
         np.einsum("kc,kc...->k...", weight, values[surface.faces[face]])
         for values in (np.log(size), slope, surface.vertices)
     )
+    # Beside a singularity the slope falls as 1/r, and means over vertices are too steep.
+    slope = np.minimum(slope, _slope(cmap, area)[face])
     size = np.exp(here) * wide[face]
     uphill = _uphill(placed, cmap.log_scale[surface.faces])[face]
     unit_area, shorter = np.zeros(lattice.sides + 1), np.zeros(len(face))

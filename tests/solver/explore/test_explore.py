@@ -21,10 +21,11 @@ from hexwrap_solver.panels.types import PanelSettings
 from hexwrap_solver.pattern import lay_pattern
 from hexwrap_solver.pattern.lattice import LATTICES
 from hexwrap_solver.pattern.types import PatternSettings
-from hexwrap_solver.pipeline import PlainRunner
+from hexwrap_solver.pipeline import PlainRunner, mapped
 from hexwrap_solver.surface import with_openings
 from tests.solver.conformal.annuli import bump, catenoid
 from tests.solver.conformal.nets import holed
+from tests.solver.singularities.shapes import dome
 
 NEW = ("brick", "truncated-hexagonal", "truncated-square")
 
@@ -229,3 +230,26 @@ def test_singularities_of_a_wall_with_windows_add_up_with_these_filled() -> None
     for at, some in parts:
         assert sum(one.index for one in at) == 0
         assert foresee(lambda: wall, settings, at, some, PlainRunner())[0].foreseen is not None
+
+
+@pytest.mark.parametrize(
+    ("surface", "numbers"), [(bump(48, 30), {2, 4}), (dome(1200), {6, 8})], ids=["straight ends", "dome"]
+)
+def test_foreseen_with_singularities_and_straight_ends(surface, numbers: set[int]) -> None:
+    """The ends are lines of the pattern, all variants of a frame share the singularities that are searched
+    once, and where there must be some, none is without."""
+    vary = Vary(boundary=("straight",), singularities=tuple(numbers), edge_length=(0.12, 0.12), sizes=(6, 9))
+    settings = ExploreSettings(vary=vary, variants=12)
+    listed = [one for one in variants(settings, None) if one.frame.boundary.mode == "straight"]
+    parts = seated(lambda: surface, settings, listed, PlainRunner())
+    assert numbers <= {len(at) for at, _ in parts}
+    assert {len(at) == 0 for at, _ in parts} == {False}
+    for at, some in parts:
+        one = foresee(lambda: surface, settings, at, some, PlainRunner())[0]
+        assert isinstance(one.foreseen, Figures)
+        cmap, _ = mapped(lambda: surface, one.settings, PlainRunner())
+        assert len(cmap.cones) == len(at)
+        laid = lay_pattern(cmap, one.settings.pattern)
+        made = quantize(fit_panels(cmap, laid, one.settings.panels), one.settings.panels)
+        assert one.foreseen.panels == pytest.approx(made.n_panels, rel=0.01)
+        assert one.foreseen.uncovered == pytest.approx(1 - measure(cmap, laid, made).coverage, abs=0.006)
