@@ -11,6 +11,7 @@ itself, says how much is left uncovered.
 
 from __future__ import annotations
 
+from collections.abc import Container, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -163,66 +164,113 @@ def outlook(cmap: ConformalMap, settings: PatternSettings, progress: Progress = 
     return min(seen, again, key=lambda one: off_by(one.edge, wanted, one.distortion))
 
 
+@dataclass(frozen=True)
+class _Cells:
+    """Cells of the lattice whose middles (c, 3) lie on the surface. sides, size, limit: see ``Outlook``.
+    area: (c,)."""
+
+    middle: Floats
+    sides: Ints
+    size: Floats
+    limit: Floats
+    area: Floats
+
+    def __len__(self) -> int:
+        return len(self.sides)
+
+    def part(self, keep: Bools) -> _Cells:
+        middle, sides, size = self.middle[keep], self.sides[keep], self.size[keep]
+        return _Cells(middle, sides, size, self.limit[keep], self.area[keep])
+
+    @property
+    def reach(self) -> Floats:
+        """(c,) from their middles, on the average over all directions."""
+        return np.asarray(self.sides / (2 * np.pi) * self.size)
+
+
 def _outlook(cmap: ConformalMap, placing: PlacementFamily, settings: PatternSettings) -> Outlook:
     lattice, placement, surface = placing.lattice, placing.at(settings), cmap.surface
     placed = placement.glued.corners(surface.faces, placement.place)
     check_count(cmap, placed, lattice, settings)
-    cells, area = plane_areas(placed) / lattice.cell_area, surface.areas
-    skew = _stretched(placing.cmap.corners(), placed)
-    size: Floats = np.exp(-(cmap.log_scale - cmap.log_scale.mean()))
-    square = lattice.cell_area / lattice.edge**2 * cells * (size**2)[surface.faces].mean(axis=1)
+    every = _every_cell(cmap, lattice, placed, _stretched(placing.cmap.corners(), placed))
+    whole = _off_cones(cmap, every)
+    every, trims = every.part(whole), settings.boundary == "trim"
+    whole = _off_loops(
+        surface, every, lattice, _on_lines(surface, lattice, placed, placement.rotation, trims)
+    )
+    bent = whole & _on_features(surface, every, placing.features, placement.straight)
+    cells, cut, folded = (every.part(which) for which in (whole & ~bent, ~whole, bent))
+    alone = _at_cones(cmap, lattice, plane_areas(placed) / lattice.cell_area)
+    length = [cells.size, np.sqrt(alone / _unit_area(lattice.sides - cmap.cones.index))]
+    length.append(folded.size * [HALF_EDGE.get(p, 1.0) for p in folded.sides])
+    weight = np.concatenate([cells.area, alone, folded.area])
+    return Outlook(
+        lattice,
+        cells.sides,
+        cells.size,
+        cells.limit,
+        edge=float(np.concatenate(length) @ weight / weight.sum()) if len(cells) else np.inf,
+        special=len(alone),
+        trimmed=round(TRIMMED * len(cut)) if trims else 0,
+        folded=2 * len(folded),
+        kinds=2 * len(_levels(folded.size)[0]) if len(folded) else 0,
+        rest=float(alone.sum() + folded.area.sum() + (cut.area.sum() if trims else 0.0)),
+        surface=0.0 if trims else float(surface.areas.sum()),
+        distortion=placement.distortion,
+    )
+
+
+def _every_cell(cmap: ConformalMap, lattice: Lattice, placed: Complexes, skew: Complexes) -> _Cells:
+    """placed: (m, 3) corners of the triangles in the plane of the lattice; skew: see ``_stretched``."""
+    surface = cmap.surface
+    faces, area = surface.faces, surface.areas
+    scale: Floats = np.exp(-(cmap.log_scale - cmap.log_scale.mean()))
+    square = plane_areas(placed) / lattice.edge**2 * (scale**2)[faces].mean(axis=1)
     # of each triangle, which is as large as the cells on it
     wide = np.sqrt(area / np.maximum(abs(square), TINY))
-    slope: Floats = np.bincount(surface.faces.ravel(), np.repeat(area * _slope(cmap, area), 3)).astype(float)
-    slope = slope / np.maximum(np.bincount(surface.faces.ravel(), np.repeat(area, 3)), TINY)
+    flat_slope = _slope(cmap, area)
+    slope: Floats = np.bincount(faces.ravel(), np.repeat(area * flat_slope, 3)).astype(float)
+    slope = slope / np.maximum(np.bincount(faces.ravel(), np.repeat(area, 3)), TINY)
     face, weight, sides = _middles(lattice, placed)
     here, slope, middle = (
-        np.einsum("kc,kc...->k...", weight, values[surface.faces[face]])
-        for values in (np.log(size), slope, surface.vertices)
+        np.einsum("kc,kc...->k...", weight, values[faces[face]])
+        for values in (np.log(scale), slope, surface.vertices)
     )
     # Beside a singularity the slope falls as 1/r, and means over vertices are too steep.
-    slope = np.minimum(slope, _slope(cmap, area)[face])
+    slope = np.minimum(slope, flat_slope[face])
     size = np.exp(here) * wide[face]
-    uphill = _uphill(placed, cmap.log_scale[surface.faces])[face]
+    gradient = slope * size * _uphill(placed, cmap.log_scale[faces])[face]
     unit_area, shorter = np.zeros(lattice.sides + 1), np.zeros(len(face))
     for kind, outline in lattice.centred.items():
         unit_area[kind], own = outline_area(outline), sides == kind
-        shorter[own] = shortened(outline, (slope * size * uphill)[own], skew[face[own]])
-    reach: Floats = np.asarray(sides / (2 * np.pi) * size)
-    regular = np.ones(len(face), dtype=bool)
-    if len(cmap.cones):
-        regular = cKDTree(surface.vertices[cmap.cones.vertex]).query(middle)[0] > reach
-    whole = regular.copy()
-    on_line = _on_lines(surface, lattice, placed, placement.rotation, settings.boundary)
+        shorter[own] = shortened(outline, gradient[own], skew[face[own]])
+    return _Cells(middle, sides, size, size * (1 - np.minimum(shorter, 1.0)), unit_area[sides] * size**2)
+
+
+def _off_cones(cmap: ConformalMap, cells: _Cells) -> Bools:
+    if not len(cmap.cones):
+        return np.ones(len(cells), dtype=bool)
+    at = cmap.surface.vertices[cmap.cones.vertex]
+    return np.asarray(cKDTree(at).query(cells.middle)[0] > cells.reach)
+
+
+def _off_loops(surface: Surface, cells: _Cells, lattice: Lattice, on_line: Bools) -> Bools:
+    """on_line: (n,) see ``_on_lines``."""
+    whole = np.ones(len(cells), dtype=bool)
     for loop in surface.loops:
-        least: Floats = HALF_ROW.get(lattice.kind, HALVED) * size if on_line[loop].mean() > MOSTLY else reach
-        whole &= _distance(middle, surface.vertices[np.append(loop, loop[0])]) > least
-    bent = np.zeros(len(face), dtype=bool)
-    for i in placing.features:
-        least = HALVED * size if i in placement.straight else reach
-        bent |= _distance(middle, surface.vertices[surface.features[i].vertices]) <= least
-    bent &= whole
-    whole &= ~bent
-    beside, cut = bent, 0
-    if settings.boundary == "trim":
-        beside, cut = regular & ~whole, round(TRIMMED * float((regular & ~whole & ~bent).sum()))
-    alone = _at_cones(cmap, lattice, cells)
-    rest = float((unit_area[sides] * size**2)[beside].sum()) + float(alone.sum())
-    shorter = np.minimum(shorter, 1.0)
-    folded, kinds = 2 * int(bent.sum()), 2 * len(_levels(size[bent])[0]) if bent.any() else 0
-    halved = (
-        unit_area[sides[bent]] * size[bent] ** 2,
-        size[bent] * [HALF_EDGE.get(p, 1.0) for p in sides[bent]],
-    )
-    size, shorter, sides = size[whole], shorter[whole], sides[whole]
-    limit = size * (1 - shorter)
-    wall = 0.0 if settings.boundary == "trim" else float(area.sum())
-    length = np.concatenate([size, np.sqrt(alone / _unit_area(lattice.sides - cmap.cones.index)), halved[1]])
-    weight = np.concatenate([unit_area[sides] * size**2, alone, halved[0]])
-    edge = float(length @ weight / weight.sum()) if len(size) else np.inf
-    return Outlook(
-        lattice, sides, size, limit, edge, len(alone), cut, folded, kinds, rest, wall, placement.distortion
-    )
+        row = HALF_ROW.get(lattice.kind, HALVED) * cells.size
+        least = row if on_line[loop].mean() > MOSTLY else cells.reach
+        whole &= _distance(cells.middle, surface.vertices[np.append(loop, loop[0])]) > least
+    return whole
+
+
+def _on_features(surface: Surface, cells: _Cells, numbers: Iterable[int], straight: Container[int]) -> Bools:
+    """straight: those features that are lines of the pattern."""
+    bent = np.zeros(len(cells), dtype=bool)
+    for i in numbers:
+        least = HALVED * cells.size if i in straight else cells.reach
+        bent |= _distance(cells.middle, surface.vertices[surface.features[i].vertices]) <= least
+    return bent
 
 
 def _unit_area(sides: Ints) -> Floats:
@@ -244,22 +292,20 @@ def _at_cones(cmap: ConformalMap, lattice: Lattice, cells: Floats) -> Floats:
     return found
 
 
-def _on_lines(surface: Surface, lattice: Lattice, placed: Complexes, angle: float, boundary: str) -> Bools:
+def _on_lines(surface: Surface, lattice: Lattice, placed: Complexes, angle: float, trims: bool) -> Bools:
     """(n,) vertices from which a boundary edge starts that lies on a line of the pattern, all but. placed:
     (m, 3) corners in the plane of the lattice; angle: of edges to the boundary."""
     found = np.zeros(len(surface.vertices), dtype=bool)
-    if is_straight(lattice, angle):
-        rim = np.flatnonzero(surface.twin < 0)
-        start, end = placed.ravel()[rim], placed.ravel()[next_half_edge(rim)]
-        rows, zero = rows_along(lattice, angle, boundary), lattice.forward * np.exp(-1j * angle)
-        inward = (
-            1j
-            * zero
-            * np.exp(1j * lattice.quantum * np.rint(np.angle((end - start) / zero) / lattice.quantum))
-        )
-        off = [(inward.conj() * (end_ - 0)).real - rows.first for end_ in (start, end)]
-        off = [abs(depth - rows.period * np.rint(depth / rows.period)) for depth in off]
-        found[surface.faces.ravel()[rim]] = np.maximum(*off) < ASTRAY * rows.period
+    if not is_straight(lattice, angle):
+        return found
+    rows = rows_along(lattice, angle, "trim" if trims else "whole")
+    rim = np.flatnonzero(surface.twin < 0)
+    start, end = placed.ravel()[rim], placed.ravel()[next_half_edge(rim)]
+    zero = lattice.forward * np.exp(-1j * angle)
+    steps = np.rint(np.angle((end - start) / zero) / lattice.quantum)
+    depth = (np.conj(1j * zero * np.exp(1j * lattice.quantum * steps)) * np.stack([start, end])).real
+    off = (depth - rows.first) / rows.period
+    found[surface.faces.ravel()[rim]] = (abs(off - np.rint(off)) < ASTRAY).all(axis=0)
     return found
 
 
