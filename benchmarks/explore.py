@@ -1,6 +1,7 @@
 """What explorations foresee against what is measured, on all samples; and one exploration, timed.
 
     python benchmarks/explore.py [--write] [SAMPLE …]  the table
+    python benchmarks/explore.py --solved [SAMPLE …]  of 40 variants of each, those that are solved
     python benchmarks/explore.py --run [SAMPLE]        an exploration of 200 variants on two processes
     python benchmarks/explore.py --run --vertices 20000  the same of a doubly curved tower with that many
     python benchmarks/explore.py --same [SAMPLE]       ten explorations of 20 variants with the same seed
@@ -36,6 +37,8 @@ from hexwrap_solver.pattern import lay_pattern
 from hexwrap_solver.pattern.types import PatternSettings
 from hexwrap_solver.surface.types import Surface
 
+#: Points by which what is foreseen may be off.
+BOUND = 0.6
 SIZES = (1, 2, 3, 4, 6, 8, 11, None)
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "results.md"
 BEGIN, END = "<!-- explore: made by its benchmark -->", "<!-- end of explore -->"
@@ -47,6 +50,7 @@ def main() -> None:
     )
     parser.add_argument("samples", nargs="*", metavar="SAMPLE")
     parser.add_argument("--write", action="store_true", help="write the table into docs/results.md")
+    parser.add_argument("--solved", action="store_true", help="explore each, and compare what is solved")
     parser.add_argument("--run", action="store_true", help="explore the first sample, or the tower")
     parser.add_argument("--same", action="store_true", help="explore it ten times with the same seed")
     parser.add_argument("--vertices", type=int, help="run: a tower of that many, not a sample")
@@ -57,6 +61,10 @@ def main() -> None:
         return
     if asked.same:
         same(first)
+        return
+    if asked.solved:
+        for name in asked.samples or samples.names():
+            solved(name)
         return
     worst = 0.0
     columns = ("sample", "ends", "cells", *(f"{k or 'own'} sizes" for k in SIZES), "s")
@@ -105,6 +113,22 @@ def explored(name: str, variants: int, vertices: int | None = None) -> dict[str,
     body = {"name": name, "surface": surface, "variants": variants}
     request = parse_exploration(body, 10**7, 10**6)
     return explore_here(name, request.surface, request.wanted, nobody)  # type: ignore[arg-type]
+
+
+def solved(name: str) -> None:
+    """How far solved variants of an exploration are from what was foreseen of them, and the worst ones."""
+    found = []
+    for variant in explored(name, 40)["variants"]:
+        if variant["measured"]:
+            foreseen, measured = (100 * variant[key]["uncovered"] for key in ("predicted", "measured"))
+            request = variant["request"]
+            at = len((request["singularities"] or {"at": ()})["at"])
+            words = f"{request['boundary']['mode']}, {at} singularities, {request['panels']['sizes']} sizes"
+            found.append((abs(foreseen - measured), f"{words}: {foreseen:.2f} / {measured:.2f}"))
+    beyond = sorted((one for one in found if one[0] > BOUND), reverse=True)
+    print(f"{name}: {len(found) - len(beyond)} of {len(found)} within {BOUND}", flush=True)
+    for _, words in beyond:
+        print(f"  {words}")
 
 
 def run(name: str, vertices: int | None) -> None:
