@@ -81,14 +81,9 @@ def seated(
     or the smallest there is: a dome whose edge is straight needs six. Raises HexwrapError where the surface
     cannot be used.
     """
-    frame, most = listed[0].frame, max(settings.vary.singularities)
     with one_blas_thread():
         surface = run("surface", source, lambda progress: take_in())
-        try:
-            searched = run("seats", (frame, most), lambda progress: _seats(surface, frame, most))
-        except HexwrapError:  # then there are the variants without
-            searched = ((),)
-    seats = {len(at): at for at in searched}
+        seats = _searched(surface, listed[0].frame, settings, run)
     fewest = min(seats)
     parts: dict[int, list[Variant]] = {}
     for variant in listed:
@@ -106,12 +101,18 @@ def foresee(
     *,
     source: object = None,
 ) -> tuple[Candidate, ...]:
-    """Variants of one frame, in their order, with singularities there: they share their map."""
-    asked = as_settings(listed[0], settings, at)
+    """Variants of one frame, in their order, with singularities there, or as few as there must be: they
+    share their map."""
+    frame = listed[0].frame
     with one_blas_thread():
         try:
-            cmap, _ = mapped(take_in, asked, run, source=source)
-            seen = outlook(cmap, listed[0].frame.pattern)
+            if not at:
+                surface = run("surface", source, lambda progress: take_in())
+                if _needed(surface, frame):
+                    seats = _searched(surface, frame, settings, run)
+                    at = seats[min(seats)]
+            cmap, _ = mapped(take_in, as_settings(listed[0], settings, at), run, source=source)
+            seen = outlook(cmap, frame.pattern)
         except HexwrapError as error:
             return tuple(Candidate(as_settings(one, settings, at), error) for one in listed)
     return tuple(
@@ -119,10 +120,26 @@ def foresee(
     )
 
 
+def _searched(
+    surface: Surface, frame: Frame, settings: ExploreSettings, run: StageRunner
+) -> dict[int, Seats]:
+    """The best places for each number of singularities that is possible; none where none are."""
+    most = max(settings.vary.singularities)
+    try:
+        found = run("seats", (frame, most), lambda progress: _seats(surface, frame, most))
+    except HexwrapError:  # then there are the variants without
+        found = ((),)
+    return {len(at): at for at in found}
+
+
+def _needed(surface: Surface, frame: Frame) -> bool:
+    return needs_singularities(surface, frame.boundary.adapted(frame.pattern.cell_kind))
+
+
 def _seats(surface: Surface, frame: Frame, most: int) -> tuple[Seats, ...]:
-    """The best places for each number of singularities that is possible, as a request says them."""
+    """As a request says them."""
+    needed = _needed(surface, frame)
     boundary = frame.boundary.adapted(frame.pattern.cell_kind)
-    needed = needs_singularities(surface, boundary)
     asked = SingularitySettings(count="auto" if needed else most)
     surface = fill_openings(surface)
     found = chosen(surface, frame_of(surface, boundary, asked, frame.pattern, None), asked)

@@ -247,6 +247,8 @@ def test_foreseen_with_singularities_and_straight_ends(surface, numbers: set[int
     for at, some in parts:
         one = foresee(lambda: surface, settings, at, some, PlainRunner())[0]
         assert isinstance(one.foreseen, Figures)
+        if len(at) == 6:  # as when none are wanted, so that none are searched
+            assert foresee(lambda: surface, settings, (), some, PlainRunner())[0] == one
         cmap, _ = mapped(lambda: surface, one.settings, PlainRunner())
         assert len(cmap.cones) == len(at)
         laid = lay_pattern(cmap, one.settings.pattern)
