@@ -21,6 +21,7 @@ from hexwrap_solver.explore.offers import (
     Offer,
     OtherKey,
     Trimmed,
+    corners_offer,
     isometric_bounds,
     isometric_map,
     isometric_offer,
@@ -34,12 +35,13 @@ from hexwrap_solver.panels.fit import fit_key
 from hexwrap_solver.panels.quantize import curve_key, size_key, trade_off
 from hexwrap_solver.panels.types import Components, ComponentSettings, Panels, PanelSettings, Quality, Support
 from hexwrap_solver.pattern import lay_pattern
+from hexwrap_solver.pattern.lattice import LATTICES
 from hexwrap_solver.pattern.types import Pattern, PatternSettings
 from hexwrap_solver.setting import Setting
 from hexwrap_solver.singularities.outlook import PATCHES, ProspectKey, outlook, prospects, seats, worth_a_look
 from hexwrap_solver.singularities.solve import SIZES, closed_map, needs_singularities, seated
 from hexwrap_solver.singularities.types import Choices, SingularitySettings
-from hexwrap_solver.surface.curvature import saddle_share
+from hexwrap_solver.surface.curvature import is_flat_with_cones, saddle_share
 from hexwrap_solver.surface.holes import fill_openings
 from hexwrap_solver.surface.types import Surface
 from hexwrap_solver.threads import one_blas_thread
@@ -230,9 +232,30 @@ def _with_choices(
                     after="map",
                 )
                 offers += isometric_offer(bounds, panels.sizes, left)
+        if choices is None or not choices.number[choices.taken]:
+            offers += _corners_offer(cmap, laid, made, panels.sizes, left, run)
     best = max(offers, key=lambda offer: offer.saved, default=None)
     notes = quality.notes if best is None or laid.proposes else (*quality.notes, best.note)
     return replace(quality, singularities=choices, notes=notes)
+
+
+def _corners_offer(
+    cmap: ConformalMap, laid: Pattern, made: Panels, sizes: int, left: float, run: StageRunner
+) -> list[Offer]:
+    """What quads would bring a building that is flat but for its corners."""
+    flat = run(
+        "flat",
+        None,
+        lambda progress: is_flat_with_cones(fill_openings(cmap.surface), LATTICES["quad"].quantum),
+        after="map",
+    )
+    if not flat or len(cmap.cones):
+        return []
+    key = replace(ProspectKey.of(cmap.surface, laid), kind="quad")
+    known = run("seats", "quad", lambda progress: seats(cmap.surface, "quad"), after="map")
+    found = run("outlook", key, lambda progress: prospects(known, cmap.surface, key), after="map")
+    types = len(made.class_length) + int((made.size < 0).sum())
+    return corners_offer(found, laid, sizes, left, types)
 
 
 def _map(surface: Surface, settings: SolveSettings, run: StageRunner) -> tuple[ConformalMap, Choices | None]:
@@ -245,7 +268,9 @@ def _map(surface: Surface, settings: SolveSettings, run: StageRunner) -> tuple[C
         make = best_boundary_map if boundary.mode == "auto" else conformal_map
         return run("map", boundary, lambda progress: make(surface, boundary, progress)), None
     if boundary.mode == "auto":  # ends that are free take up what singularities need
-        boundary = replace(boundary, mode="isometric")
+        quantum = LATTICES[pattern.cell_kind if pattern else "hex"].quantum
+        flat = is_flat_with_cones(fill_openings(surface), quantum)
+        boundary = replace(boundary, mode="straight" if flat else "isometric")
     surface = fine_enough(surface, PATCHES)
     wanted = asked
     sizes = settings.panels.sizes if settings.panels is not None else None

@@ -27,6 +27,8 @@ LINEAR, LITTLE, EXACT = 1.2, 0.003, 0.006
 #: A smaller share of the surface without cells is not worth cutting some; covered by cut cells, each a type
 #: of its own, it counts for so much.
 BARE, CUT = 0.05, 0.5
+#: Cells that differ by less than this are equally large. More types of panels than these are many.
+EVEN, FEW_TYPES = 1.01, 20
 #: Numbers of sizes that are foreseen at once, so that another one asks for no other map.
 MOST_SIZES = 40
 
@@ -88,6 +90,24 @@ def outlook_offer(found: Prospects, laid: Pattern, sizes: int, left: float, poin
         f"{left:.1%}{more}: ask for singularities {number} with boundary.mode isometric."
     )
     return [Offer(left - bound + pointed, note)]
+
+
+def corners_offer(found: Prospects, laid: Pattern, sizes: int, left: float, types: int) -> list[Offer]:
+    """Quads around the corners of a building that is flat but for these, where they leave hardly more open in
+    few types of panels. found: of quads. types: of panels now."""
+    choices = found.choices
+    even = np.flatnonzero((choices.number > 0) & (choices.ratio < EVEN))
+    if not len(even) or types <= FEW_TYPES:
+        return []
+    bound = LINEAR * float(uncovered_then(found, laid, sizes)[even[0]]) + LITTLE
+    if bound > left + SAVED:
+        return []
+    note = (
+        f"The surface is flat but for {choices.number[even[0]]} corners of quarter turns: pattern.kind "
+        f"quad with singularities auto and no boundary.mode would leave less than {bound:.1%} uncovered in "
+        f"one size and a few kinds along the folds, instead of {left:.1%} in {types} types of panels."
+    )
+    return [Offer(1.0, note)]
 
 
 def plain_is_better(found: Prospects, laid: Pattern, sizes: int, left: float) -> bool:

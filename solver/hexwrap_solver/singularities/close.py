@@ -47,6 +47,8 @@ ROUGH = 1e-7
 CHORDS, CHORD_GAIN, SMALL = 60, 0.3, 1e-12
 #: Rotations and scales of the lattice that are tried where nothing is aligned.
 TURNS, SCALES = 48, 9
+#: Where the scale may change by more than the first, only so many places have their integers searched.
+WIDE, FEW = 0.2, 8
 
 
 @dataclass(frozen=True)
@@ -447,7 +449,16 @@ class Closing:
         factors = self._factors()
         if self.line is None:
             factors = [self._least(changed, np.array(factors))]
+        elif self.free_scale > WIDE:
+            factors = self._nearest(np.array(factors))
         return min((self._goal(changed, factor) for factor in factors), key=lambda goal: goal.cost)
+
+    def _nearest(self, factors: Complexes) -> list[complex]:
+        """Of many places of the lattice a few from which translations are nearest as they are."""
+        wanted = factors[:, None] * self.base.image[self.kept]
+        nearest = near_lattice(wanted / self.divisor, self.order) @ self.zeta ** np.arange(2) * self.divisor
+        off = (abs(nearest - wanted) ** 2).sum(axis=1)
+        return list(factors[np.argsort(off, kind="stable")[:FEW]].tolist())
 
     def _least(self, changed: list[Holonomy], factors: Complexes) -> complex:
         """Of many places of the lattice the one whose nearest translations ask for the least moves."""

@@ -22,6 +22,7 @@ from hexwrap_solver.conformal.fixed import minimise
 from hexwrap_solver.conformal.types import Targets
 from hexwrap_solver.linalg.factor import Factorisation
 from hexwrap_solver.singularities.types import Rules
+from hexwrap_solver.surface.curvature import cone_points
 from hexwrap_solver.surface.types import Surface
 from hexwrap_solver.tolerances import TINY
 
@@ -32,6 +33,8 @@ PATCHES = 1200
 SOLVED, FEWEST = 1.5e7, 400
 #: Right-hand sides solved at a time.
 BLOCK = 128
+#: More vertices than these at which the surface is a cone are roughness, and no seats of their own.
+MOST_CONES = 100
 #: What the area of filled openings counts.
 NOTHING = 1e-6
 
@@ -88,7 +91,8 @@ class Model:
     None elsewhere. turn: (q,) for two straight loops on a tube: where seats stand around it, in turns; Σ
     k·turn quanta is how far the second loop is turned against the first. orbits: per seat all vertices that
     get a singularity along with it, where places must be symmetric, and member_place: where these are; None:
-    the seat alone.
+    the seat alone. cone: (q,) k of the cone that the surface is there already, 0 elsewhere; None where not
+    all of its cones are seats.
     """
 
     seat: Ints
@@ -104,6 +108,7 @@ class Model:
     turn: Floats | None = None
     orbits: Ragged | None = None
     member_place: Floats | None = None
+    cone: Ints | None = None
 
     @cached_property
     def size(self) -> Ints:
@@ -112,7 +117,9 @@ class Model:
 
     def on(self, kept: Bools) -> Model:
         """With fewer seats. kept: (q,) of a model without orbits and turns."""
-        return replace(self, seat=self.seat[kept], place=self.place[kept], response=self.response[:, kept])
+        cone = None if self.cone is None or self.cone[~kept].any() else self.cone[kept]
+        seat, place, response = self.seat[kept], self.place[kept], self.response[:, kept]
+        return replace(self, seat=seat, place=place, response=response, cone=cone)
 
 
 def vertex_areas(surface: Surface) -> Floats:
@@ -273,7 +280,17 @@ class Responses:
             around,
             together,
             None if together is None else places,
+            self._cone(seats) if together is None else None,
         )
+
+    def _cone(self, seats: Ints) -> Ints | None:
+        """(q,) see ``Model``."""
+        points, index = cone_points(self.surface, self.rules.quantum)
+        if len(points) > MOST_CONES or not np.isin(points, seats).all():
+            return None
+        at = np.zeros(len(self.surface.vertices), dtype=np.int64)
+        at[points] = index
+        return at[seats]
 
 
 def linear_model(
@@ -355,7 +372,11 @@ def _means(points: Floats, group: Ints, weight: Floats) -> Floats:
 
 
 def _seats(surface: Surface, seat: Ints, rules: Rules) -> Ints:
-    """Of the patches' middles, and the vertices next to the middles of balls, those that the rules leave."""
+    """Of the patches' middles, the vertices next to the middles of balls, and those at which the surface is a
+    cone already, those that the rules leave."""
+    cones, _ = cone_points(surface, rules.quantum)
+    if len(cones) <= MOST_CONES:
+        seat = np.concatenate([seat, np.setdiff1d(cones, seat)])
     if rules.only is not None:  # a ball may be smaller than a patch
         near = np.asarray(cKDTree(surface.vertices).query(rules.only[:, :3])[1], dtype=np.int64)
         seat = np.concatenate([seat, np.setdiff1d(near, seat)])
@@ -371,6 +392,9 @@ def _allowed(surface: Surface, seat: Ints, rules: Rules) -> Bools:
         allowed &= ~np.isin(seat, loop)
     if surface.patch is not None:  # what is cut out again
         allowed &= np.isin(seat, surface.faces[~surface.patch])
+    on_cone = np.isin(seat, cone_points(surface, rules.quantum)[0])
+    for line, cells in rules.creases:  # which end or meet at cones
+        allowed &= on_cone | (distance_to(place, line) >= cells * rules.cell)
     for line, cells in rules.away:
         allowed &= distance_to(place, line) >= cells * rules.cell
     if rules.only is not None:

@@ -13,7 +13,7 @@ from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.pattern.lattice import LATTICES
 from hexwrap_solver.pattern.types import Kind, Pattern
 from hexwrap_solver.singularities.linear import Model, Responses, vertex_areas
-from hexwrap_solver.singularities.search import Search, ranked
+from hexwrap_solver.singularities.search import Search, ranked, state_of_cones
 from hexwrap_solver.singularities.sizes import uncovered, uncovered_by, within
 from hexwrap_solver.singularities.types import Choices, End, Rules
 from hexwrap_solver.surface.holes import fill_openings
@@ -101,6 +101,11 @@ def prospects(found: Seats, surface: Surface, key: ProspectKey) -> Prospects:
         return Prospects(Choices.of((), 0, CURVE, found.vertices), np.zeros((0, CURVE)))
     search = Search(model, rules)
     best = [states[0] for states in ranked(search, starts=0, refine=False) if states]
+    cones = state_of_cones(search)
+    if cones is not None:  # for as many, they are the best, or all others are as good
+        best = sorted(
+            [one for one in best if len(one.seat) != len(cones.seat)] + [cones], key=lambda one: len(one.seat)
+        )
     choices = Choices.of([search.proposal(state) for state in best], 0, CURVE, found.vertices)
     area = model.weight * surface.areas.sum()
     left = [uncovered_by(*within(u, model.steepness.of(u), area), CURVE) for u in map(search.scale, best)]

@@ -88,7 +88,7 @@ def _curve(known: Responses, patience: int | None, group: Group | None = None) -
     if group is not None:
         kept = partial(orbits, known.surface, group=group, rules=rules)
     model = known.model(known.seats(), kept)
-    if not len(model.seat) and (rules.away or rules.only is not None):
+    if not len(model.seat) and (rules.away or rules.creases or rules.only is not None):
         raise SingularitiesError(
             "The rules leave no place for a singularity: it would have to stand "
             f"{rules.from_loops:g} cells from the boundary (a cell is {rules.cell:.3g} wide), off the lines "

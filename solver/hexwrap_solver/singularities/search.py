@@ -477,7 +477,24 @@ def curve(
             break
         if least is not None and max(found) >= search.rules.enough and least.uncovered <= MUCH:
             break
+    cones = state_of_cones(search)
+    if cones is not None:
+        one = search.proposal(cones)
+        if one.count not in found or one.uncovered < found[one.count].uncovered:
+            found[one.count] = one
     return [found[number] for number in sorted(found)]
+
+
+def state_of_cones(search: Search) -> State | None:
+    """Singularities at all cones that the surface has already, around which it may be flat: no search that
+    adds one after the other comes to all of them. None where it has none, or the rules forbid them."""
+    cone = search.model.cone
+    if cone is None or not cone.any() or abs(cone).max() > search.rules.largest:
+        return None
+    seat = np.flatnonzero(cone)
+    pairs = list(zip(seat.tolist(), cone[seat].tolist(), strict=True))
+    state = State.of(pairs, (0,) * max(len(search.model.free) - 1, 0))
+    return search.with_loops(state) if search.complete(state) else None
 
 
 def ranked(search: Search, starts: int = STARTS, refine: bool = True) -> Iterator[list[State]]:

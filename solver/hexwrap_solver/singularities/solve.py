@@ -34,6 +34,7 @@ from hexwrap_solver.singularities.drag import refined, rims
 from hexwrap_solver.singularities.linear import Tube, targets, vertex_areas
 from hexwrap_solver.singularities.place import Proposals, given, place
 from hexwrap_solver.singularities.types import End, Proposal, Rules, SingularitySettings
+from hexwrap_solver.surface.curvature import cone_points
 from hexwrap_solver.surface.holes import fill_openings
 from hexwrap_solver.surface.types import Surface
 
@@ -44,6 +45,11 @@ SIZES = 11
 MOST, MORE, MANY = 8, 2, 18
 #: The size of the cells may change by this share, and by this one where a length is asked for.
 FREE, ASKED = 0.05, 0.015
+#: And by this one, a logarithm, where singularities stay at the corners of a building: the sizes that divide
+#: what lies between them are few.
+AT_CONES = 0.7
+#: There they stay if the pattern closes after moves of so many cells; else it is bent.
+STAYS = 1e-3
 #: Where the least moves that close are longer than this, in cells, singularities are seated anew, this many
 #: times.
 FAR, AGAIN = 0.6, 2
@@ -123,7 +129,8 @@ def frame_of(
         enough=enough,
         from_loops=settings.from_boundary,
         angles=angles if "angles" in ends else None,
-        away=_lines(surface, settings, width),
+        away=_lines(surface, settings),
+        creases=_creases(surface, settings.from_features, width),
         only=np.array([[*one.point, one.radius or width] for one in settings.only])
         if settings.only
         else None,
@@ -162,19 +169,22 @@ def _parts_left(lattice: Lattice, k: int) -> int:
     return around - k * around // lattice.order
 
 
-def _lines(surface: Surface, settings: SingularitySettings, width: float) -> tuple[tuple[Floats, float], ...]:
-    """Polylines to keep away from, with how many cells: creases, unless these are everywhere, as on a faceted
-    surface, or all vertices lie on them, as on a coarse box; the rims of filled openings, and the curves that
-    were asked for."""
+def _lines(surface: Surface, settings: SingularitySettings) -> tuple[tuple[Floats, float], ...]:
+    """Polylines to keep away from, with how many cells: the rims of filled openings, and those asked for."""
+    asked = ((np.array(one.line, dtype=float), one.distance) for one in settings.keep_off)
+    return (*((surface.vertices[edge], settings.from_features) for edge in rims(surface)), *asked)
+
+
+def _creases(surface: Surface, distance: float, width: float) -> tuple[tuple[Floats, float], ...]:
+    """Likewise creases, unless these are everywhere, as on a faceted surface, or all vertices lie on them, as
+    on a coarse box."""
     creases = [surface.vertices[feature.vertices] for feature in surface.features]
     length = sum(float(np.linalg.norm(np.diff(crease, axis=0), axis=1).sum()) for crease in creases)
     creased = {v for feature in surface.features for v in feature.vertices.tolist()}
-    is_faceted = 2 * length * settings.from_features * width > FACETED * vertex_areas(surface).sum()
+    is_faceted = 2 * length * distance * width > FACETED * vertex_areas(surface).sum()
     if is_faceted or len(creased) == len(surface.vertices):
-        creases = []
-    asked = [(np.array(one.line, dtype=float), one.distance) for one in settings.keep_off]
-    creases += [surface.vertices[edge] for edge in rims(surface)]
-    return (*((crease, settings.from_features) for crease in creases), *asked)
+        return ()
+    return tuple((crease, distance) for crease in creases)
 
 
 @dataclass(frozen=True)
@@ -282,6 +292,8 @@ def closed_map(
         if len(surface.loops) > 2 and set(frame.rules.ends) == {"free"}:
             return map_of_curvatures(surface, frame.rules.quantum * np.array(proposal.loops), progress)
         return conformal_map(surface, boundary, progress)
+    if is_cones(surface, proposal, frame.lattice.quantum):
+        return _at_cones(surface, frame, placing, progress)
     work = Work(WORK)
     try:
         return first_that_closes(surface, frame, placing, progress, work)
@@ -313,7 +325,23 @@ def first_that_closes(
     raise failed
 
 
-def unmoved(frame: Frame, seats: Seats, progress: Progress) -> ConformalMap:
+def _at_cones(surface: Surface, frame: Frame, placing: Proposals, progress: Progress) -> ConformalMap:
+    """With the singularities that the surface has already: moved, each would be two. Cells are of a size near
+    the one wanted that divides what lies between them, or bent where there is none."""
+    try:
+        chart, found = closed_at(surface, frame, placing.proposal, progress, Work(WORK), stays=True)
+    except ConvergenceError:
+        why = "no size of the cells near the one wanted divides what lies between them"
+        return unmoved(frame, Seats.of(surface, frame, placing.proposal), progress, why)
+    return as_map(frame, chart, found, placing, surface)
+
+
+def unmoved(
+    frame: Frame,
+    seats: Seats,
+    progress: Progress,
+    why: str = "they cannot be moved on this mesh until the pattern closes around each",
+) -> ConformalMap:
     """The map with the singularities at vertices, for which the pattern is bent until it closes. Triangles
     may be flipped, so that there always is one. Raises ConvergenceError where doubles do not suffice."""
     surface, rules, cones = (
@@ -327,8 +355,8 @@ def unmoved(frame: Frame, seats: Seats, progress: Progress) -> ConformalMap:
     )
     found = map_to(surface, wanted, cones, None, progress)
     note = (
-        f"{in_words(frame.lattice.kind, cones.index).capitalize()}: they cannot be moved on this mesh until "
-        "the pattern closes around each, so that it is bent beside them; smaller cells are bent less."
+        f"{in_words(frame.lattice.kind, cones.index).capitalize()}: {why}, so that the pattern is bent "
+        "beside them; smaller cells are bent less."
     )
     return replace(on_area(found), notes=(*found.notes, note))
 
@@ -370,10 +398,16 @@ class Work:
 
 
 def closed_at(
-    surface: Surface, frame: Frame, proposal: Proposal, progress: Progress, work: Work
+    surface: Surface,
+    frame: Frame,
+    proposal: Proposal,
+    progress: Progress,
+    work: Work,
+    *,
+    stays: bool = False,
 ) -> tuple[Chart, Closed]:
     """Seated anew at the nearest vertices where the first moves would be too long, or the mesh does not allow
-    them."""
+    them. stays: they must not move; the size of the cells may change the more, where none is asked for."""
     failed: ConvergenceError | None = None
     seats = Seats.of(surface, frame, proposal)
     finer, vertex, index = seats.surface, seats.vertex, seats.index
@@ -381,19 +415,22 @@ def closed_at(
     quantum, ends, angles = frame.lattice.quantum, frame.rules.ends, frame.rules.angles
     chart: Chart | None = None
     share = max(1.0, len(index) / USUAL)
+    scale = AT_CONES if stays and frame.free_scale == FREE else frame.free_scale
     for again in range(AGAIN + 1):
         try:
             chart = None if chart is None or finer is not chart.surface else chart.reseated(vertex)
             chart = chart or Chart(
                 finer, vertex, index, proposal.loops, ends, quantum, frame.width, slope, angles
             )
-            closing = Closing(chart, frame.width, frame.line, frame.free_scale, frame.aligned)
+            closing = Closing(chart, frame.width, frame.line, scale, frame.aligned)
         except ConvergenceError as error:
             work.left -= HARD * share * len(finer.vertices)
             raise failed or error from None
         finer = chart.surface
         work.left -= share * len(finer.vertices)
         off = float(np.linalg.norm(closing.moves, axis=1).max())
+        if stays and off > STAYS:
+            raise ConvergenceError("Cells of this size do not fit between the corners of the surface.")
         if off < work.off:
             work.off, work.seats = off, Seats(finer, vertex, index, proposal.loops)
         last = again == AGAIN or work.left <= 0
@@ -414,6 +451,13 @@ def closed_at(
         vertex = nearest
     assert failed is not None
     raise failed
+
+
+def is_cones(surface: Surface, proposal: Proposal, quantum: float) -> bool:
+    """Whether the singularities are the cones that the surface has already, all of them."""
+    points, index = cone_points(surface, quantum)
+    order = np.argsort(proposal.vertex)
+    return np.array_equal(proposal.vertex[order], points) and np.array_equal(proposal.index[order], index)
 
 
 def _slope(before: Surface, tube: Tube, surface: Surface) -> Floats:

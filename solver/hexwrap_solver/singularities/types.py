@@ -96,7 +96,8 @@ class Rules:
     number of size classes. ends: per loop of the surface. most: number of singularities, at most; enough:
     more than so many only where these leave much open.
     from_loops: cells between a singularity and a loop; apart, opposite: between two of the same and of
-    opposite signs. away: polylines (k, 3), each with how many cells they must keep from it. only: (k, 4)
+    opposite signs. away: polylines (k, 3), each with how many cells they must keep from it; creases: further
+    ones, but for vertices at which the surface is a cone already. only: (k, 4)
     centres and radii of balls in which they must stand, None: anywhere. largest: greatest |k| of one.
     symmetric: see ``SingularitySettings``. angles: (n,) target angles at boundary vertices of loops
     whose ends are "angles"; None: there are none.
@@ -112,6 +113,7 @@ class Rules:
     apart: float = 3.0
     opposite: float = 5.0
     away: tuple[tuple[Floats, float], ...] = ()
+    creases: tuple[tuple[Floats, float], ...] = ()
     only: Floats | None = None
     largest: int = 1
     angles: Floats | None = None

@@ -95,3 +95,18 @@ def renumbered(surface: Surface, seed: int) -> tuple[Surface, Ints]:
     new = np.argsort(order)
     faces = new[surface.faces][rng.permutation(len(surface.faces))]
     return surface_of(surface.vertices[order], faces), new
+
+
+def setbacks(sizes: list[tuple[float, float]], heights: list[float]) -> Surface:
+    """Boxes without floor and roof on top of each other, with ledges between them: rectangles joined in turn
+    by walls and by ledges, each side by two triangles."""
+    rings, low = [], 0.0
+    for (a, b), height in zip(sizes, heights, strict=True):
+        rings += [(a, b, low), (a, b, low + height)]
+        low += height
+    corner = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) / 2
+    vertices = [np.column_stack([corner * (a, b), np.full(4, z)]) for a, b, z in rings]
+    k = np.arange(4)
+    side = np.stack([k, (k + 1) % 4, (k + 1) % 4 + 4, k + 4], axis=1)
+    quads = np.concatenate([side + 4 * i for i in range(len(rings) - 1)])
+    return surface_of(np.concatenate(vertices), np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]))
