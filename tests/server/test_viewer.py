@@ -295,6 +295,14 @@ class TestResult:
         assert tower.evaluate(f"() => {{ {INSIDE} {normal} return {facing} }}") > 0.4
         wide = tower.viewport_size
         tower.click("#fit")
+        # clear of what lies over the view
+        assert tower.evaluate(
+            f"""() => {{ {INSIDE} const at = space.element.getBoundingClientRect();
+            const [bar, legend] = [".bar", "#legend"].map((n) => document.querySelector(n))
+            .map((one) => one.getBoundingClientRect());
+            return state.result.mesh.vertices.map((p) => space.project(p))
+            .every(({{ x, y }}) => y > bar.bottom - at.top && x > legend.right - at.left) }}"""
+        )
         tower.set_viewport_size({"width": 860, "height": 720})
         tower.wait_for_function(
             f"""() => {{ {INSIDE} return state.result.mesh.vertices.map((p) => space.project(p))
@@ -812,6 +820,19 @@ def test_theme_and_keyboard(browser, server: Server) -> None:
             if not wanted:
                 break
         assert not wanted
+
+
+@pytest.mark.parametrize("width", [900, 420])
+def test_narrow_windows_show_everything_one_below_the_other(browser, server: Server, width: int) -> None:
+    with opened(browser, server) as page:
+        page.set_viewport_size({"width": width, "height": 700})
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+        view, work, result = (page.locator(name).bounding_box() for name in ("main", "#side", "#right"))
+        assert view["width"] == width
+        assert view["height"] > 300
+        assert min(work["y"], result["y"]) >= view["y"] + view["height"]
+        assert work["x"] + work["width"] <= result["x"] or work["y"] + work["height"] <= result["y"]
+        page.locator("#copy-gh").scroll_into_view_if_needed()
 
 
 @pytest.fixture(scope="module")

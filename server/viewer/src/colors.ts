@@ -124,9 +124,10 @@ export function colour(result: Result, mode: Mode): Colouring {
     const table = new Map(result.sizes.map((s) => [s.size, rgb(s.color)]));
     for (let i = 0; i < n; i++) colors.set(table.get(result.panels!.size[i]) ?? UNSIZED, 3 * i);
     const types = collected(result);
-    const lengths = types.filter((s) => !s.types).map((s) => s.edge_length);
+    const lengths = (result.sizes ?? []).slice(0, regular(result.sizes ?? [], result.quality.trade_off?.taken)).map((s) => s.edge_length);
+    const digits = digitsApart(lengths);
     const rows = types.map((s) => ({
-      color: s.color, label: s.types ? `${s.types} other types` : number(s.edge_length, digitsApart(lengths)), count: s.count,
+      color: s.color, label: s.types ? `${s.types} other types` : number(s.edge_length, digits), count: s.count,
     }));
     const unsized = result.panels!.size.filter((s) => s < 0).length;
     if (unsized) rows.push({ color: `rgb(${UNSIZED.join(" ")})`, label: "cut to fit", count: unsized });

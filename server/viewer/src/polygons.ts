@@ -214,7 +214,8 @@ export class PolygonLayer {
     const target = new THREE.WebGLRenderTarget(1, 1);
     const clear = renderer.getClearColor(new THREE.Color());
     const alpha = renderer.getClearAlpha();
-    camera.setViewOffset(w, h, x, y, 1, 1);
+    const view = camera.view && { ...camera.view };
+    camera.setViewOffset(w, h, x + (view?.offsetX ?? 0), y + (view?.offsetY ?? 0), 1, 1);
     camera.updateProjectionMatrix();
     const before = renderer.getRenderTarget();
     renderer.setRenderTarget(target);
@@ -225,7 +226,8 @@ export class PolygonLayer {
     renderer.readRenderTargetPixels(target, 0, 0, 1, 1, pixel);
     renderer.setRenderTarget(before);
     renderer.setClearColor(clear, alpha);
-    camera.clearViewOffset();
+    if (view) camera.setViewOffset(view.fullWidth, view.fullHeight, view.offsetX, view.offsetY, view.width, view.height);
+    else camera.clearViewOffset();
     camera.updateProjectionMatrix();
     target.dispose();
     const id = pixel[0] + (pixel[1] << 8) + (pixel[2] << 16);

@@ -15,6 +15,8 @@ export interface Toggles {
 }
 
 const MAX_LABELS = 120;
+/** What lies over the view and hides what is under it. */
+const OVERLAYS = ".bar, #legend";
 
 export class View3D {
   readonly renderer: THREE.WebGLRenderer;
@@ -66,7 +68,8 @@ export class View3D {
     this.scene.add(new THREE.HemisphereLight(0xffffff, 0x9aa0a4, 2.1), this.content, this.layer.group, this.normals, this.supports, this.camera);
     this.headlight.position.set(0.5, 0.8, 1);
     this.camera.add(this.headlight);
-    new ResizeObserver(() => this.resize()).observe(element);
+    const observer = new ResizeObserver(() => this.resize());
+    for (const one of [element, ...element.querySelectorAll(OVERLAYS)]) observer.observe(one);
     canvas.addEventListener("keydown", (event) => this.key(event));
     // In the capturing phase, before the controls begin to turn the camera.
     canvas.addEventListener("pointerdown", (event) => this.grab(event), { capture: true });
@@ -97,6 +100,8 @@ export class View3D {
     if (!w || !h) return;
     this.renderer.setSize(w, h);
     this.camera.aspect = w / h;
+    const view = this.camera.view;
+    if (view) this.camera.setViewOffset(w, h, (view.offsetX / view.fullWidth) * w, (view.offsetY / view.fullHeight) * h, w, h);
     this.camera.updateProjectionMatrix();
     if (this.fitted) this.fit();
     this.render();
@@ -121,8 +126,23 @@ export class View3D {
     this.invalidate();
   }
 
+  /** What toolbar and legend leave of the view: its middle and size, as parts of the whole. */
+  private free(): { x: number; y: number; w: number; h: number } {
+    const whole = this.element.getBoundingClientRect();
+    let [left, top] = [0, 0];
+    for (const one of this.element.querySelectorAll(OVERLAYS)) {
+      const { right, bottom, width, height } = one.getBoundingClientRect();
+      if (!height) continue;
+      if (one.id !== "legend") top = Math.max(top, (bottom - whole.top) / whole.height);
+      else if (width < 0.4 * whole.width) left = (right - whole.left) / whole.width;
+    }
+    return { x: (1 + left) / 2, y: (1 + top) / 2, w: 1 - left, h: 1 - top };
+  }
+
   /** Moves the camera so that everything is seen; keeps the direction of view. */
   fit(): void {
+    const free = this.free();
+    const { clientWidth: w, clientHeight: h } = this.element;
     const center = this.box.getCenter(new THREE.Vector3());
     const direction = this.camera.position.clone().sub(this.controls.target);
     if (direction.lengthSq() < 1e-12 || !Number.isFinite(direction.x)) direction.set(1, -1.6, 0.7);
@@ -133,13 +153,13 @@ export class View3D {
     const half = Math.tan(THREE.MathUtils.degToRad(this.camera.fov / 2));
     const { min, max } = this.box;
     const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((k) => new THREE.Vector3(k & 1 ? max.x : min.x, k & 2 ? max.y : min.y, k & 4 ? max.z : min.z).sub(center));
-    const distance = 1.08 * Math.max(...corners.map((c) => c.dot(back) + Math.max(Math.abs(c.dot(right)) / this.camera.aspect, Math.abs(c.dot(up))) / half));
+    const distance = 1.08 * Math.max(...corners.map((c) => c.dot(back) + Math.max(Math.abs(c.dot(right)) / (this.camera.aspect * free.w), Math.abs(c.dot(up)) / free.h) / half));
     this.fitted = true;
     this.controls.target.copy(center);
     this.camera.position.copy(center).addScaledVector(back, distance);
     this.camera.near = distance / 200;
     this.camera.far = distance * 20;
-    this.camera.updateProjectionMatrix();
+    this.camera.setViewOffset(w, h, (0.5 - free.x) * w, (0.5 - free.y) * h, w, h);
     this.invalidate();
   }
 
