@@ -69,7 +69,8 @@ class Frame:
     """What the singularities of one surface are chosen and closed for.
 
     width: of a cell, which is that of the surface as of the domain. line: for straight loops that are to be
-    lattice lines; aligned: which ones. tube: where both are.
+    lattice lines; aligned: which ones. tube: where both are. free_scale: share by which the width may change.
+    any_size: whether none is asked for.
     """
 
     lattice: Lattice
@@ -79,6 +80,7 @@ class Frame:
     aligned: tuple[bool, ...]
     tube: Tube | None
     free_scale: float
+    any_size: bool = False
 
 
 def needs_singularities(surface: Surface, boundary: BoundaryCondition) -> bool:
@@ -142,7 +144,8 @@ def frame_of(
         straight_tube = Tube(tube.uv[:n] / tube.circumference, tube.log_scale[:n])
     free_scale = ASKED if pattern.edge_length is not None else FREE
     line = _line(lattice, angle, pattern.boundary) if any(aligned) else None
-    return Frame(lattice, rules, width, line, aligned, straight_tube, free_scale)
+    any_size = pattern.edge_length is None and pattern.around is None
+    return Frame(lattice, rules, width, line, aligned, straight_tube, free_scale, any_size)
 
 
 def _check_kind(lattice: Lattice, settings: SingularitySettings) -> None:
@@ -415,7 +418,7 @@ def closed_at(
     quantum, ends, angles = frame.lattice.quantum, frame.rules.ends, frame.rules.angles
     chart: Chart | None = None
     share = max(1.0, len(index) / USUAL)
-    scale = AT_CONES if stays and frame.free_scale == FREE else frame.free_scale
+    scale = AT_CONES if stays and frame.any_size else frame.free_scale
     for again in range(AGAIN + 1):
         try:
             chart = None if chart is None or finer is not chart.surface else chart.reseated(vertex)

@@ -65,9 +65,13 @@ def test_quads_of_one_size_where_an_edge_divides_all(surface, edge: float) -> No
     assert made.quality.coverage > 0.997
 
 
-def test_an_edge_that_is_asked_for_is_kept() -> None:
+def test_a_size_that_is_asked_for_is_kept() -> None:
     asked = replace(AUTO, pattern=PatternSettings(kind="quad", edge_length=2.0))
     assert solved(TWO, asked).panels.class_length[0] == pytest.approx(2.0)
+    asked = replace(AUTO, pattern=PatternSettings(kind="quad", around=78))
+    found = solved(TWO, asked)  # as many cells as without singularities: the nearest edge that fits
+    assert found.panels.class_length[0] == pytest.approx(0.8)
+    assert found.pattern.distortion < 1e-9
 
 
 def test_corners_stay_where_no_edge_divides_what_is_between_them() -> None:
