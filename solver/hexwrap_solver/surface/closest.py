@@ -304,9 +304,11 @@ class TriangleTree:
     def _nearest(self, points: Floats) -> tuple[Ints, Floats, Floats]:
         """The triangle with the nearest centroid bounds the search of the others."""
         first = np.asarray(self.centroids.query(points)[1])
-        bound = nearest_in_triangles(points, self.corners[first])[1]
+        guess = self.corners[first]
+        bound = nearest_in_triangles(points, guess)[1]
         # Rounding, of the distance as of the boxes, must not prune the guess itself.
-        reach = bound * (1 + RELATIVE) + ROUNDINGS * np.finfo(float).eps * np.abs(points).max(axis=1)
+        scale = np.maximum(np.abs(points).max(axis=1), np.abs(guess).max(axis=(1, 2)))
+        reach = bound * (1 + RELATIVE) + ROUNDINGS * np.finfo(float).eps * scale
         reach += np.finfo(float).tiny
         found = self._within(points, reach)
         if found is None:

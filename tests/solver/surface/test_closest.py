@@ -35,6 +35,14 @@ def test_tree_search_is_exact(seed, faces, flatness):
     assert np.allclose(found.barycentric.sum(axis=1), 1)
 
 
+def test_a_point_beside_a_corner_at_the_origin_is_found():
+    """Its distance is rounding of the corners' coordinates, which are large beside its own."""
+    corners = np.array([[0.0, 0.25, 0.625], [0.0, 0.0, 0.0], [0.0, 0.0, 0.625]])
+    point = np.array([[-4.04720376e-19, -1.13193909e-20, 3.58042662e-19]])
+    found = TriangleTree.build(corners, np.array([[0, 1, 2]])).nearest(point)
+    assert found.distance == pytest.approx([0.0], abs=1e-15)
+
+
 @settings(max_examples=40, deadline=None)
 @given(st.integers(0, 10**6), st.booleans())
 def test_farthest_of_a_row_is_exact_whatever_triangles_are_guessed(seed, good):
