@@ -15,6 +15,7 @@ from hexwrap_solver.pattern.trim.folds import Seams
 from hexwrap_solver.pattern.types import PatternFeature
 from hexwrap_solver.surface.features import FeatureEdges
 from hexwrap_solver.tolerances import RELATIVE
+from hexwrap_solver.words import were
 
 
 def on_features(
@@ -87,10 +88,10 @@ def feature_notes(features: tuple[PatternFeature, ...]) -> list[str]:
     cut, folds = sum(feature.cut for feature in straight), [np.rad2deg(f.fold) for f in straight]
     worst = max(feature.distortion or 0.0 for feature in straight)
     one = len(straight) == 1
+    beside = f", at a distortion of {worst:.2g} beside them" if worst > RELATIVE else ""
     angle = f"{min(folds):.0f}°" if np.ptp(folds) < 1 else f"{min(folds):.0f}° to {max(folds):.0f}°"
     folded = f" (folded by {angle})" if max(folds) >= 1 else ""  # drawn lines may lie flat
     return [
         f"{len(straight)} {'feature' if one else 'features'}{folded} "
-        f"{'lies' if one else 'lie'} on lines of the pattern; {cut} cells are cut there, at a distortion of "
-        f"{worst:.2g} beside them."
+        f"{'lies' if one else 'lie'} on lines of the pattern; {were(cut, 'cell')} cut there{beside}."
     ]

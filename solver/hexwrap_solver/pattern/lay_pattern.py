@@ -48,6 +48,7 @@ from hexwrap_solver.surface.features import FeatureEdges
 from hexwrap_solver.surface.normals import with_tangents
 from hexwrap_solver.surface.projection import project, start_parameters
 from hexwrap_solver.tolerances import RELATIVE
+from hexwrap_solver.words import were
 
 #: Relative error of an edge length asked for that calls for a second attempt.
 CLOSE = 0.005
@@ -391,26 +392,21 @@ def _usable(cells: Cells, outward: Bools, narrows: bool) -> tuple[Bools, int, tu
 def _trim_notes(cut: Trimmed, narrow: int, folded: int, apart: int) -> list[str]:
     notes = []
     if cut.joined:
-        notes.append(f"{cut.joined} slivers at the boundary were joined to the cut cell beside them.")
+        notes.append(f"{were(cut.joined, 'sliver')} joined at the boundary to the next cut cell.")
     if cut.lost:
-        notes.append(
-            f"{cut.lost} slivers at the boundary were left out, {cut.dropped:.2f} cells in area altogether."
-        )
+        notes.append(f"{were(cut.lost, 'sliver')} left out at the boundary, {cut.dropped:.2f} cells in area.")
     if narrow:
         notes.append(
-            f"{narrow} cells at the narrow end were left out: so few go around it there that they touch "
-            "themselves."
-            if cut.seams is None
-            else f"Cells that touch themselves were left out: {narrow}."
+            f"{were(narrow, 'cell')} left out where the surface is so narrow that a cell touches itself."
         )
     if cut.holed:
         notes.append(
-            f"{cut.holed} cells were left out because an opening lies inside them; smaller cells would go "
+            f"{were(cut.holed, 'cell')} left out because an opening lies inside; smaller cells would go "
             "around it."
         )
     if folded:
         notes.append(
-            f"{folded} cells were left out because the surface folds back within them; smaller cells would "
+            f"{were(folded, 'cell')} left out because the surface folds back there; smaller cells would "
             "follow it."
         )
     if apart:

@@ -206,7 +206,7 @@ def test_the_default_size_of_a_cone_counts_its_cells_whatever_its_narrow_end():
     cmap = annuli.flat_cone(2 * np.pi / 3, 1.0, 200.0, 60, 40)
     pattern = lay_pattern(cmap, PatternSettings())
     assert 1000 < pattern.n_cells < 3300
-    assert "narrow end" in " ".join(pattern.notes)
+    assert "so narrow" in " ".join(pattern.notes)
     check_closed(pattern)
 
 

@@ -139,10 +139,9 @@ class PlacementFamily:
             placement = self._seated(settings)
         corners = self._corner_notes(placement.straight)
         if len(sentences) > MOST_NAMED:
-            sentences = [
-                *sentences[:MOST_NAMED],
-                f"The same holds of {len(sentences) - MOST_NAMED} further folds.",
-            ]
+            more = len(sentences) - MOST_NAMED
+            same = f"The same holds of {more} further fold{'s' * (more > 1)}."
+            sentences = [*sentences[:MOST_NAMED], same]
         told = (*self.notes, *corners, *sentences, *proposed, *placement.notes)
         return replace(placement, notes=told, proposes=bool(proposed))
 
