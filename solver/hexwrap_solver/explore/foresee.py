@@ -162,6 +162,11 @@ def _candidate(asked: SolveSettings, settings: ExploreSettings, seen: Outlook, u
     if not found.panels:
         if not len(seen.size):
             return Candidate(asked, PatternError("No whole cell fits: ask for smaller cells."))
+        if panels.increment > 0 and seen.foresee(sizes, panels.joint).panels:
+            sentence = (
+                f"The increment {panels.increment:g} is longer than any panel may be: ask for a smaller "
+            )
+            return Candidate(asked, PanelsError(f"{sentence}one, or larger cells.", field=("increment",)))
         return Candidate(
             asked,
             PanelsError(

@@ -17,10 +17,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints, Progress, no_progress
+from hexwrap_solver.arrays import Bools, Complexes, Floats, Ints, Progress, no_progress, runs
 from hexwrap_solver.conformal.types import ConformalMap
 from hexwrap_solver.domain.locate import barycentric
-from hexwrap_solver.geometry import outline_area, plane_areas
+from hexwrap_solver.geometry import dot, lengths, outline_area, plane_areas
 from hexwrap_solver.panels.sizes import divide, floor_to, lengths_of, partition_by_area
 from hexwrap_solver.pattern.lattice import LATTICES, Lattice
 from hexwrap_solver.pattern.lay.nodes import lattice_points_in_triangles
@@ -45,8 +45,9 @@ HALF_EDGE = {3: (3 + 3**0.5) / 6, 4: 0.75, 6: (3 + 3**0.5) / 5}
 TRIMMED = 2.0
 #: Loops lie on lines of the pattern where so much of them does, to within so much of the distance of lines.
 MOSTLY, ASTRAY = 0.9, 0.05
-#: Points on each edge of the boundary, and of features, from which distances are taken.
-FINE = 4
+#: Edges of the boundary, and of features, are looked for by points on them: so many pieces each at least,
+#: none longer than the smallest cell's edge, but no more than this many in all.
+FINE, MOST_FINE = 3, 3000
 #: Middles are taken this far beside where they stand, in periods of the lattice, so that hardly one lies on
 #: an edge between triangles; they lie in a triangle to within rounding.
 ASIDE, ROUNDING = 1e-4 * (1 + 0.6j), 1e-9
@@ -187,6 +188,18 @@ class _Cells:
         """(c,) from their middles, on the average over all directions."""
         return np.asarray(self.sides / (2 * np.pi) * self.size)
 
+    def distance(self, line: Floats) -> Floats:
+        """(c,) of their middles from a polyline (k, 3): from the edge that has the nearest of its points."""
+        along = np.diff(line, axis=0)
+        wanted = np.ceil(lengths(along) / self.size.min(initial=np.inf))
+        pieces = np.clip(wanted, FINE, max(MOST_FINE // len(along), FINE)).astype(np.int64)
+        edge, number = runs(pieces + 1)
+        points = line[edge] + (number / pieces[edge])[:, None] * along[edge]
+        edge = edge[cKDTree(points).query(self.middle)[1]]
+        offset, along = self.middle - line[edge], along[edge]
+        share = np.clip(dot(offset, along) / np.maximum(dot(along, along), TINY), 0.0, 1.0)
+        return lengths(offset - share[:, None] * along)
+
 
 def _outlook(cmap: ConformalMap, placing: PlacementFamily, settings: PatternSettings) -> Outlook:
     lattice, placement, surface = placing.lattice, placing.at(settings), cmap.surface
@@ -260,7 +273,7 @@ def _off_loops(surface: Surface, cells: _Cells, lattice: Lattice, on_line: Bools
     for loop in surface.loops:
         row = HALF_ROW.get(lattice.kind, HALVED) * cells.size
         least = row if on_line[loop].mean() > MOSTLY else cells.reach
-        whole &= _distance(cells.middle, surface.vertices[np.append(loop, loop[0])]) > least
+        whole &= cells.distance(surface.vertices[np.append(loop, loop[0])]) > least
     return whole
 
 
@@ -269,7 +282,7 @@ def _on_features(surface: Surface, cells: _Cells, numbers: Iterable[int], straig
     bent = np.zeros(len(cells), dtype=bool)
     for i in numbers:
         least = HALVED * cells.size if i in straight else cells.reach
-        bent |= _distance(cells.middle, surface.vertices[surface.features[i].vertices]) <= least
+        bent |= cells.distance(surface.vertices[surface.features[i].vertices]) <= least
     return bent
 
 
@@ -361,12 +374,6 @@ def _middles(lattice: Lattice, corners: Complexes) -> tuple[Ints, Floats, Ints]:
         found.append((face, barycentric(corners[face], place), np.full(len(face), sides)))
     face, weight, corner = (np.concatenate(parts) for parts in zip(*found, strict=True))
     return face, weight, corner
-
-
-def _distance(points: Floats, line: Floats) -> Floats:
-    """(n,) to a polyline, all but."""
-    fine = line[:-1, None] + np.linspace(0, 1, FINE)[:, None] * np.diff(line, axis=0)[:, None]
-    return np.asarray(cKDTree(fine.reshape(-1, 3)).query(points)[0])
 
 
 def _slope(cmap: ConformalMap, area: Floats) -> Floats:

@@ -10,7 +10,7 @@ from scipy.optimize import linprog
 
 from hexwrap_solver.conformal import conformal_map
 from hexwrap_solver.conformal.types import BoundaryCondition
-from hexwrap_solver.errors import SettingError
+from hexwrap_solver.errors import PanelsError, SettingError
 from hexwrap_solver.explore.foresee import foresee, seated
 from hexwrap_solver.explore.front import by_cost, excess, front_of, non_dominated, to_solve
 from hexwrap_solver.explore.predict import outlook, shortened
@@ -25,6 +25,7 @@ from hexwrap_solver.pipeline import PlainRunner, mapped
 from hexwrap_solver.surface import with_openings
 from tests.solver.conformal.annuli import bump, catenoid
 from tests.solver.conformal.nets import holed
+from tests.solver.pattern.folded import ELL, RECTANGLE, prism
 from tests.solver.singularities.shapes import dome
 
 NEW = ("brick", "truncated-hexagonal", "truncated-square")
@@ -76,6 +77,16 @@ def test_foreseen_is_near_measured(surface, mode: str, kind: str, boundary: str)
         assert found.panels == pytest.approx(made.n_panels, rel=0.06)
         if sizes and boundary == "whole":
             assert found.types <= sizes * len(LATTICES[kind].outlines)
+
+
+@pytest.mark.parametrize("corners", [RECTANGLE, ELL], ids=["rectangle", "L"])
+def test_folds_of_coarse_meshes_are_foreseen(corners) -> None:
+    """Edges much longer than the cells cut as many as short ones do."""
+    cmap = conformal_map(prism(corners, 60.0, 60.0), BoundaryCondition("straight").adapted("hex"))
+    pattern = PatternSettings(around=32)
+    laid, seen = lay_pattern(cmap, pattern), outlook(cmap, pattern)
+    made = quantize(fit_panels(cmap, laid, PanelSettings()), PanelSettings())
+    assert seen.foresee(11).panels == pytest.approx(made.n_panels, rel=0.01)
 
 
 @pytest.mark.parametrize(
@@ -219,6 +230,22 @@ def test_numbers_of_sizes_beyond_their_limit_are_not_tried() -> None:
     settings = ExploreSettings(limits=Limits(sizes=3), variants=20)
     assert {one.sizes for one in variants(settings, 1.0)} == {1, 2, 3}
     assert {one.sizes for one in variants(replace(settings, vary=Vary(sizes=(5, 9))), 1.0)} == {3, 5}
+
+
+@pytest.mark.parametrize(
+    ("settings", "field"),
+    [
+        (PanelSettings(increment=50.0), "increment"),
+        (PanelSettings(joint=50.0), "joint"),
+        (PanelSettings(increment=0.01, joint=50.0), "joint"),
+    ],
+)
+def test_what_leaves_no_panel_is_named(settings: PanelSettings, field: str) -> None:
+    asked = ExploreSettings(panels=settings, variants=1)
+    listed = variants(asked, 0.2)[:1]
+    (one,) = foresee(lambda: bump(16, 8), asked, (), listed, PlainRunner())
+    assert isinstance(one.foreseen, PanelsError)
+    assert one.foreseen.field == (field,)
 
 
 def test_singularities_of_a_wall_with_windows_add_up_with_these_filled() -> None:
