@@ -202,6 +202,15 @@ def test_the_default_size_suits_short_rings_and_long_pipes(kind, rotation, heigh
     assert pattern.n_cells < 1.25 * 3000 or pattern.rings <= 5
 
 
+def test_smaller_edges_need_more_cells_where_a_single_ring_has_too_many():
+    needed = []
+    for edge in (1e-3, 1e-6):
+        with pytest.raises(PatternError, match="cells with edges of") as refused:
+            lay_pattern(short_ring(10.0), PatternSettings(edge_length=edge))
+        needed.append(refused.value.data["cells"])
+    assert needed[1] == pytest.approx(1e6 * needed[0], rel=0.01)
+
+
 def test_the_default_size_of_a_cone_counts_its_cells_whatever_its_narrow_end():
     cmap = annuli.flat_cone(2 * np.pi / 3, 1.0, 200.0, 60, 40)
     pattern = lay_pattern(cmap, PatternSettings())

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import sys
 from math import log
 
 import numpy as np
 
 from hexwrap_solver.arrays import Floats
 from hexwrap_solver.errors import PatternError
+from hexwrap_solver.pattern.lattice import LATTICES
 from hexwrap_solver.pattern.types import PatternSettings
 from hexwrap_solver.surface.types import Surface
-from hexwrap_solver.words import box
+from hexwrap_solver.words import box, length
 
 #: Ratios of units that are mistaken for each other: metric ones, inches and feet.
 RATIOS = (10.0, 100.0, 1000.0, 12.0, 25.4, 39.37, 304.8)
@@ -38,12 +40,18 @@ def check_edge(surface: Surface, settings: PatternSettings) -> None:
 def too_many(
     surface: Surface, settings: PatternSettings, cells: float, log_scale: Floats | None = None
 ) -> PatternError:
-    """Why that many cells would be needed, and what to do. log_scale: of the map, where there is one."""
+    """Why that many cells would be needed, and what to do. cells: counted, or those of one ring where that is
+    too many already. log_scale: of the map, where there is one."""
     edge, limit = settings.edge_length, settings.max_cells
+    if edge is not None:
+        lattice = LATTICES[settings.cell_kind]
+        along = lattice.edge / edge
+        whole = float(surface.areas.sum()) * along * along / lattice.cell_area
+        cells = min(max(cells, whole), sys.float_info.max)
     data: dict[str, object] = {"cells": int(cells), "limit": limit}
     if edge is not None and edge * _nearest(surface, edge) != edge:
         return PatternError(
-            f"The model is {model(surface)}, so that about {cells:,.0f} cells with edges of "
+            f"The model is {model(surface)}, so that about {length(cells)} cells with edges of "
             f"{edge:g}{unit(surface)} would be needed, over the limit of {limit:,}: did you mean "
             f"{_meant(surface, edge):g}?",
             data=data,
